@@ -1,0 +1,1 @@
+"""The standard nodes: one module a technique, folders by family."""

@@ -1,0 +1,1 @@
+"""Shipped pipelines; shipped scenes in `scenes/`."""

@@ -1,0 +1,3 @@
+"""Declarative real-time rendering: one YAML file is a renderer."""
+
+__version__ = "0.1.0"

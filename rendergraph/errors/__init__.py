@@ -1,0 +1,129 @@
+"""Problems, where they are, and the exceptions that carry them.
+
+A *problem* is one mistake with its place; an exception carries all problems found before stopping. Each code has one
+file beside this module, `RG103-unknown-param.yaml`, with the wrong text, its exact message and the mended text; tests,
+docs and `rendergraph explain RG103` read it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import ClassVar, Literal
+
+
+@dataclass(frozen=True, order=True)
+class Place:
+    """A place in a file; line and column start at 1, 0 where a file has none (a mesh, a command-line option)."""
+
+    file: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        if self.line:
+            return f"{self.file}:{self.line}:{self.column}"
+        return self.file
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake: `file:line:col: RG103 text`, with the line of the file beneath.
+
+    Attributes:
+        code: `RG` and three digits.
+        text: where, what, and the way out, in one line.
+        place: where it stands, None where it stands nowhere.
+        line_text: the line of the file, empty where unknown.
+        severity: an `error` stops, a `warning` is said and the work goes on.
+    """
+
+    code: str
+    text: str
+    place: Place | None = None
+    line_text: str = ""
+    severity: Literal["error", "warning"] = "error"
+
+    def __str__(self) -> str:
+        head = f"{self.place}: " if self.place else ""
+        word = "warning: " if self.severity == "warning" else ""
+        text = f"{head}{word}{self.code} {self.text}"
+        if self.line_text and self.place and self.place.line:
+            shown = self.line_text.expandtabs(1)
+            text += f"\n    {shown}\n    {' ' * (self.place.column - 1)}^"
+        return text
+
+    def as_json(self) -> dict[str, object]:
+        """The same as plain JSON values."""
+        return {
+            "code": self.code,
+            "severity": self.severity,
+            "file": self.place.file if self.place else None,
+            "line": self.place.line if self.place and self.place.line else None,
+            "column": self.place.column if self.place and self.place.line else None,
+            "text": self.text,
+        }
+
+
+class RendergraphError(Exception):
+    """Base of everything a user can cause; `exit_code` is the command line's."""
+
+    exit_code: ClassVar[int] = 1
+
+    def __init__(self, problems: Problem | Sequence[Problem]) -> None:
+        self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class InputError(RendergraphError):
+    """Something named on the command line or in a file is missing or wrong: pipeline, scene, mesh, image, shader."""
+
+    exit_code = 3
+
+
+class RenderError(RendergraphError):
+    """It failed while running: disk, memory, GL."""
+
+    exit_code = 1
+
+
+class UsageError(RendergraphError):
+    """The command line itself is malformed."""
+
+    exit_code = 2
+
+
+class DeviceError(RendergraphError):
+    """No usable GL device."""
+
+    exit_code = 5
+
+
+def nearest(word: str, words: Iterable[str]) -> str | None:
+    """The word a user most likely meant, or None.
+
+    `difflib` alone misses shared beginnings (`kernal` for `kernel_size`), so words that share a prefix of four letters or a token
+    count too.
+    """
+    known = sorted(words)
+    lowered = {candidate.lower(): candidate for candidate in reversed(known)}
+    close = get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    if close:
+        return lowered[close[0]]
+    for low, candidate in sorted(lowered.items()):
+        tokens = low.replace("-", "_").split("_")
+        if get_close_matches(word.lower(), tokens, n=1, cutoff=0.75):
+            return candidate
+    return None
+
+
+def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
+    """`; did you mean 'x'?`, or the whole list where it is short, or nothing."""
+    known = sorted(set(words))
+    near = nearest(word, known)
+    if near is not None:
+        return f"; did you mean '{near}'?"
+    if 0 < len(known) <= most:
+        return f"; there is {', '.join(known)}"
+    return ""

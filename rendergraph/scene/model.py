@@ -1,0 +1,249 @@
+"""What a scene is: immutable values that readers make and `pack` lays out for the GPU.
+
+Conventions are glTF 2.0's: right-handed, +Y up, metres, column vectors, scene-linear colours, texture coordinates with
+the origin at the image's top left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Floats: TypeAlias = npt.NDArray[np.float32]
+Matrix: TypeAlias = npt.NDArray[np.float64]
+Vec3: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with their vertex attributes, one material's worth of geometry.
+
+    Attributes:
+        name: from the file.
+        positions: float32 (n, 3), finite.
+        indices: uint32 (m, 3), each below n; counter-clockwise seen from outside.
+        normals: float32 (n, 3) unit length, or None: the reader fills them in (mean of adjacent face normals).
+        tangents: float32 (n, 4), w the handedness, or None: the shader derives them.
+        uv0, uv1: float32 (n, 2), or None.
+        colors: float32 (n, 4) linear, or None for white.
+    """
+
+    name: str
+    positions: Floats
+    indices: npt.NDArray[np.uint32]
+    normals: Floats
+    tangents: Floats | None = None
+    uv0: Floats | None = None
+    uv1: Floats | None = None
+    colors: Floats | None = None
+
+
+@dataclass(frozen=True)
+class ImageSource:
+    """An image not yet decoded: a file, or bytes inside another file.
+
+    Attributes:
+        path: the file it comes from (also where `data` holds its bytes, for messages).
+        data: the encoded bytes where the image is embedded, else None.
+        label: how messages name it.
+    """
+
+    path: Path
+    data: bytes | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image with its sampling and coordinates.
+
+    Attributes:
+        image: where the pixels come from.
+        srgb: decoded with the sRGB curve (base colour, emissive).
+        wrap_s, wrap_t: `repeat`, `mirror` or `clamp`.
+        mag_filter: `nearest` or `linear`.
+        min_filter: `nearest`, `linear` (no mips), `nearest_mipmap_nearest`, … as in glTF.
+        uv: which UV set, 0 or 1.
+        transform: KHR_texture_transform as a 2×3 matrix on (u, v, 1), row by row; None for identity.
+    """
+
+    image: ImageSource
+    srgb: bool
+    wrap_s: Literal["repeat", "mirror", "clamp"] = "repeat"
+    wrap_t: Literal["repeat", "mirror", "clamp"] = "repeat"
+    mag_filter: Literal["nearest", "linear"] = "linear"
+    min_filter: str = "linear_mipmap_linear"
+    uv: int = 0
+    transform: tuple[float, float, float, float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface, glTF's names in snake case.
+
+    Attributes:
+        base_color: linear RGBA factor.
+        metallic, roughness: factors, 0 to 1.
+        emissive: linear RGB factor, `emissive_strength` already multiplied in.
+        occlusion_strength, normal_scale: as in glTF.
+        alpha_mode, alpha_cutoff, double_sided, unlit: as in glTF.
+        ior: index of refraction; dielectric f0 is ((ior-1)/(ior+1))².
+        specular: KHR_materials_specular factor; `specular_color` its linear RGB.
+        anisotropy_strength, anisotropy_rotation: as in KHR_materials_anisotropy, radians.
+        textures: by slot: `base_color`, `metallic_roughness`, `normal`, `occlusion`, `emissive`, `anisotropy`,
+            `specular`, `specular_color`.
+        ambient, diffuse, specular_phong, shininess: an OBJ's Ka, Kd, Ks, Ns where the MTL gives no Pr/Pm; None where
+            the material is metallic-roughness (design.md §8 says how one is derived from the other).
+    """
+
+    name: str
+    base_color: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    metallic: float = 0.0
+    roughness: float = 1.0
+    emissive: Vec3 = (0.0, 0.0, 0.0)
+    occlusion_strength: float = 1.0
+    normal_scale: float = 1.0
+    alpha_mode: Literal["opaque", "mask", "blend"] = "opaque"
+    alpha_cutoff: float = 0.5
+    double_sided: bool = False
+    unlit: bool = False
+    ior: float = 1.5
+    specular: float = 1.0
+    specular_color: Vec3 = (1.0, 1.0, 1.0)
+    anisotropy_strength: float = 0.0
+    anisotropy_rotation: float = 0.0
+    textures: Mapping[str, Texture] = field(default_factory=dict)
+    ambient: Vec3 | None = None
+    diffuse: Vec3 | None = None
+    specular_phong: Vec3 | None = None
+    shininess: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """One placed mesh.
+
+    Attributes:
+        name: node or `o` name, unique within its file.
+        mesh: index into `Scene.meshes`.
+        material: index into `Scene.materials`.
+        transform: object to world, float64 (4, 4), affine.
+        casts_shadow: false for names ending in `NS` and where a file says so.
+        hidden: not drawn.
+    """
+
+    name: str
+    mesh: int
+    material: int
+    transform: Matrix
+    casts_shadow: bool = True
+    hidden: bool = False
+
+
+@dataclass(frozen=True)
+class Light:
+    """A punctual light (KHR_lights_punctual).
+
+    Attributes:
+        type: `directional`, `point` or `spot`.
+        position: world space, metres; unused for directional.
+        direction: unit vector the light travels along; unused for point.
+        color: linear RGB.
+        intensity: lux for directional, candela for point and spot.
+        range: metres where the inverse-square falloff is windowed to zero, None for no window.
+        inner, outer: half angles of the spot's cone in radians.
+        casts_shadow: whether `shadow_map.light: auto` may choose it.
+    """
+
+    name: str
+    type: Literal["directional", "point", "spot"]
+    position: Vec3 = (0.0, 0.0, 0.0)
+    direction: Vec3 = (0.0, -1.0, 0.0)
+    color: Vec3 = (1.0, 1.0, 1.0)
+    intensity: float = 1.0
+    range: float | None = None
+    inner: float = 0.0
+    outer: float = 0.7853981633974483
+    casts_shadow: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera.
+
+    Attributes:
+        name: from the file.
+        transform: camera to world, float64 (4, 4), looking down -Z.
+        type: `perspective`, `orthographic` or `frustum` (off-centre perspective).
+        fov_y: vertical angle in radians (perspective).
+        height: full height in metres (orthographic); the width follows the picture's aspect.
+        frustum: left, right, bottom, top at the near plane in metres.
+        near, far: metres; far may be infinite for perspective.
+        target: the point it was aimed at, for orbits; None where unknown.
+    """
+
+    name: str
+    transform: Matrix
+    type: Literal["perspective", "orthographic", "frustum"] = "perspective"
+    fov_y: float = 0.7853981633974483
+    height: float = 2.0
+    frustum: tuple[float, float, float, float] | None = None
+    near: float = 0.05
+    far: float = 100.0
+    target: Vec3 | None = None
+
+
+@dataclass(frozen=True)
+class Environment:
+    """An equirectangular image around the scene.
+
+    Attributes:
+        image: the file.
+        intensity: factor on its radiance.
+        rotate: radians about +Y.
+    """
+
+    image: ImageSource
+    intensity: float = 1.0
+    rotate: float = 0.0
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A camera that turns about its target."""
+
+    camera: str
+    degrees_per_second: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that can be drawn, with what lights and sees it.
+
+    Attributes:
+        name: the file's stem.
+        source: the file.
+        objects, meshes, materials, lights: in the file's order; objects index meshes and materials.
+        cameras: by name, the first is the default.
+        environment: or None.
+        keyframes: dotted path to times in seconds and values, linear between, held outside.
+        orbit: or None.
+        warnings: what a reader left out, replaced or clamped, once a kind and file.
+    """
+
+    name: str
+    source: Path | None = None
+    objects: tuple[Object, ...] = ()
+    meshes: tuple[Mesh, ...] = ()
+    materials: tuple[Material, ...] = ()
+    lights: tuple[Light, ...] = ()
+    cameras: Mapping[str, Camera] = field(default_factory=dict)
+    environment: Environment | None = None
+    keyframes: Mapping[str, tuple[tuple[float, Any], ...]] = field(default_factory=dict)
+    orbit: Orbit | None = None
+    warnings: tuple[Any, ...] = ()

@@ -1,0 +1,227 @@
+"""Formats, what texels mean, and the description a texture is allocated from.
+
+Nothing here touches GL: a format knows its GL enum as a number so that `gl` needs no second table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "scene", "function"]
+TEXTURE_KINDS: frozenset[str] = frozenset({"texture2d", "texture2d_array", "texture_cube"})
+
+Family = Literal["float", "unorm", "uint", "int", "depth", "depth_stencil"]
+Filter = Literal["nearest", "linear", "trilinear"]
+Wrap = Literal["clamp", "repeat", "mirror", "border"]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One texel format.
+
+    Attributes:
+        name: the word used in declarations and files, for example `rgba16f`.
+        gl: the sized internal format's GL enum.
+        components: channels per texel, 1 to 4.
+        bytes: bytes per texel.
+        family: how the shader sees the channels; two formats of one family can stand for each other at a port.
+        view_class: formats of one class share storage through texture views (OpenGL 4.6, table 8.22); depth formats
+            are each their own class, for they never share storage with colour.
+        srgb: whether the sRGB curve is decoded on read and encoded on write.
+    """
+
+    name: str
+    gl: int
+    components: int
+    bytes: int
+    family: Family
+    view_class: str
+    srgb: bool = False
+
+    @property
+    def is_depth(self) -> bool:
+        """Whether a texture of this format is a depth attachment."""
+        return self.family in ("depth", "depth_stencil")
+
+
+def _formats() -> dict[str, Format]:
+    rows: list[tuple[str, int, int, int, Family]] = [
+        ("r8", 0x8229, 1, 1, "unorm"),
+        ("rg8", 0x822B, 2, 2, "unorm"),
+        ("rgba8", 0x8058, 4, 4, "unorm"),
+        ("srgb8_a8", 0x8C43, 4, 4, "unorm"),
+        ("r16", 0x822A, 1, 2, "unorm"),
+        ("rg16", 0x822C, 2, 4, "unorm"),
+        ("rgba16", 0x805B, 4, 8, "unorm"),
+        ("rgb10_a2", 0x8059, 4, 4, "unorm"),
+        ("r16f", 0x822D, 1, 2, "float"),
+        ("rg16f", 0x822F, 2, 4, "float"),
+        ("rgba16f", 0x881A, 4, 8, "float"),
+        ("r11f_g11f_b10f", 0x8C3A, 3, 4, "float"),
+        ("r32f", 0x822E, 1, 4, "float"),
+        ("rg32f", 0x8230, 2, 8, "float"),
+        ("rgba32f", 0x8814, 4, 16, "float"),
+        ("r8ui", 0x8232, 1, 1, "uint"),
+        ("r16ui", 0x8234, 1, 2, "uint"),
+        ("r32ui", 0x8236, 1, 4, "uint"),
+        ("rg32ui", 0x823C, 2, 8, "uint"),
+        ("rgba32ui", 0x8D70, 4, 16, "uint"),
+        ("r32i", 0x8235, 1, 4, "int"),
+    ]
+    table = {n: Format(n, gl, c, b, f, f"{8 * b}-bit", srgb=n.startswith("srgb")) for n, gl, c, b, f in rows}
+    for name, gl, size, family in (
+        ("depth16", 0x81A5, 2, "depth"),
+        ("depth32f", 0x8CAC, 4, "depth"),
+        ("depth24_stencil8", 0x88F0, 4, "depth_stencil"),
+        ("depth32f_stencil8", 0x8CAD, 8, "depth_stencil"),
+    ):
+        table[name] = Format(name, gl, 1, size, family, name)  # type: ignore[arg-type]  # a tuple of literals widens
+    return table
+
+
+FORMATS: dict[str, Format] = _formats()
+
+
+@dataclass(frozen=True)
+class Semantic:
+    """What the texels of a port mean.
+
+    Attributes:
+        name: the word in files and messages.
+        doc: one line, with units and range.
+        space: the space directions or positions are in, where that matters: `view`, `world` or None.
+        encoding: `linear` or `display` for colours, None for everything else.
+    """
+
+    name: str
+    doc: str
+    space: Literal["view", "world"] | None = None
+    encoding: Literal["linear", "display"] | None = None
+
+
+Radiance = Semantic("radiance", "Scene-linear radiance, Rec. 709 primaries, 0 to infinity.", encoding="linear")
+DisplayColor = Semantic("display_color", "Display-referred colour, sRGB encoded, 0 to 1.", encoding="display")
+Albedo = Semantic("albedo", "Linear base colour, 0 to 1.", encoding="linear")
+Emissive = Semantic("emissive", "Emitted radiance, scene-linear.", encoding="linear")
+Normal = Semantic("normal", "Unit normal in world space.", space="world")
+Material = Semantic("material", "Metallic, roughness, occlusion and model data, 0 to 1.")
+Depth = Semantic("depth", "Window depth, 0 near to 1 far.")
+LinearDepth = Semantic("linear_depth", "Distance along the view axis, -z in view space, metres.")
+ShadowMap = Semantic("shadow_map", "Window depth seen from lights, one layer a view.")
+Visibility = Semantic("visibility", "1 lit, 0 shadowed, one layer a shadowed light.")
+Occlusion = Semantic("occlusion", "Ambient visibility: 1 open, 0 closed.")
+Luminance = Semantic("luminance", "Scene luminance, relative to white at 1.")
+IrradianceSH = Semantic("irradiance_sh", "L2 spherical harmonics of the environment's radiance.")
+Any = Semantic("any", "Whatever is connected.")
+View = Semantic("view", "Matrices and size that geometry is drawn with.")
+SceneRef = Semantic("scene", "The scene that is drawn.")
+
+SEMANTICS: tuple[Semantic, ...] = (
+    Radiance, DisplayColor, Albedo, Emissive, Normal, Material, Depth, LinearDepth, ShadowMap, Visibility, Occlusion,
+    Luminance, IrradianceSH, Any, View, SceneRef,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A function that one node provides and another calls inside its shader.
+
+    Attributes:
+        name: the GLSL name the caller uses, for example `shadow`.
+        declaration: the GLSL declaration without a semicolon.
+        arguments: the argument names in order, to forward them.
+        combine: the operator that joins several providers.
+        neutral: the GLSL value with no provider.
+        doc: what it returns.
+        texture: name of the semantic whose textures provide the same in screen space, read at the fragment's own
+            texel, one layer a light; None where there is no such form.
+    """
+
+    name: str
+    declaration: str
+    arguments: tuple[str, ...]
+    combine: str
+    neutral: str
+    doc: str
+    texture: str | None = None
+
+
+ShadowLookup = Signature(
+    name="shadow",
+    declaration="float shadow(int light, vec3 position, vec3 normal)",
+    arguments=("light", "position", "normal"),
+    combine="*",
+    neutral="1.0",
+    doc="Visibility of the scene's light from a world-space position with a geometric normal; 1 for other lights.",
+    texture="visibility",
+)
+
+SIGNATURES: tuple[Signature, ...] = (ShadowLookup,)
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """How a reader samples; two readers of one texture may differ, so this becomes a GL sampler object."""
+
+    filter: Filter = "nearest"
+    wrap: Wrap = "clamp"
+    compare: bool = False
+    anisotropy: int = 1
+
+
+@dataclass(frozen=True)
+class TextureDesc:
+    """What a texture is allocated from; equal descriptions can share one texture.
+
+    Attributes:
+        kind: `texture2d`, `texture2d_array` or `texture_cube`; multisampled where `samples` is above 1.
+        format: a name in `FORMATS`.
+        width, height: texels of mip 0, each at least 1.
+        layers: array layers; 6 for a cube.
+        mips: levels of the mip chain, 1 for none.
+        samples: samples per texel.
+    """
+
+    kind: Kind
+    format: str
+    width: int
+    height: int
+    layers: int = 1
+    mips: int = 1
+    samples: int = 1
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of mip 0 in texels."""
+        return self.width, self.height
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of all mips, layers and samples by formula; a driver may pad."""
+        texels = 0
+        for mip in range(self.mips):
+            w, h = self.mip_size(mip)
+            texels += w * h
+        return texels * self.layers * self.samples * FORMATS[self.format].bytes
+
+    def mip_size(self, mip: int) -> tuple[int, int]:
+        """Width and height of one level."""
+        return max(1, self.width >> mip), max(1, self.height >> mip)
+
+    @property
+    def storage_class(self) -> TextureDesc:
+        """The description with its format replaced by the texel class's name: equal ones can share through a view."""
+        return replace(self, format=FORMATS[self.format].view_class)
+
+
+@dataclass(frozen=True)
+class BufferDesc:
+    """A buffer of `bytes` bytes."""
+
+    bytes: int
+
+
+def full_mip_count(width: int, height: int) -> int:
+    """Levels down to 1×1."""
+    return max(width, height).bit_length()

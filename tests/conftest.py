@@ -1,0 +1,17 @@
+"""Fixtures for every test."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of reference data and assets beside the project; tests that need it skip where it is missing."""
+    folder = Path(os.environ.get("RENDERGRAPH_SHARED", Path(__file__).parents[2] / "shared"))
+    if not (folder / "reference").is_dir():
+        pytest.skip("no shared reference data beside the project")
+    return folder
