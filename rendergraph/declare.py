@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
-from rendergraph.textures import FORMATS, Filter, Kind, Semantic, Signature, TextureDesc, Wrap
+from rendergraph.textures import FORMATS, Filter, Kind, Sampler, Semantic, Signature, TextureDesc, Wrap
 
 if TYPE_CHECKING:
     from rendergraph.steps import Frame, Steps
@@ -101,6 +101,10 @@ class Port:
         """One array layer or cube face as an ordinary 2D texture."""
         return Part(self, layer=index)
 
+    def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
+        """The whole texture, read with this sampler; inputs have theirs declared."""
+        return Part(self, sampler=Sampler(filter, wrap, compare))
+
 
 @dataclass(frozen=True)
 class Part:
@@ -110,14 +114,19 @@ class Part:
     mip: int | None = None
     layer: int | None = None
     previous: bool = False
+    sampler: Sampler | None = None
 
     def at_mip(self, level: int) -> Part:
         """The same layer's level."""
-        return Part(self.port, level, self.layer, self.previous)
+        return replace(self, mip=level)
 
     def at_layer(self, index: int) -> Part:
         """The same level's layer."""
-        return Part(self.port, self.mip, index, self.previous)
+        return replace(self, layer=index)
+
+    def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
+        """The same part, read with this sampler."""
+        return replace(self, sampler=Sampler(filter, wrap, compare))
 
 
 @dataclass(frozen=True, eq=False)
@@ -395,19 +404,7 @@ class Node(BaseModel):
 
 # Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that pydantic's base owns.
 RESERVED_NAMES: frozenset[str] = frozenset(
-    """
-    attribute const uniform varying buffer shared coherent volatile restrict readonly writeonly layout centroid flat smooth
-    noperspective patch sample break continue do for while switch case default if else subroutine in out inout float double
-    int void bool true false invariant precise discard return mat2 mat3 mat4 vec2 vec3 vec4 ivec2 ivec3 ivec4 bvec2 bvec3
-    bvec4 uint uvec2 uvec3 uvec4 lowp mediump highp precision struct common partition active asm class union enum typedef
-    template this resource goto inline noinline public static extern external interface long short half fixed unsigned superp
-    input output hvec2 hvec3 hvec4 fvec2 fvec3 fvec4 sampler3DRect filter image sizeof cast namespace using texture
-    sampler2D sampler3D samplerCube image2D
-    abs acos all any asin atan ceil clamp cos cross degrees determinant distance dot equal exp exp2 floor fma fract inverse
-    inversesqrt length log log2 main max min mix mod modf normalize not pow radians reflect refract round sign sin
-    smoothstep sqrt step tan transpose trunc
-    copy json dict schema construct fields validate record update ports inputs outputs groups parameters shader role_of
-    """.split()
+    ["attribute", "const", "uniform", "varying", "buffer", "shared", "coherent", "volatile", "restrict", "readonly", "writeonly", "layout", "centroid", "flat", "smooth", "noperspective", "patch", "sample", "break", "continue", "do", "for", "while", "switch", "case", "default", "if", "else", "subroutine", "in", "out", "inout", "float", "double", "int", "void", "bool", "true", "false", "invariant", "precise", "discard", "return", "mat2", "mat3", "mat4", "vec2", "vec3", "vec4", "ivec2", "ivec3", "ivec4", "bvec2", "bvec3", "bvec4", "uint", "uvec2", "uvec3", "uvec4", "lowp", "mediump", "highp", "precision", "struct", "common", "partition", "active", "asm", "class", "union", "enum", "typedef", "template", "this", "resource", "goto", "inline", "noinline", "public", "static", "extern", "external", "interface", "long", "short", "half", "fixed", "unsigned", "superp", "input", "output", "hvec2", "hvec3", "hvec4", "fvec2", "fvec3", "fvec4", "sampler3DRect", "filter", "image", "sizeof", "cast", "namespace", "using", "texture", "sampler2D", "sampler3D", "samplerCube", "image2D", "abs", "acos", "all", "any", "asin", "atan", "ceil", "clamp", "cos", "cross", "degrees", "determinant", "distance", "dot", "equal", "exp", "exp2", "floor", "fma", "fract", "inverse", "inversesqrt", "length", "log", "log2", "main", "max", "min", "mix", "mod", "modf", "normalize", "not", "pow", "radians", "reflect", "refract", "round", "sign", "sin", "smoothstep", "sqrt", "step", "tan", "transpose", "trunc", "copy", "json", "dict", "schema", "construct", "fields", "validate", "record", "update", "ports", "inputs", "outputs", "groups", "parameters", "shader", "role_of"]
 )
 
 

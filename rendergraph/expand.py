@@ -1,11 +1,33 @@
-"""Graph to Expansion: what each node records, with resources and versions in place of ports."""
+"""Graph to Expansion: what each node records, with resources and versions in place of ports.
+
+Nodes are recorded from the end of the graph to its beginning, so that a node already knows which of its outputs
+anybody reads; then versions are counted from the beginning to the end.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, get_args
 
-from rendergraph.steps import Resource, Step
+from rendergraph.declare import (
+    Facts, Function, History, InOut, Input, Internal, Made, Node, Output, Part, Port, TextureInfo, Views,
+)  # fmt: skip
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.link import Endpoint, Graph, GraphNode
+from rendergraph.steps import FunctionBinding, Read, Request, Resource, Step, Steps, UniformValue, Write, define_text
+from rendergraph.textures import TEXTURE_KINDS, BufferDesc, Sampler, TextureDesc
+
+CAMERA = "camera"
+"""Id of the view table every pipeline has."""
+
+
+@dataclass(frozen=True)
+class ViewTable:
+    """A table of views: how many, and the scene's light index of each (empty where views are not lights')."""
+
+    count: int = 1
+    lights: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -17,9 +39,511 @@ class Expansion:
         resources: by id.
         wanted: ids of the resources that must exist at the end of the frame (outputs and taps), with output names.
         idle: nodes that recorded nothing, with the reason.
+        views: view tables by id.
     """
 
     steps: tuple[Step, ...]
     resources: Mapping[str, Resource]
     wanted: Mapping[str, str]
     idle: Mapping[str, str] = field(default_factory=dict)
+    views: Mapping[str, ViewTable] = field(default_factory=dict)
+
+
+def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
+    """Record every node that `wanted` needs.
+
+    Args:
+        graph: a checked graph.
+        wanted: name to port for everything that must exist at the end of the frame; the file's outputs by default.
+
+    Raises:
+        InputError: a node recorded something that its declaration does not allow.
+    """
+    outputs = dict(graph.outputs if wanted is None else wanted)
+    order = _topological(graph)
+    recorders, idle = _record_all(graph, order, outputs)
+    return _Numbering(graph, recorders, idle, outputs).expansion()
+
+
+def is_empty(info: TextureInfo | None) -> bool:
+    """Whether a texture has no layers: no light casts, nothing is drawn, and readers do without."""
+    return info is not None and info.desc is not None and info.desc.layers == 0
+
+
+def _topological(graph: Graph) -> list[str]:
+    import networkx as nx
+
+    dag = nx.DiGraph()
+    dag.add_nodes_from(graph.dag.nodes)
+    dag.add_edges_from((a, b) for a, b, previous in graph.dag.edges(data="previous") if not previous)
+    place = {name: number for number, name in enumerate(dag)}
+    return list(nx.lexicographical_topological_sort(dag, key=place.__getitem__))
+
+
+# --- recording -------------------------------------------------------------------------------------------------------
+
+
+class _Recorder:
+    """The `steps.Recorder` of one node: keeps requests, answers what is known."""
+
+    def __init__(self, graph: Graph, node: GraphNode, used: set[str]) -> None:
+        self.graph = graph
+        self.node = node
+        self.used_ports = used
+        self.requests: list[Request] = []
+        self.links = {
+            name: tuple(end for end in ends if not is_empty(graph.textures.get(_now(end))))
+            for name, ends in node.inputs.items()
+        }
+        self.facts = Facts(
+            viewport=graph.size,
+            lights=graph.lights,
+            inputs={
+                name: tuple(graph.textures[_now(end)] for end in ends if _now(end) in graph.textures)
+                for name, ends in self.links.items()
+                if ends
+            },
+        )
+
+    def desc(self, port: Port) -> TextureDesc | BufferDesc:
+        if isinstance(port, Input):
+            found = self.facts.input(port.name).desc
+            return found if found is not None else BufferDesc(self.facts.input(port.name).bytes)
+        info = self.graph.textures[Endpoint(self.node.id, port.name)]
+        return info.desc if info.desc is not None else BufferDesc(info.bytes)
+
+    def used(self, port: Port) -> bool:
+        return port.name in self.used_ports
+
+    def add(self, request: Request) -> None:
+        self.requests.append(request)
+
+    def reads_of(self, request: Request) -> Iterator[tuple[str, Port | Part]]:
+        """Names and ports a request reads, with the default inputs filled in."""
+        if not request.default_inputs:
+            yield from request.bindings.items()
+            return
+        for name, port in self.node.node.inputs().items():
+            if isinstance(port, Input) and self.links.get(name):
+                yield name, port
+
+    def demands(self) -> Iterator[Endpoint]:
+        """The ports of other nodes that the recorded steps and the used functions read."""
+        ports = self.node.node.ports()
+        names: set[str] = set()
+        for request in self.requests:
+            for _, target in self.reads_of(request):
+                port = target.port if isinstance(target, Part) else target
+                names |= {port.name, *(port.reads if isinstance(port, Function) else ())}
+            names |= {part.port.name for _, part in request.out if isinstance(part.port, InOut)}
+            view = request.options.get("view")
+            names |= {view.name} if isinstance(view, Input) else set()
+            if "view" in self.links:
+                names.add("view")
+        for name in self.used_ports:
+            port = ports.get(name)
+            if isinstance(port, Function):
+                names.update(port.reads)
+        for name in names:
+            yield from self.links.get(name, ())
+
+
+def _now(end: Endpoint) -> Endpoint:
+    return replace(end, previous=False) if end.previous else end
+
+
+def _record_all(
+    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint]
+) -> tuple[dict[str, _Recorder], dict[str, str]]:
+    demanded: dict[str, set[str]] = {name: set() for name in order}
+    for end in wanted.values():
+        demanded[end.node].add(end.port)
+    for node in graph.nodes:  # last frame's readers may come earlier in the order, so all of them count
+        for ends in node.inputs.values():
+            for end in ends:
+                if end.previous:
+                    demanded[end.node].add(end.port)
+    recorders: dict[str, _Recorder] = {}
+    idle: dict[str, str] = {}
+    for name in reversed(order):
+        node = graph[name]
+        used = demanded[name]
+        if not used:
+            idle[name] = "nothing that is wanted reads its outputs"
+            continue
+        reason = _nothing_to_do(graph, node, used)
+        if reason:
+            idle[name] = reason
+            continue
+        recorder = _Recorder(graph, node, used)
+        steps = Steps(node.node, name, node.type.name, recorder)
+        try:
+            node.node.record(steps)
+        except (InputError, AssertionError, KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(_author_problem(node, error)) from error
+        recorders[name] = recorder
+        for end in recorder.demands():
+            demanded[end.node].add(end.port)
+    return {name: recorders[name] for name in order if name in recorders}, idle
+
+
+def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
+    """Why a node has nothing to record: what it would draw, or what it must read, has no layers."""
+    made = [graph.textures.get(Endpoint(node.id, name)) for name in used]
+    if made and all(is_empty(info) for info in made):
+        return f"{node.id}.{min(used)} has no layers: there is nothing to draw"
+    for name, port in node.node.inputs().items():
+        ends = node.inputs.get(name, ())
+        if isinstance(port, Input) and not port.optional and ends:
+            if all(is_empty(graph.textures.get(_now(end))) for end in ends):
+                return f"{ends[0]} has no layers: there is nothing to read"
+    return None
+
+
+def _author_problem(node: GraphNode, error: Exception) -> Problem:
+    import traceback
+
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(node.type.file)]
+    where = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
+    text = f"node '{node.id}' ({node.type.name}) failed while recording: {where}{type(error).__name__}: {error}"
+    return Problem("RG420", text, node.place)
+
+
+# --- numbering -------------------------------------------------------------------------------------------------------
+
+
+class _Numbering:
+    """Second pass: resources and versions for what was recorded."""
+
+    def __init__(
+        self, graph: Graph, recorders: dict[str, _Recorder], idle: dict[str, str], wanted: dict[str, Endpoint]
+    ) -> None:
+        self.graph = graph
+        self.recorders = recorders
+        self.idle = idle
+        self.wanted = wanted
+        self.version: dict[str, int] = {}
+        self.at_end: dict[Endpoint, tuple[str, int]] = {}
+        self.written: dict[str, set[tuple[int | None, int | None]]] = {}
+        self.resources: dict[str, Resource] = {}
+        self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
+        self.steps: list[Step] = []
+
+    def expansion(self) -> Expansion:
+        for name, recorder in self.recorders.items():
+            self._declare(recorder)
+            before = len(self.steps)
+            for request in recorder.requests:
+                self.steps.append(self._step(recorder, request, len(self.steps) - before))
+            if len(self.steps) == before and not any(
+                isinstance(port, Function | Views) and port.name in recorder.used_ports
+                for port in recorder.node.node.outputs().values()
+            ):
+                self.idle[name] = "it recorded no step"
+            for port in recorder.node.node.ports().values():
+                if isinstance(port, Made):
+                    self._finish(recorder, port)
+        wanted = self._wanted()
+        self._mark_roles(wanted)
+        return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
+
+    def _declare(self, recorder: _Recorder) -> None:
+        """Give every texture the node may write a resource; an `InOut` continues somebody's."""
+        node = recorder.node
+        for port in node.node.ports().values():
+            end = Endpoint(node.id, port.name)
+            if isinstance(port, Views):
+                count = port.count(node.node, recorder.facts) if callable(port.count) else port.count
+                lights = port.lights(node.node, recorder.facts) if port.lights else ()
+                self.views[str(end)] = ViewTable(count, lights)
+            if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
+                continue
+            if isinstance(port, InOut) and recorder.links.get(port.name):
+                self.at_end[end] = self.at_end[_now(recorder.links[port.name][0])]
+                continue
+            info = self.graph.textures[end]
+            desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
+            role = "internal" if isinstance(port, Internal) else "history" if isinstance(port, History) else "transient"
+            resource = Resource(str(end), desc, role, port.first, info.view, info.lights)
+            self.resources[resource.id] = resource
+            self.version[resource.id] = 0
+            self.written[resource.id] = set()
+            self.at_end[end] = (resource.id, 0)
+
+    def _finish(self, recorder: _Recorder, port: Made) -> None:
+        end = Endpoint(recorder.node.id, port.name)
+        if end in self.at_end:
+            resource, _ = self.at_end[end]
+            self.at_end[end] = (resource, self.version[resource])
+
+    def _step(self, recorder: _Recorder, request: Request, index: int) -> Step:
+        node = recorder.node
+        options = dict(request.options)
+        reads: list[Read] = []
+        functions: list[FunctionBinding] = []
+        for name, target in recorder.reads_of(request):
+            port = target.port if isinstance(target, Part) else target
+            if isinstance(port, Function):
+                functions += self._own_function(recorder, port)
+            elif isinstance(port, Input) and port.kind == "function":
+                functions += [f for end in recorder.links[port.name] for f in self._function(end)]
+            elif not (isinstance(port, Input) and port.kind in ("view", "scene")):
+                reads += self._reads(recorder, name, target if isinstance(target, Part) else Part(port))
+        writes: list[Write] = []
+        for name, part in request.out:
+            read, write = self._write(recorder, request, name, part, options.get("value"))
+            reads += read
+            writes.append(write)
+        view, view_index = self._view(recorder, request, options)
+        self._carry_view(writes, view if request.kind == "geometry" else None)
+        size, samples = self._target_size(writes, reads)
+        attributes = options.pop("attributes", {})
+        vertices = options.get("vertices", 3)
+        if isinstance(vertices, Port):
+            reads += self._reads(recorder, vertices.name, Part(vertices))
+            vertices = reads[-1].resource
+        for port in attributes.values():
+            reads += self._reads(recorder, port.name, Part(port))
+        keep = ("state", "objects", "materials", "order", "per_light", "topology", "instances", "groups")
+        return Step(
+            node=node.id,
+            index=index,
+            kind=request.kind,
+            shaders=request.shaders,
+            reads=tuple(reads),
+            writes=tuple(writes),
+            functions=tuple(functions),
+            defines=(*self._defines(recorder, reads, functions), *request.defines.items()),
+            uniforms=(*param_uniforms(node.node), *request.uniforms.items()),
+            size=size,
+            samples=samples,
+            view=view,
+            view_index=view_index,
+            vertices=vertices,
+            attributes=tuple((layout, self._own(recorder, port)) for layout, port in attributes.items()),
+            label=f"{node.id}" + (f" {index}" if len(recorder.requests) > 1 else ""),
+            **{key: options[key] for key in keep if key in options},
+        )
+
+    def _own(self, recorder: _Recorder, port: Port) -> str:
+        return self.at_end[Endpoint(recorder.node.id, port.name)][0]
+
+    def _reads(self, recorder: _Recorder, name: str, part: Part) -> list[Read]:
+        port = part.port
+        if isinstance(port, Input):
+            ends = recorder.links.get(port.name, ())
+            sampler = part.sampler or Sampler(
+                port.filter(recorder.node.node) if callable(port.filter) else port.filter,
+                port.wrap, port.compare, port.anisotropy,
+            )  # fmt: skip
+            return [
+                self._read(f"{name}_{number}" if port.many else name, end, part, sampler, port.use)
+                for number, end in enumerate(ends)
+            ]
+        own = Endpoint(recorder.node.id, port.name, part.previous)
+        resource, _ = self.at_end[_now(own)]
+        use = "buffer" if isinstance(self.resources[resource].desc, BufferDesc) else "sample"
+        return [self._read(name, own, part, part.sampler or Sampler(), use, self.version[resource])]
+
+    def _read(
+        self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: str, version: int | None = None
+    ) -> Read:
+        resource, at_end = self.at_end[_now(end)] if _now(end) in self.at_end else (str(_now(end)), 0)
+        desc = self._desc_of(end, resource)
+        if isinstance(desc, BufferDesc):
+            use = "buffer"
+        whole = part.layer is None
+        kind = desc.kind if isinstance(desc, TextureDesc) and whole else "texture2d"
+        return Read(
+            name, resource, at_end if version is None else version, use, sampler,  # type: ignore[arg-type]
+            part.mip, part.layer, end.previous, kind,
+        )  # fmt: skip
+
+    def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
+        if resource in self.resources:
+            return self.resources[resource].desc
+        info = self.graph.textures[_now(end)]  # last frame's value of a node further down
+        return info.desc if info.desc is not None else BufferDesc(info.bytes)
+
+    def _write(
+        self, recorder: _Recorder, request: Request, name: str, part: Part, value: Any
+    ) -> tuple[list[Read], Write]:
+        port = part.port
+        if not isinstance(port, Made):
+            text = f"node '{recorder.node.id}' writes its {type(port).__name__.lower()} '{port.name}'"
+            raise InputError(Problem("RG421", text + "; only outputs, internals and history can be", recorder.node.place))
+        end = Endpoint(recorder.node.id, port.name)
+        if end not in self.at_end:
+            text = f"node '{recorder.node.id}' writes '{port.name}', which has no layers"
+            raise InputError(Problem("RG421", text, recorder.node.place))
+        resource, at_end = self.at_end[end]
+        desc = self.resources[resource].desc
+        old = self.version[resource]
+        self.version[resource] = old + 1
+        continued = isinstance(port, InOut) and bool(recorder.links.get(port.name))
+        key = (part.mip, part.layer)
+        parts = self.written[resource]
+        fresh = not continued and not (key in parts or (None, None) in parts)
+        parts.add(key)
+        clear = port.clear(recorder.node.node) if callable(port.clear) else port.clear
+        if request.kind == "clear":
+            load, clear = "clear", value
+        elif not fresh:
+            load = "load"
+        else:
+            load = "discard" if clear is None else "clear"
+        use = "color"
+        if isinstance(desc, BufferDesc):
+            use = "buffer"
+        elif request.kind == "compute":
+            use = "image"
+        elif self.is_depth(desc):
+            use = "depth"
+        read = []
+        if load == "load" and (continued or old > 0):
+            read = [Read(name, resource, old, "attach", mip=part.mip, layer=part.layer)]
+        if request.kind == "mipmaps":
+            read = [Read(name, resource, old, "attach")]
+            load = "load"
+        write = Write(name, resource, old + 1, use, load, 0.0 if clear is None else clear, part.mip, part.layer)  # type: ignore[arg-type]
+        return read, write
+
+    @staticmethod
+    def is_depth(desc: TextureDesc | BufferDesc) -> bool:
+        from rendergraph.textures import FORMATS
+
+        return isinstance(desc, TextureDesc) and FORMATS[desc.format].is_depth
+
+    def _view(self, recorder: _Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
+        port = options.pop("view", None)
+        index = options.pop("view_index", 0)
+        if request.kind not in ("geometry", "draw"):
+            return None, None
+        if isinstance(port, Views):
+            return str(Endpoint(recorder.node.id, port.name)), index
+        name = port.name if isinstance(port, Input) else "view"
+        ends = recorder.links.get(name, ())
+        return (str(ends[0]) if ends else CAMERA), index
+
+    def _carry_view(self, writes: Iterable[Write], view: str | None) -> None:
+        for write in writes:
+            resource = self.resources[write.resource]
+            if view is not None and resource.view is None:
+                self.resources[write.resource] = replace(resource, view=view)
+
+    def _target_size(self, writes: Iterable[Write], reads: Iterable[Read]) -> tuple[tuple[int, int], int]:
+        for touched in (*writes, *(read for read in reads if read.use == "depth_test")):
+            desc = self.resources[touched.resource].desc
+            if isinstance(desc, TextureDesc):
+                return desc.mip_size(touched.mip or 0), desc.samples
+        return (1, 1), 1
+
+    def _defines(
+        self, recorder: _Recorder, reads: list[Read], functions: list[FunctionBinding]
+    ) -> Iterator[tuple[str, str]]:
+        node = recorder.node.node
+        read_names = {read.name for read in reads}
+        for name, port in node.inputs().items():
+            many = isinstance(port, Input) and port.many
+            if name in read_names or (many and f"{name}_0" in read_names):
+                yield f"HAS_{name.upper()}", "1"
+            elif isinstance(port, Input) and port.kind == "function" and functions and recorder.links.get(name):
+                yield f"HAS_{name.upper()}", "1"
+        yield from define_parameters(node)
+
+    # Functions ------------------------------------------------------------------------------------------------------
+
+    def _own_function(self, recorder: _Recorder, port: Function) -> list[FunctionBinding]:
+        return self._binding(recorder, port)
+
+    def _function(self, end: Endpoint) -> list[FunctionBinding]:
+        recorder = self.recorders.get(end.node)
+        if recorder is None:
+            return []  # it has nothing to read: the consumer's function is then neutral
+        port = recorder.node.node.ports()[end.port]
+        assert isinstance(port, Function)
+        return self._binding(recorder, port)
+
+    def _binding(self, recorder: _Recorder, port: Function) -> list[FunctionBinding]:
+        node = recorder.node
+        reads = []
+        ports = node.node.ports()
+        for name in port.reads:
+            source = ports[name]
+            if isinstance(source, Input) and not recorder.links.get(name):
+                continue
+            if not isinstance(source, Input) and is_empty(self.graph.textures.get(Endpoint(node.id, name))):
+                continue
+            reads += self._reads(recorder, name, Part(source))
+        present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
+        return [
+            FunctionBinding(
+                port.signature.name, node.id, port.shader, tuple(reads),
+                (*present, *define_parameters(node.node)), tuple(param_uniforms(node.node)),
+            )
+        ]  # fmt: skip
+
+    # The end --------------------------------------------------------------------------------------------------------
+
+    def _wanted(self) -> dict[str, str]:
+        wanted: dict[str, str] = {}
+        for name, end in self.wanted.items():
+            if end in self.at_end and end.node not in self.idle:
+                wanted[name] = self.at_end[end][0]
+            else:
+                reason = self.idle.get(end.node, "it makes no texture")
+                text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
+                raise InputError(Problem("RG204", text, self.graph[end.node].place))
+        return wanted
+
+    def _mark_roles(self, wanted: dict[str, str]) -> None:
+        previous = {read.resource for step in self.steps for read in step.all_reads if read.previous}
+        for name in set(wanted.values()) | previous:
+            resource = self.resources[name]
+            role = "history" if name in previous or resource.role == "history" else "output"
+            self.resources[name] = replace(resource, role=role)
+
+
+# --- parameters as program text and uniforms -------------------------------------------------------------------------
+
+
+def define_parameters(node: Node) -> Iterator[tuple[str, str]]:
+    """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers."""
+    for name, info in type(node).parameters().items():
+        if type(node).role_of(name) != "define":
+            continue
+        value = getattr(node, name)
+        if isinstance(value, str):
+            choices = [choice for choice in get_args(info.annotation) if isinstance(choice, str)]
+            for number, choice in enumerate(choices):
+                yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
+            yield name.upper(), f"{name}_{value}".upper().replace("-", "_")
+        else:
+            yield name.upper(), define_text(value)
+
+
+def param_uniforms(node: Node) -> Iterator[tuple[str, UniformValue]]:
+    """Names and values of a node's `param` parameters; a number given for a vector fills it."""
+    for name, info in type(node).parameters().items():
+        if type(node).role_of(name) != "param":
+            continue
+        value = getattr(node, name)
+        extra = info.json_schema_extra
+        glsl = str(extra.get("glsl", "")) if isinstance(extra, Mapping) else ""
+        if glsl.startswith("vec") and not isinstance(value, tuple):
+            value = (float(value),) * int(glsl[3])
+        yield name, value
+
+
+def made_ports(node: Node) -> Iterator[Made]:
+    """The textures and buffers a node makes."""
+    for port in node.ports().values():
+        if isinstance(port, Output | InOut | Internal | History):
+            yield port
+
+
+__all__ = [
+    "CAMERA", "TEXTURE_KINDS", "Expansion", "Place", "ViewTable", "define_parameters", "expand", "is_empty", "param_uniforms",
+]  # fmt: skip

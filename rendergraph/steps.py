@@ -11,7 +11,19 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 from rendergraph.declare import (
-    Facts, Function, History, InOut, Input, Internal, LightFacts, Made, Node, Output, Part, Port, Views,
+    Facts,
+    Function,
+    History,
+    InOut,
+    Input,
+    Internal,
+    LightFacts,
+    Made,
+    Node,
+    Output,
+    Part,
+    Port,
+    Views,
 )  # fmt: skip
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
