@@ -1,0 +1,289 @@
+"""One step's program text: version, macros, declarations, the functions it is given, then the author's file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from rendergraph.catalog import NodeType
+from rendergraph.declare import Function, Input
+from rendergraph.errors import InputError, Problem
+from rendergraph.expand import ViewTable
+from rendergraph.glsl.names import calls, declared, mentions, renamed
+from rendergraph.glsl.source import Includes, Origin, SourceText, generated
+from rendergraph.resources import folder
+from rendergraph.steps import FunctionBinding, Read, Resource, Step
+from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
+
+VERSION = "#version 450 core"
+_MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
+
+
+@dataclass(frozen=True)
+class StageText:
+    """The final text of one stage.
+
+    Attributes:
+        stage: `vertex`, `geometry`, `fragment` or `compute`.
+        source: lines and where they come from.
+    """
+
+    stage: str
+    source: SourceText = field(repr=False)
+
+    @property
+    def text(self) -> str:
+        """What the driver compiles."""
+        return self.source.text
+
+
+def prefix(node: str) -> str:
+    """What stands before every name of a function's text: the providing node's id and an underscore.
+
+    Two ids never give the same prefix, nor can a prefixed name be read in two ways: signs that are no letters or
+    digits are escaped with `Z`.
+    """
+    escapes = {"Z": "ZZ", "_": "Zu", "-": "Zd", "/": "Zs"}
+    plain = "".join(letter if letter.isalnum() and letter != "Z" else escapes[letter] for letter in node)
+    return ("Z" if plain == "gl" or plain[0].isdigit() else "") + plain + "_"
+
+
+def stage_texts(
+    step: Step,
+    types: Mapping[str, NodeType],
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
+    *,
+    defines: Mapping[str, str] | None = None,
+    include_folder: Path | None = None,
+) -> dict[str, StageText]:
+    """The text of every stage of a step.
+
+    Args:
+        step: its `defines` already hold `HAS_*`, the node's define parameters and its own (`expand` puts them there);
+            likewise those of its functions.
+        types: node id to type, at least for the step's node and the providers of its functions: their folders of
+            shaders and their declarations.
+        resources: everything the step and its functions read, for layers, views and light tables.
+        views: view tables by id, for their length.
+        defines: macros the framework adds: lights, materials, batch, `PASS_VIEW_COUNT`.
+        include_folder: where `#include <…>` looks; the shipped one by default.
+
+    Returns:
+        Stage to text, in the pipeline's order.
+
+    Raises:
+        InputError: a file is missing or cannot be put together (RG400 to RG409).
+    """
+    include_folder = include_folder or folder("rendergraph.shaders") / "include"
+    shaders = dict(step.shaders)
+    if step.kind == "fullscreen":
+        shaders.setdefault("vertex", "<fullscreen.vert>")
+    macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
+    wanted = _signatures(step, types)
+    texts: dict[str, StageText] = {}
+    for stage in ("vertex", "geometry", "fragment", "compute"):
+        if stage in shaders:
+            texts[stage] = _stage(stage, shaders[stage], step, types, resources, views, macros, wanted, include_folder)
+    return texts
+
+
+def read_defines(
+    reads: Iterable[Read], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
+) -> dict[str, str]:
+    """`<X>_LAYERS` and `<X>_VIEW_COUNT` of every texture read, `<X>_COUNT` of every input that takes a list."""
+    macros: dict[str, str] = {}
+    counts: dict[str, int] = {}
+    for read in reads:
+        resource = resources.get(read.resource)
+        if resource is None or not isinstance(resource.desc, TextureDesc) or read.use == "attach":
+            continue
+        name = read.name.upper()
+        macros[f"{name}_LAYERS"] = str(resource.desc.layers)
+        if resource.view is not None:
+            macros[f"{name}_VIEW_COUNT"] = str(views.get(resource.view, ViewTable()).count)
+        if match := re.match(r"(.+)_(\d+)\Z", name):
+            counts[match[1]] = max(counts.get(match[1], 0), int(match[2]) + 1)
+    return {f"{name}_COUNT": str(count) for name, count in counts.items()} | macros
+
+
+# --- one stage -------------------------------------------------------------------------------------------------------
+
+
+def _stage(
+    stage: str, name: str, step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable], macros: Mapping[str, str], wanted: Mapping[str, Signature], include_folder: Path,
+) -> StageText:  # fmt: skip
+    includes = Includes(include_folder)
+    view = includes.expand(include_folder / "view.glsl")
+    view = SourceText(view.lines, tuple(replace(origin, shared=True) for origin in view.origins))
+    shared = re.match(r"<(.+)>\Z", name)
+    root = include_folder if shared else types[step.node].shaders
+    file = root / (shared[1] if shared else name)
+    # What the file calls decides which functions stand before it, so it is read once with includes of its own.
+    called = Includes(include_folder).expand(file, root=root).text
+    functions = SourceText()
+    for signature in wanted.values():
+        if calls(called, signature.name):
+            functions += _functions(stage, signature, step, types, resources, views, includes)
+    source = includes.expand(file, root=root)
+    extensions, source = _hoisted(source)
+    body = functions.text + source.text
+    head = [VERSION, *extensions, *(f"#define {key} {value}".rstrip() for key, value in macros.items())]
+    declarations = _read_declarations(step.reads, resources, "", body)
+    final = generated(head) + view + generated(declarations) + functions + source
+    return StageText(stage, final)
+
+
+def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
+    """`#extension` lines, which must come before everything else, and the text without them."""
+    is_extension = [re.match(r"\s*#\s*extension\b", line) is not None for line in source.lines]
+    found = [line.strip() for line, yes in zip(source.lines, is_extension, strict=True) if yes]
+    if not found:
+        return [], source
+    lines = tuple("" if yes else line for line, yes in zip(source.lines, is_extension, strict=True))
+    return found, SourceText(lines, source.origins)
+
+
+def _read_declarations(
+    reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str
+) -> Iterator[str]:
+    """Views and light tables of the textures read, where the text looks at them."""
+    for read in reads:
+        resource = resources.get(read.resource)
+        if resource is None or not isinstance(resource.desc, TextureDesc):
+            continue
+        name, macro = before + read.name, before + read.name.upper()
+        if resource.view is not None and mentions(body, f"{name}_views"):
+            yield f"layout(std140) uniform {name}_view_block {{ View {name}_views[{macro}_VIEW_COUNT]; }};"
+        if resource.lights and mentions(body, f"{name}_lights"):
+            table = ", ".join(str(light) for light in resource.lights)
+            yield f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
+
+
+# --- functions -------------------------------------------------------------------------------------------------------
+
+
+def _signatures(step: Step, types: Mapping[str, NodeType]) -> dict[str, Signature]:
+    """Every function the step's shader may call: with providers, or declared as an input and so neutral."""
+    found = {signature.name: signature for signature in SIGNATURES}
+    for binding in step.functions:
+        found |= _declared_signatures(types[binding.node])
+    return found | _declared_signatures(types[step.node])
+
+
+def _declared_signatures(node: NodeType) -> dict[str, Signature]:
+    ports = node.cls.ports().values()
+    signatures = [port.signature for port in ports if isinstance(port, Function)]
+    signatures += [port.semantic for port in ports if isinstance(port, Input) and isinstance(port.semantic, Signature)]
+    return {signature.name: signature for signature in signatures}
+
+
+def _functions(
+    stage: str, signature: Signature, step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable], includes: Includes,
+) -> SourceText:  # fmt: skip
+    """The providers' texts with prefixed names, and the one function that joins them."""
+    text = SourceText()
+    factors: list[str] = []
+    known: dict[int, None] = {}
+    arguments = ", ".join(signature.arguments)
+    for binding in step.functions:
+        if binding.signature != signature.name:
+            continue
+        text += provider_text(binding, types[binding.node], resources, views, includes)
+        factors.append(f"result = result {signature.combine} {prefix(binding.node)}{signature.name}({arguments});")
+        known |= dict.fromkeys(light for read in binding.reads for light in _lights(read, resources))
+    screen = _screen_reads(signature, step, types[step.node])
+    known |= dict.fromkeys(light for read in screen for light in _lights(read, resources))
+    lines: list[str] = []
+    if stage == "fragment":
+        lines += [f"uniform sampler2DArray {read.name};" for read in screen]
+        for read in screen:
+            factors += _screen_factors(read, _lights(read, resources), signature)
+    kind = signature.declaration.split()[0]
+    lines += [f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"] if signature.texture else []
+    if known and signature.texture:
+        table = ", ".join(str(light) for light in known)
+        lines.append(f"const int {signature.name}_lights[{len(known)}] = int[]({table});")
+    lines += [f"{signature.declaration} {{", f"    {kind} result = {signature.neutral};"]
+    lines += [f"    {factor}" for factor in factors]
+    return text + generated([*lines, "    return result;", "}"])
+
+
+def _lights(read: Read, resources: Mapping[str, Resource]) -> tuple[int, ...]:
+    return resources[read.resource].lights if read.resource in resources else ()
+
+
+def _screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read]:
+    """The step's textures that hold the function's values in screen space."""
+    names = [
+        name
+        for name, port in node.cls.inputs().items()
+        if isinstance(port, Input) and port.kind in TEXTURE_KINDS and port.semantic is not None
+        and signature.texture is not None and port.semantic.name == signature.texture
+    ]  # fmt: skip
+    wanted = re.compile(rf"(?:{'|'.join(names)})(?:_\d+)?\Z") if names else None
+    return [read for read in step.reads if wanted and wanted.match(read.name) and read.use == "sample"]
+
+
+def _screen_factors(read: Read, lights: tuple[int, ...], signature: Signature) -> list[str]:
+    fetch = f"texelFetch({read.name}, ivec3(ivec2(gl_FragCoord.xy), {{}}), 0).r"
+    light = signature.arguments[0]
+    join = f"result = result {signature.combine} "
+    if len(lights) <= _MANY_LAYERS:
+        return [f"if ({light} == {index}) {join}{fetch.format(layer)};" for layer, index in enumerate(lights)]
+    table = f"int[]({', '.join(str(index) for index in lights)})"
+    return [
+        f"const int {read.name}_table[{len(lights)}] = {table};",
+        f"for (int layer = 0; layer < {len(lights)}; ++layer)",
+        f"    if ({read.name}_table[layer] == {light}) {join}{fetch.format('layer')};",
+    ]
+
+
+def provider_text(
+    binding: FunctionBinding, node: NodeType, resources: Mapping[str, Resource], views: Mapping[str, ViewTable],
+    includes: Includes,
+) -> SourceText:  # fmt: skip
+    """One provider's text with every name it declares, its inputs and its parameters prefixed.
+
+    Raises:
+        InputError: a file is missing, or does not define the function (RG408).
+    """
+    before = prefix(binding.node)
+    source = includes.expand(node.shaders / binding.shader, root=node.shaders, prefix=before)
+    own = SourceText(*_rows((line, origin) for line, origin in _pairs(source) if not origin.shared))
+    names = {name.name for name in declared(own.text)}
+    if binding.signature not in names:
+        signature = _declared_signatures(node)[binding.signature]
+        text = f"node '{binding.node}' ({node.name}): '{binding.shader}' does not define '{signature.declaration}'"
+        raise InputError(Problem("RG408", text, Origin(node.shaders / binding.shader, 1).place()))
+    macros = {**read_defines(binding.reads, resources, views), **dict(binding.defines)}
+    names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
+    for port in (*node.cls.ports(), *(read.name for read in binding.reads)):
+        endings = ("_LAYERS", "_COUNT", "_VIEW_COUNT")
+        names |= {port, f"{port}_views", f"{port}_lights", f"HAS_{port.upper()}", *(port.upper() + e for e in endings)}
+
+    def rename(word: str) -> str:
+        return before + word if word in names else word
+
+    lines = renamed(own.text, rename).split("\n")
+    own_lines = iter(lines)
+    rows = [
+        (line if origin.shared else next(own_lines), origin if origin.shared else replace(origin, column=0))
+        for line, origin in _pairs(source)
+    ]
+    final = SourceText(*_rows(rows))
+    head = [f"#define {before}{key} {renamed(value, rename)}".rstrip() for key, value in macros.items()]
+    return generated([*head, *_read_declarations(binding.reads, resources, before, final.text)]) + final
+
+
+def _pairs(source: SourceText) -> Iterator[tuple[str, Origin]]:
+    return zip(source.lines, source.origins, strict=True)
+
+
+def _rows(pairs: Iterable[tuple[str, Origin]]) -> tuple[tuple[str, ...], tuple[Origin, ...]]:
+    rows = tuple(pairs)
+    return tuple(line for line, _ in rows), tuple(origin for _, origin in rows)

@@ -1,0 +1,223 @@
+"""Shader files to text with includes resolved, every line knowing where it came from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rendergraph.errors import InputError, Place, Problem, suggestion
+
+MAX_BYTES = 1_000_000
+"""Bytes of one stage's text after includes."""
+MAX_DEPTH = 32
+"""Includes inside each other."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a line of program text comes from.
+
+    Attributes:
+        file: the author's file, None for generated lines.
+        line: its line there, from 1.
+        column: columns by which the line has moved to the right.
+        shared: it comes from an include in angle brackets.
+        prefix: what stands before the names that the file declares.
+    """
+
+    file: Path | None = None
+    line: int = 0
+    column: int = 0
+    shared: bool = False
+    prefix: str = ""
+
+    def place(self, column: int = 1) -> Place | None:
+        """The place as messages print it, relative to the current folder where it lies inside."""
+        if self.file is None:
+            return None
+        return Place(shown(self.file), self.line, max(1, column - self.column))
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """Lines of GLSL, comments blanked out, with an origin each."""
+
+    lines: tuple[str, ...] = ()
+    origins: tuple[Origin, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """The lines as one string."""
+        return "".join(line + "\n" for line in self.lines)
+
+    @property
+    def bytes(self) -> int:
+        """Size of the text."""
+        return sum(len(line) + 1 for line in self.lines)
+
+    def __add__(self, other: SourceText) -> SourceText:
+        return SourceText(self.lines + other.lines, self.origins + other.origins)
+
+
+def generated(lines: Iterable[str]) -> SourceText:
+    """Lines that stand in no file."""
+    rows = tuple(lines)
+    return SourceText(rows, (Origin(),) * len(rows))
+
+
+def shown(file: Path) -> str:
+    """A path as messages print it."""
+    try:
+        return file.relative_to(Path.cwd()).as_posix()
+    except ValueError:
+        return str(file)
+
+
+_COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?\*/", re.DOTALL)
+
+
+def strip_comments(text: str) -> str:
+    """The text with comments replaced by as many blanks: lines and columns stay where they are."""
+    return _COMMENT.sub(lambda match: re.sub(r"[^\n]", " ", match.group()), text)
+
+
+_INCLUDE = re.compile(r"\s*#\s*include\b\s*(.*?)\s*\Z")
+_INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
+_OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
+_CLOSES = re.compile(r"\s*#\s*endif\b")
+_FORBIDDEN = re.compile(r"\s*#\s*(version|line)\b")
+
+
+class Includes:
+    """Resolves the includes of one stage; a file is compiled once a stage, wherever it is included first.
+
+    An include inside `#if` may or may not be compiled, which only the driver's preprocessor knows: such text stands
+    between guards and is written again where it is included again.
+    """
+
+    def __init__(self, include_folder: Path) -> None:
+        self.include_folder = include_folder
+        self.bytes = 0
+        self._certain: set[tuple[Path, str]] = set()
+        self._guards: dict[tuple[Path, str], str] = {}
+
+    def expand(self, source: Path, *, root: Path | None = None, prefix: str = "") -> SourceText:
+        """The text of a file with all its includes.
+
+        Args:
+            source: the file.
+            root: the folder that includes in quotes must stay in; the file's own by default.
+            prefix: noted in the origins of every line that is not shared.
+
+        Raises:
+            InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
+        """
+        root = (root or source.parent).resolve()
+        lines: list[str] = []
+        origins: list[Origin] = []
+        self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
+        return SourceText(tuple(lines), tuple(origins))
+
+    def _file(
+        self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
+        depth: list[int],
+    ) -> None:  # fmt: skip
+        raw = _read(file)
+        stack = [*stack, file.resolve()]
+        for number, line in enumerate(strip_comments(raw).split("\n"), start=1):
+            origin = replace(base, file=file, line=number)
+            if _FORBIDDEN.match(line):
+                word = _FORBIDDEN.match(line)[1]  # type: ignore[index]  # it has just matched
+                raise _error("RG404", f"'#{word}' is written by rendergraph; take the line out", origin, raw)
+            include = _INCLUDE.match(line)
+            if include is None:
+                depth[0] += bool(_OPENS.match(line)) - bool(_CLOSES.match(line))
+                self.bytes += len(line) + 1
+                if self.bytes > MAX_BYTES:
+                    text = f"the shader with its includes is larger than {MAX_BYTES:,} bytes"
+                    raise _error("RG403", text, origin, raw)
+                lines.append(line.rstrip())
+                origins.append(origin)
+                continue
+            target, shared = self._find(include[1], file, root, origin, raw, base.shared)
+            if target.resolve() in stack:
+                chain = " includes ".join(path.name for path in [*stack, target])
+                raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
+            if len(stack) > MAX_DEPTH:
+                raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
+            inner = replace(base, shared=shared, prefix="" if shared else base.prefix)
+            self._include(target, self.include_folder if shared else root, inner, stack, lines, origins, depth)
+
+    def _include(
+        self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
+        depth: list[int],
+    ) -> None:  # fmt: skip
+        key = (file.resolve(), base.prefix)
+        if key in self._certain:
+            return
+        certain = depth[0] <= 0
+        if certain:
+            self._certain.add(key)
+        guard = self._guards.get(key)
+        if guard is None and not certain:
+            guard = self._guards[key] = f"INCLUDED_{len(self._guards)}"
+        if guard is None:
+            self._file(file, root, base, stack, lines, origins, depth)
+            return
+        for text in (f"#ifndef {guard}", f"#define {guard}"):
+            lines.append(text)
+            origins.append(Origin(shared=True))
+        depth[0] += 1
+        self._file(file, root, base, stack, lines, origins, depth)
+        depth[0] -= 1
+        lines.append("#endif")
+        origins.append(Origin(shared=True))
+
+    def _find(
+        self, written: str, file: Path, root: Path, origin: Origin, raw: str, in_shared: bool
+    ) -> tuple[Path, bool]:
+        """The file an include names, and whether it is a shared one."""
+        match = _INCLUDE_NAME.match(written)
+        if match is None:
+            text = f"'#include {written}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
+            raise _error("RG405", text, origin, raw)
+        name = match[1] or match[2]
+        beside = match[1] is not None
+        shared = not beside or in_shared
+        folder = file.parent if beside else self.include_folder
+        target = folder / name
+        inside = (self.include_folder if shared else root).resolve()
+        if not target.resolve().is_relative_to(inside):
+            text = f"'{name}' lies outside '{shown(inside)}', where this shader's includes are"
+            raise _error("RG406", text, origin, raw)
+        if not target.is_file():
+            known = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix == ".glsl"}
+            where = "beside the file" if beside else "in shaders/include"
+            raise _error("RG401", f"there is no include '{name}' {where}{suggestion(name, known)}", origin, raw)
+        return target, shared
+
+
+def expand(source: Path, include_folder: Path, *, root: Path | None = None) -> SourceText:
+    """One file with its includes resolved, as `Includes.expand`."""
+    return Includes(include_folder).expand(source, root=root)
+
+
+def _read(file: Path) -> str:
+    if not file.is_file():
+        known = {path.name for path in file.parent.glob("*") if path.is_file()} if file.parent.is_dir() else set()
+        text = f"there is no shader '{shown(file)}'{suggestion(file.name, known)}"
+        raise InputError(Problem("RG400", text))
+    if file.stat().st_size > MAX_BYTES:
+        raise InputError(Problem("RG403", f"the shader is larger than {MAX_BYTES:,} bytes", Place(shown(file))))
+    try:
+        return file.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        raise InputError(Problem("RG407", f"the shader is not UTF-8 text: {error}", Place(shown(file)))) from error
+
+
+def _error(code: str, text: str, origin: Origin, raw: str) -> InputError:
+    line = raw.split("\n")[origin.line - 1]
+    column = len(line) - len(line.lstrip()) + 1
+    return InputError(Problem(code, text, origin.place(column), line))
