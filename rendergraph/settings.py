@@ -1,0 +1,169 @@
+"""The project's settings file, and the folders that files may be read from.
+
+Pipelines and scenes are untrusted data: whatever they refer to must lie, links followed, inside a root. The settings
+file `rendergraph.toml` marks a project's folder as one. What it says beyond that (more roots, plugins, which are code)
+is believed only where the user stands in that project, so that a downloaded folder cannot bring its own permissions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rendergraph.document import read_bytes, shown
+from rendergraph.errors import InputError, Place, Problem, suggestion
+
+FILE_NAME = "rendergraph.toml"
+_KEYS = ("asset_roots", "plugins")
+_MOST_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One `rendergraph.toml`.
+
+    Attributes:
+        file: the file.
+        asset_roots: further folders that files may be read from.
+        plugins: files and folders with node modules.
+    """
+
+    file: Path
+    asset_roots: tuple[Path, ...] = ()
+    plugins: tuple[Path, ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        """The project's folder."""
+        return self.file.parent
+
+
+def nearest(start: Path) -> Settings | None:
+    """The settings file in a folder or the nearest one above it.
+
+    Raises:
+        InputError: it is malformed.
+    """
+    folder = _resolved(start)
+    for candidate in (folder, *folder.parents):
+        file = candidate / FILE_NAME
+        if file.is_file():
+            return load(file)
+    return None
+
+
+def load(file: Path) -> Settings:
+    """A settings file; its paths are relative to it.
+
+    Raises:
+        InputError: it is no TOML, or has other keys than `asset_roots` and `plugins`, each a list of paths.
+    """
+    import tomllib
+
+    place = Place(str(file))
+    try:
+        table: dict[str, Any] = tomllib.loads(read_bytes(file, _MOST_BYTES).decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(Problem("RG017", f"not a valid settings file: {shown(error, 120)}", place)) from None
+    problems = []
+    paths: dict[str, tuple[Path, ...]] = {}
+    for key, value in table.items():
+        if key not in _KEYS:
+            problems.append(Problem("RG017", f"no setting '{shown(key)}'{suggestion(key, _KEYS)}", place))
+        elif not isinstance(value, list) or not all(isinstance(item, str) and "\0" not in item for item in value):
+            problems.append(Problem("RG017", f"'{key}' is a list of paths, as in {key} = [\"../assets\"]", place))
+        else:
+            paths[key] = tuple(file.parent / Path(item).expanduser() for item in value)
+    if problems:
+        raise InputError(problems)
+    return Settings(file, **paths)
+
+
+@dataclass(frozen=True)
+class Roots:
+    """The folders that files may be read from, links followed.
+
+    Attributes:
+        folders: resolved.
+    """
+
+    folders: tuple[Path, ...]
+
+    @classmethod
+    def around(cls, file: Path, extra: Iterable[Path] = (), cwd: Path | None = None) -> Roots:
+        """The roots of everything reached from a file that the user named.
+
+        Args:
+            file: the file; its own folder is a root, or that of the nearest settings file above it.
+            extra: folders added on the command line.
+            cwd: where the user stands; the current folder by default.
+
+        Raises:
+            InputError: the settings file is malformed.
+        """
+        home = _resolved(file.parent)
+        folders = [home]
+        project = nearest(home)
+        if project is not None:
+            folders.append(_resolved(project.folder))
+            here = _resolved(cwd or Path.cwd())
+            if here.is_relative_to(folders[-1]):
+                folders += [_resolved(folder) for folder in project.asset_roots]
+        folders += [_resolved(folder) for folder in extra]
+        return cls(tuple(dict.fromkeys(folders)))
+
+    def check(self, path: Path, place: Place | None = None, written: str | None = None) -> Path:
+        """The file a path leads to, links followed.
+
+        Args:
+            path: joined to the folder of the file it is written in.
+            place: where it is written.
+            written: how it is written there; the path by default.
+
+        Raises:
+            InputError: it lies outside every root, or is missing, or is no regular file.
+        """
+        mistake = self.mistake(path, written)
+        if mistake:
+            raise InputError(Problem(*mistake, place))
+        return _resolved(path)
+
+    def mistake(self, path: Path, written: str | None = None) -> tuple[str, str] | None:
+        """Code and text of what forbids reading a path, None where nothing does."""
+        name = shown(written or path, 120)
+        if "://" in (written or str(path)):
+            return "RG012", f"'{name}' is an address; only files are read"
+        try:
+            resolved = path.resolve()
+            # Asked before whether it exists: a file outside is none of the pipeline's business.
+            if not any(resolved.is_relative_to(folder) for folder in self.folders):
+                text = (
+                    f"'{name}' lies outside the folder of the file it is reached from; --asset-root DIR allows DIR too"
+                )
+                return "RG012", text
+            if resolved.is_file():
+                return None
+            if resolved.is_dir():
+                return "RG011", f"'{name}' is a folder, a file is needed"
+            if resolved.exists():
+                return "RG011", f"'{name}' is not a regular file"
+        except (OSError, ValueError, RuntimeError):
+            return "RG011", f"'{name}' cannot be a file's path"
+        return "RG011", f"there is no file '{name}'{_neighbour(resolved)}"
+
+
+def _neighbour(path: Path) -> str:
+    try:
+        names = [entry.name for entry in path.parent.iterdir()][:1000]
+    except OSError:
+        return ""
+    return suggestion(path.name, names, most=0)
+
+
+def _resolved(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return path.absolute()
