@@ -1,0 +1,328 @@
+"""Schedule to ResourcePlan: lifetimes, physical textures, aliases, bytes, lower bound.
+
+Textures are shared whole, in two tiers: `descriptor`, equal descriptions, and `view`, equal texel classes looked at
+through texture views. Within a class lifetimes are intervals, so that giving each the first free texture in order of
+time uses as few textures as are ever alive at once: no assignment uses fewer.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Literal, TypeAlias
+
+from rendergraph.allocate.heap import heap_bytes
+from rendergraph.schedule import Schedule, step_names
+from rendergraph.schedule.dependencies import touched_ids
+from rendergraph.schedule.model import storage_class
+from rendergraph.steps import Resource
+from rendergraph.textures import BufferDesc, TextureDesc
+
+# Above this, placing bytes takes longer than its figure is worth.
+MOST_PLACED = 2_000
+
+
+Tier: TypeAlias = Literal["descriptor", "view", "heap"]
+"""How textures share memory: equal descriptions, equal texel classes through views, or bytes of one heap."""
+
+
+@dataclass(frozen=True)
+class Lifetime:
+    """First and last position in the schedule at which a resource must hold its values, inclusive."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Physical:
+    """One texture or buffer that is really allocated.
+
+    Attributes:
+        index: its number.
+        desc: what it is created from; members of another format of the same texel class look at it through a view.
+        members: resources that live in it, in time order; a history resource has two physicals to itself.
+        bytes: by formula.
+    """
+
+    index: int
+    desc: TextureDesc | BufferDesc
+    members: tuple[str, ...]
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The figures of `run --json` and `plan --json`.
+
+    Attributes:
+        no_reuse_bytes: every resource its own texture.
+        allocated_bytes: what the plan allocates.
+        lower_bound_bytes: the least peak of live bytes over all orders that was found.
+        peak_node: the node whose step is the peak of this order; None without steps.
+        proven: no order has a lower peak than `lower_bound_bytes`.
+        tier: how textures are shared: `view` only where some share needs a view.
+        next_tier: the next way of sharing; None where everything shares all it can already.
+        next_tier_bytes: what that would allocate, in this order.
+    """
+
+    no_reuse_bytes: int
+    allocated_bytes: int
+    lower_bound_bytes: int
+    peak_node: str | None
+    proven: bool
+    tier: Tier
+    next_tier: Tier | None = None
+    next_tier_bytes: int | None = None
+
+    def as_json(self) -> dict[str, object]:
+        """Plain JSON values."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class ResourcePlan:
+    """Where every resource lives.
+
+    Attributes:
+        schedule: what it was made from.
+        lifetimes: resource id to lifetime.
+        physicals: what is allocated.
+        placement: resource id to the indices of its physicals (two for history, else one).
+        released: step position to the resources that are dead after it (for the poison mode).
+        memory: bytes.
+        reasons: resource id to why it shares, or why not.
+    """
+
+    schedule: Schedule
+    lifetimes: Mapping[str, Lifetime]
+    physicals: tuple[Physical, ...]
+    placement: Mapping[str, tuple[int, ...]]
+    released: Mapping[int, tuple[str, ...]]
+    memory: Memory
+    reasons: Mapping[str, str]
+
+    @property
+    def resources(self) -> Mapping[str, Resource]:
+        """The schedule's resources."""
+        return self.schedule.resources
+
+
+def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> ResourcePlan:
+    """Give every resource of a schedule memory.
+
+    Args:
+        schedule: steps in order.
+        alias: let resources that are never alive together share; without it each has its own.
+        views: let formats of one texel class share through texture views.
+    """
+    lifetimes = _lifetimes(schedule)
+    shareable = [
+        id for id in sorted(lifetimes, key=lambda id: (lifetimes[id].first, id)) if id not in schedule.whole_frame
+    ]
+    by_desc = _colour(schedule, lifetimes, shareable, _description)
+    by_class = _colour(schedule, lifetimes, shareable, storage_class)
+    better: list[tuple[Tier, Groups]] = []  # tiers above the one asked for
+    if not alias:
+        groups = [[id] for id in shareable]
+        better += [("descriptor", by_desc), ("view", by_class)]
+    elif views:
+        groups = _fewest_views(schedule, shareable, by_desc, by_class)
+    else:
+        groups = by_desc
+        better.append(("view", by_class))
+    physicals, placement = _physicals(schedule, groups)
+    released: dict[int, list[str]] = defaultdict(list)
+    for id in shareable:
+        released[lifetimes[id].last].append(id)
+    return ResourcePlan(
+        schedule=schedule,
+        lifetimes=lifetimes,
+        physicals=physicals,
+        placement=placement,
+        released={position: tuple(ids) for position, ids in sorted(released.items())},
+        memory=_memory(schedule, lifetimes, shareable, physicals, better),
+        reasons=_reasons(schedule, lifetimes, physicals, placement, alias=alias, views=views),
+    )  # fmt: skip
+
+
+def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
+    last = max(0, len(schedule.steps) - 1)
+    first_touch: dict[str, int] = {}
+    last_touch: dict[str, int] = {}
+    for position, step in enumerate(schedule.steps):
+        for id in touched_ids(step):
+            first_touch.setdefault(id, position)
+            last_touch[id] = position
+    return {
+        id: Lifetime(0, last) if id in schedule.whole_frame else Lifetime(first_touch[id], last_touch[id])
+        for id in schedule.resources
+    }
+
+
+def _description(resource: Resource) -> object:
+    return resource.desc
+
+
+Groups = list[list[str]]
+"""Resources that live in one physical each, in time order."""
+
+
+def _colour(
+    schedule: Schedule, lifetimes: Mapping[str, Lifetime], ids: Iterable[str], kind: Callable[[Resource], object]
+) -> Groups:
+    """Interval colouring within each kind; of the free textures one of the same description, else the oldest."""
+    groups: Groups = []
+    free: dict[object, list[int]] = defaultdict(list)  # by kind: indices into groups, lowest first
+    free_exact: dict[object, list[int]] = defaultdict(list)  # by description
+    taken: list[bool] = []
+    busy: list[tuple[int, int]] = []  # last position and group
+    for id in ids:
+        resource = schedule.resources[id]
+        while busy and busy[0][0] < lifetimes[id].first:
+            _, group = heappop(busy)
+            taken[group] = False
+            owner = schedule.resources[groups[group][-1]]
+            heappush(free[kind(owner)], group)
+            heappush(free_exact[owner.desc], group)
+        found = _take(free_exact[resource.desc], taken, groups, schedule, resource.desc)
+        if found is None:
+            found = _take(free[kind(resource)], taken, groups, schedule, None)
+        if found is None:
+            found = len(groups)
+            groups.append([])
+            taken.append(True)
+        taken[found] = True
+        groups[found].append(id)
+        heappush(busy, (lifetimes[id].last, found))
+    return groups
+
+
+def _take(free: list[int], taken: Sequence[bool], groups: Groups, schedule: Schedule, desc: object) -> int | None:
+    # Every free texture is queued by kind and by description; an entry is stale once the other queue gave it away.
+    while free:
+        group = heappop(free)
+        if not taken[group] and (desc is None or schedule.resources[groups[group][-1]].desc == desc):
+            return group
+    return None
+
+
+def _fewest_views(schedule: Schedule, ids: Iterable[str], by_desc: Groups, by_class: Groups) -> Groups:
+    """The class's sharing where it saves bytes, the description's where it does not: a view for nothing is clutter."""
+
+    def kinds(groups: Groups) -> dict[object, Groups]:
+        table: dict[object, Groups] = defaultdict(list)
+        for group in groups:
+            table[storage_class(schedule.resources[group[0]])].append(group)
+        return table
+
+    exact, loose = kinds(by_desc), kinds(by_class)
+    order = {id: place for place, id in enumerate(ids)}
+    chosen: Groups = []
+    for kind, groups in exact.items():
+        chosen += loose[kind] if len(loose[kind]) < len(groups) else groups
+    return sorted(chosen, key=lambda group: order[group[0]])
+
+
+def _physicals(schedule: Schedule, groups: Groups) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
+    physicals: list[Physical] = []
+    placement: dict[str, tuple[int, ...]] = {}
+    whole = [id for id in schedule.resources if id in schedule.whole_frame]
+    for members in (*groups, *([id] for id in whole)):
+        resource = schedule.resources[members[0]]
+        first = len(physicals)
+        copies = 2 if resource.role == "history" else 1
+        for _ in range(copies):
+            physicals.append(Physical(len(physicals), resource.desc, tuple(members), resource.desc.bytes))
+        for id in members:
+            placement[id] = tuple(range(first, first + copies))
+    return tuple(physicals), placement
+
+
+def _memory(
+    schedule: Schedule,
+    lifetimes: Mapping[str, Lifetime],
+    shareable: Sequence[str],
+    physicals: Sequence[Physical],
+    better: Iterable[tuple[Tier, Groups]],
+) -> Memory:
+    resources = schedule.resources
+    constant = sum(resources[id].bytes for id in schedule.whole_frame)
+    allocated = sum(physical.bytes for physical in physicals)
+    viewed = any(resources[id].desc != physical.desc for physical in physicals for id in physical.members)
+    next_tier: Tier | None = None
+    next_bytes: int | None = None
+    for name, groups in better:
+        total = constant + sum(resources[group[0]].bytes for group in groups)
+        if next_bytes is None and total < allocated:
+            next_tier, next_bytes = name, total
+    if next_bytes is None and len(shareable) <= MOST_PLACED:
+        items = [(resources[id].bytes, lifetimes[id].first, lifetimes[id].last) for id in shareable]
+        total = constant + heap_bytes(items, schedule.peak_bytes - constant)
+        if total < allocated:
+            next_tier, next_bytes = "heap", total
+    return Memory(
+        no_reuse_bytes=sum(resource.bytes for resource in resources.values()),
+        allocated_bytes=allocated,
+        lower_bound_bytes=schedule.lower_bound_bytes,
+        peak_node=schedule.peak_node,
+        proven=schedule.proven,
+        tier="view" if viewed else "descriptor",
+        next_tier=next_tier,
+        next_tier_bytes=next_bytes,
+    )
+
+
+def _reasons(
+    schedule: Schedule,
+    lifetimes: Mapping[str, Lifetime],
+    physicals: Sequence[Physical],
+    placement: Mapping[str, tuple[int, ...]],
+    *,
+    alias: bool,
+    views: bool,
+) -> dict[str, str]:
+    names = step_names(schedule.steps)
+    outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
+    alike: dict[object, int] = defaultdict(int)
+    kind = storage_class if views else _description
+    for id, resource in schedule.resources.items():
+        if id not in schedule.whole_frame:
+            alike[kind(resource)] += 1
+    reasons: dict[str, str] = {}
+    for id, resource in schedule.resources.items():
+        physical = physicals[placement[id][0]]
+        word = "texture" if isinstance(resource.desc, TextureDesc) else "buffer"
+        if resource.role == "history":
+            reasons[id] = f"the next frame reads it: two {word}s take turns and nothing shares them"
+        elif id in schedule.whole_frame:
+            why = f"output '{outputs[id]}' is kept" if id in outputs else "it is filled before the first step"
+            reasons[id] = f"{why}: its {word} is its own for the whole frame"
+        elif not alias:
+            reasons[id] = "aliasing is off"
+        elif len(physical.members) == 1:
+            others = alike[kind(resource)] - 1
+            reasons[id] = (
+                f"no other {word} is of its {'texel class and' if views and word == 'texture' else 'format and'} size"
+                if not others
+                else f"whenever it is alive, all {word}s it could share are in use"
+            )
+        else:
+            place = physical.members.index(id)
+            other = physical.members[place - 1 if place else 1]
+            view = _view(resource, physical)
+            if place:
+                end = names[schedule.steps[lifetimes[other].last].key]
+                reasons[id] = f"shares {word} {physical.index} with {other}{view}, dead after {end}"
+            else:
+                start = names[schedule.steps[lifetimes[other].first].key]
+                reasons[id] = f"shares {word} {physical.index} with {other}, which takes it over at {start}"
+    return reasons
+
+
+def _view(resource: Resource, physical: Physical) -> str:
+    if isinstance(resource.desc, BufferDesc) or resource.desc == physical.desc:
+        return ""
+    return f" through a {resource.desc.format} view"

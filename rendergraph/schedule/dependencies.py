@@ -1,0 +1,223 @@
+"""Which steps run, and which must run before which: versions turned into a networkx graph."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeAlias
+
+from rendergraph.errors import InputError, Problem
+from rendergraph.steps import Resource, Step, Write
+from rendergraph.textures import TextureDesc
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+StepKey: TypeAlias = tuple[str, int]
+"""A step's `key`: node id and number."""
+
+
+def touched_ids(step: Step) -> dict[str, None]:
+    """Ids of the resources a step reads or writes, each once, in its own order."""
+    return dict.fromkeys([*(read.resource for read in step.all_reads), *(write.resource for write in step.writes)])
+
+
+@dataclass(frozen=True)
+class Versions:
+    """Who writes and who reads each version of each resource.
+
+    Attributes:
+        writers: resource id to version to the step that makes it, in rising order of versions.
+        readers: resource id to (version, step) pairs; last frame's values are no part of it.
+    """
+
+    writers: Mapping[str, dict[int, Step]]
+    readers: Mapping[str, Sequence[tuple[int, Step]]]
+
+    @classmethod
+    def of(cls, steps: Iterable[Step]) -> Versions:
+        """Collect what the steps touch.
+
+        Raises:
+            InputError: two steps make the same version of one resource (RG605).
+        """
+        writers: dict[str, dict[int, Step]] = defaultdict(dict)
+        readers: dict[str, list[tuple[int, Step]]] = defaultdict(list)
+        problems: list[Problem] = []
+        for step in steps:
+            for write in step.writes:
+                other = writers[write.resource].setdefault(write.version, step)
+                if other is not step:
+                    problems.append(_two_writers(write.resource, other, step))
+            for read in step.all_reads:
+                if not read.previous:
+                    readers[read.resource].append((read.version, step))
+        if problems:
+            raise InputError(problems)
+        return cls({id: dict(sorted(found.items())) for id, found in writers.items()}, dict(readers))
+
+    def final(self, resource: str) -> Step | None:
+        """The step that makes the last version, None where nothing writes it."""
+        found = self.writers.get(resource)
+        return found[next(reversed(found))] if found else None
+
+
+def continues(step: Step, write: Write, resource: Resource) -> bool:
+    """Whether something of the version before shows in what the step leaves behind.
+
+    True for everything but a clear or discard of the whole texture: a part, a level of a mip chain, an image store and
+    a buffer leave the rest as it was.
+    """
+    whole = write.mip is None and write.layer is None and getattr(resource.desc, "mips", 1) == 1
+    return not whole or write.load == "load" or write.use in ("image", "buffer") or step.kind == "mipmaps"
+
+
+def is_filled_by_update(id: str, resource: Resource, versions: Versions) -> bool:
+    """Whether a buffer holds what the CPU wrote before the frame's first step: it is read before any step writes it."""
+    return not isinstance(resource.desc, TextureDesc) and (
+        id not in versions.writers or any(version == 0 for version, _ in versions.readers.get(id, ()))
+    )
+
+
+def contributing(
+    steps: Sequence[Step], resources: Mapping[str, Resource], wanted: Mapping[str, str], versions: Versions
+) -> list[Step]:
+    """The steps that something wanted depends on, in the order given.
+
+    History that a kept step reads from the last frame is wanted as well: its writers are kept.
+
+    Raises:
+        InputError: a kept step reads, or continues, a texture that nothing has written (RG601, RG603), or an output is
+            never written (RG604).
+    """
+    kept: set[StepKey] = set()
+    problems: list[Problem] = []
+    stack: list[Step] = []
+    for name, id in wanted.items():
+        final = versions.final(id)
+        if final is not None:
+            stack.append(final)
+        elif id not in resources or isinstance(resources[id].desc, TextureDesc):
+            text = f"output '{name}' shows '{id}', but no step writes it; write it in the node's `record`"
+            problems.append(Problem("RG604", text))
+    while stack:
+        step = stack.pop()
+        if step.key in kept:
+            continue
+        kept.add(step.key)
+        for read in step.all_reads:
+            if read.previous:
+                writer = versions.final(read.resource)
+            else:
+                writer = versions.writers.get(read.resource, {}).get(read.version)
+                texture = isinstance(resources[read.resource].desc, TextureDesc)
+                if writer is None and texture and read.use != "attach":  # the write beside it says it better
+                    problems.append(_unwritten(step, read.resource))
+            if writer is not None:
+                stack.append(writer)
+        for write in step.writes:
+            resource = resources[write.resource]
+            if not continues(step, write, resource):
+                continue
+            before = versions.writers[write.resource].get(write.version - 1)
+            if before is not None:
+                stack.append(before)
+            elif isinstance(resource.desc, TextureDesc) and (write.load == "load" or step.kind == "mipmaps"):
+                problems.append(_loads_nothing(step, write.resource))
+    if problems:
+        raise InputError(sorted(set(problems), key=lambda problem: (problem.code, problem.text)))
+    return [step for step in steps if step.key in kept]
+
+
+def dependencies(kept: Sequence[Step], versions: Versions) -> nx.DiGraph[StepKey]:
+    """The order among kept steps: a networkx.DiGraph of step keys, an edge from what runs earlier.
+
+    A reader follows the writer of its version; a writer follows the writer before it and everybody who reads what it
+    is about to overwrite. Edges carry `resource` and `why` (`reads`, `continues`, `overwrites`); a step's incoming
+    edges are in the order of its reads, then its writes, so that the graph does not depend on the order of nodes.
+
+    Raises:
+        InputError: steps wait for each other (RG602); the message names both nodes.
+    """
+    import networkx as nx
+
+    keys = {step.key for step in kept}
+    dag: nx.DiGraph[StepKey] = nx.DiGraph()
+    dag.add_nodes_from(step.key for step in kept)
+    writers = {
+        id: [(version, step.key) for version, step in found.items() if step.key in keys]
+        for id, found in versions.writers.items()
+    }
+    # Readers by the kept version they see: the writers between may have been culled.
+    readers: dict[tuple[str, int], list[StepKey]] = defaultdict(list)
+    for id, found in versions.readers.items():
+        known = [0, *(version for version, _ in writers.get(id, ()))]
+        for version, step in found:
+            if step.key in keys:
+                readers[id, known[bisect_right(known, version) - 1]].append(step.key)
+    before = {id: {v: earlier for earlier, (v, _) in pairwise(found)} for id, found in writers.items()}
+
+    def add(source: StepKey, target: StepKey, resource: str, why: str) -> None:
+        if source != target and not dag.has_edge(source, target):
+            dag.add_edge(source, target, resource=resource, why=why)
+
+    for step in kept:
+        for read in step.all_reads:
+            writer = None if read.previous else versions.writers.get(read.resource, {}).get(read.version)
+            if writer is not None:
+                add(writer.key, step.key, read.resource, "reads")
+        for write in step.writes:
+            version, earlier = before[write.resource].get(write.version, (0, None))
+            if earlier is not None:
+                add(earlier, step.key, write.resource, "continues")
+            for reader in sorted(readers.get((write.resource, version), ())):
+                add(reader, step.key, write.resource, "overwrites")
+    if not nx.is_directed_acyclic_graph(dag):
+        raise InputError(_cycle(dag))
+    return dag
+
+
+def _two_writers(resource: str, one: Step, other: Step) -> Problem:
+    return Problem(
+        "RG605",
+        f"'{one.node}' and '{other.node}' both continue '{resource}' from the same state; "
+        f"let one of them take the other's output",
+    )
+
+
+def _unwritten(step: Step, resource: str) -> Problem:
+    return Problem(
+        "RG601",
+        f"node '{step.node}' reads '{resource}', but no step has written it by then; "
+        f"write it in an earlier step, or declare it `History` to read last frame's value",
+    )
+
+
+def _loads_nothing(step: Step, resource: str) -> Problem:
+    return Problem(
+        "RG603",
+        f"the first step that writes '{resource}', in node '{step.node}', keeps what is there, but nothing is there "
+        f"yet; give the port a `clear` value or fill it in an earlier step",
+    )
+
+
+def _cycle(dag: nx.DiGraph[StepKey]) -> Problem:
+    import networkx as nx
+
+    edges = list(nx.find_cycle(dag))
+    # An edge that only keeps a reader ahead of an overwriter is what the user can change: start the cycle there.
+    start = next((i for i, (a, b, *_) in enumerate(edges) if dag.edges[a, b]["why"] == "overwrites"), 0)
+    (reader, _), (writer, _) = edges[start][0], edges[start][1]
+    resource = dag.edges[edges[start][0], edges[start][1]]["resource"]
+    back = edges[(start + 1) % len(edges)]
+    needed = dag.edges[back[0], back[1]]["resource"]
+    return Problem(
+        "RG602",
+        f"'{reader}' must run before '{writer}', which overwrites '{resource}', but also after it, "
+        f"as it depends on '{needed}'; let '{reader}' take '{resource}' from '{writer}' "
+        f"or the rest from before it",
+    )

@@ -1,0 +1,240 @@
+"""The steps as small integers: what a search needs to know of them, and what an order costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rendergraph.schedule.dependencies import StepKey, Versions, is_filled_by_update, touched_ids
+from rendergraph.steps import Resource, Step
+from rendergraph.textures import TextureDesc
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+# Counting where a texture must live costs a visit a step and texture; long graphs count only where it is touched.
+MUST_LIVE_VISITS = 20_000
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What an order costs, compared from the first field to the last.
+
+    Attributes:
+        pool: bytes of a pool of textures that are shared within a texel class.
+        peak: most live bytes at any step.
+        area: live bytes summed over the steps; breaks ties towards short lifetimes.
+    """
+
+    pool: int
+    peak: int
+    area: int
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        """What is compared."""
+        return self.pool, self.peak, self.area
+
+
+@dataclass(frozen=True)
+class Model:
+    """Steps numbered in the reading order: depth first from the outputs, inputs in the order of their ports.
+
+    The numbering depends on links and port declarations alone, never on the order of nodes in a file or of keys in a
+    mapping, so neither does anything computed from it.
+
+    Attributes:
+        steps: by number.
+        before, after: numbers a step waits for, and that wait for it.
+        touched: resources a step touches, as numbers; only those that may die within the frame.
+        born: bytes that come alive with a step.
+        sizes: bytes of each resource.
+        classes: number of the storage class of each resource; equal ones can share a texture.
+        toucher_count: how many steps touch each resource.
+        names: id of each resource.
+        constant: bytes alive during the whole frame: outputs, history, buffers filled before the first step.
+    """
+
+    steps: tuple[Step, ...]
+    before: tuple[tuple[int, ...], ...]
+    after: tuple[tuple[int, ...], ...]
+    touched: tuple[tuple[int, ...], ...]
+    born: tuple[int, ...]
+    sizes: tuple[int, ...]
+    classes: tuple[int, ...]
+    toucher_count: tuple[int, ...]
+    names: tuple[str, ...]
+    constant: int
+
+    @classmethod
+    def of(
+        cls, dag: nx.DiGraph[StepKey], kept: Sequence[Step], resources: Mapping[str, Resource], whole_frame: set[str],
+        sinks: Sequence[Step],
+    ) -> Model:  # fmt: skip
+        """Number the steps of a dependency graph.
+
+        Args:
+            dag: step keys with edges from earlier to later.
+            kept: the steps.
+            resources: what the steps touch.
+            whole_frame: ids of the resources that are alive during the whole frame.
+            sinks: the steps the frame is rendered for, in a fixed order.
+        """
+        by_key = {step.key: step for step in kept}
+        order = _reading_order(dag, [step.key for step in sinks])
+        number = {key: place for place, key in enumerate(order)}
+        steps = tuple(by_key[key] for key in order)
+        before = tuple(tuple(sorted(number[key] for key in dag.predecessors(key_))) for key_ in order)
+        after = tuple(tuple(sorted(number[key] for key in dag.successors(key_))) for key_ in order)
+        names: dict[str, int] = {}
+        touched: list[tuple[int, ...]] = []
+        born = [0] * len(steps)
+        toucher_count: list[int] = []
+        for place, step in enumerate(steps):
+            mine = []
+            for id in touched_ids(step):
+                if id in whole_frame:
+                    continue
+                if id not in names:  # the reading order is legal, so the first to touch is the first writer
+                    names[id] = len(names)
+                    toucher_count.append(0)
+                    born[place] += resources[id].bytes
+                mine.append(names[id])
+                toucher_count[names[id]] += 1
+            touched.append(tuple(mine))
+        kinds: dict[object, int] = {}
+        classes = tuple(kinds.setdefault(storage_class(resources[id]), len(kinds)) for id in names)
+        return cls(
+            steps, before, after, tuple(touched), tuple(born), tuple(resources[id].bytes for id in names), classes,
+            tuple(toucher_count), tuple(names), sum(resources[id].bytes for id in whole_frame),
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def cost(self, order: Sequence[int]) -> Cost:
+        """What an order costs; linear in what the steps touch."""
+        sizes, classes, touched = self.sizes, self.classes, self.touched
+        count = len(sizes)
+        left = list(self.toucher_count)
+        seen = bytearray(count)
+        live, peak, area = self.constant, self.constant, 0
+        alive = [0] * count  # by class; there are at most as many classes as resources
+        most: dict[int, int] = {}
+        for step in order:
+            dead = 0
+            for resource in touched[step]:
+                if not seen[resource]:
+                    seen[resource] = 1
+                    live += sizes[resource]
+                    kind = classes[resource]
+                    alive[kind] += 1
+                    if alive[kind] > most.get(kind, 0):
+                        most[kind] = alive[kind]
+            if live > peak:
+                peak = live
+            area += live
+            for resource in touched[step]:
+                left[resource] -= 1
+                if not left[resource]:
+                    dead += sizes[resource]
+                    alive[classes[resource]] -= 1
+            live -= dead
+        size_of = dict(zip(classes, sizes, strict=True))
+        return Cost(self.constant + sum(size_of[kind] * number for kind, number in most.items()), peak, area)
+
+    def peak(self, order: Sequence[int]) -> tuple[int, int | None]:
+        """The most live bytes of an order, and the first step with that many; None where there is no step."""
+        left = list(self.toucher_count)
+        live = peak = self.constant
+        at = order[0] if order else None
+        for step in order:
+            live += self.born[step]
+            if live > peak:
+                peak, at = live, step
+            for resource in self.touched[step]:
+                left[resource] -= 1
+                if not left[resource]:
+                    live -= self.sizes[resource]
+        return peak, at
+
+    def bounds(self) -> tuple[int, int]:
+        """Bytes that no order's pool and no order's peak can go below.
+
+        A resource is alive at a step that touches it, and at every step that must lie between its first writer and
+        another step that touches it.
+        """
+        count = len(self)
+        ancestors = [0] * count
+        for step, earlier in enumerate(self.before):
+            for other in earlier:
+                ancestors[step] |= ancestors[other] | 1 << other
+        touchers: list[list[int]] = [[] for _ in self.sizes]
+        for step, resources in enumerate(self.touched):
+            for resource in resources:
+                touchers[resource].append(step)
+        live = [self.constant] * count
+        alive: dict[int, list[int]] = {}
+        visits = MUST_LIVE_VISITS
+        descendants = self._descendants() if visits > count else []
+        for resource in sorted(range(len(self.sizes)), key=lambda r: (-self.sizes[r], r)):
+            mask = within = 0
+            for step in touchers[resource]:
+                mask |= 1 << step
+                within |= ancestors[step]
+            if visits > 0:
+                mask |= within & descendants[touchers[resource][0]]
+            number_alive = alive.setdefault(self.classes[resource], [0] * count)
+            while mask:
+                low = mask & -mask
+                mask ^= low
+                step = low.bit_length() - 1
+                live[step] += self.sizes[resource]
+                number_alive[step] += 1
+                visits -= 1
+        size_of = dict(zip(self.classes, self.sizes, strict=True))
+        pool = sum(size_of[kind] * max(numbers) for kind, numbers in alive.items())
+        return self.constant + pool, max(live, default=self.constant)
+
+    def _descendants(self) -> list[int]:
+        found = [0] * len(self)
+        for step in range(len(self) - 1, -1, -1):
+            for other in self.after[step]:
+                found[step] |= found[other] | 1 << other
+        return found
+
+
+def storage_class(resource: Resource) -> object:
+    """Resources of an equal storage class can share one texture or buffer, through a view where formats differ."""
+    return resource.desc.storage_class if isinstance(resource.desc, TextureDesc) else resource.desc
+
+
+def alive_all_frame(resources: Mapping[str, Resource], wanted: Mapping[str, str], versions: Versions) -> set[str]:
+    """Ids of the resources that keep their memory for the whole frame: outputs, history, buffers `update` fills."""
+    shown = set(wanted.values())
+    return {
+        id
+        for id, resource in resources.items()
+        if id in shown or resource.role in ("output", "history") or is_filled_by_update(id, resource, versions)
+    }
+
+
+def _reading_order(dag: nx.DiGraph[StepKey], sinks: Sequence[StepKey]) -> list[StepKey]:
+    """Depth-first post-order from the sinks along incoming edges in the order they were added."""
+    order: list[StepKey] = []
+    seen: set[StepKey] = set()
+    for sink in sinks:
+        stack = [(sink, iter(list(dag.predecessors(sink))))] if sink not in seen else []
+        seen.add(sink)
+        while stack:
+            key, waiting = stack[-1]
+            for earlier in waiting:
+                if earlier not in seen:
+                    seen.add(earlier)
+                    stack.append((earlier, iter(list(dag.predecessors(earlier)))))
+                    break
+            else:
+                order.append(key)
+                stack.pop()
+    return order

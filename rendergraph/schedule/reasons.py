@@ -1,0 +1,94 @@
+"""Why a step stands where it stands, and why a node does not run: one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from heapq import heappop, heappush
+
+from rendergraph.schedule.dependencies import Versions
+from rendergraph.schedule.model import Model
+from rendergraph.steps import Step
+
+
+def mebibytes(count: int) -> str:
+    """Bytes for people: `8.0 MiB`, `12 KiB`."""
+    for unit, size in (("GiB", 1 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)):
+        if count >= size:
+            return f"{count / size:.1f} {unit}"
+    return f"{count} B"
+
+
+def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
+    """Step key to what it is called: the node's id, with a number where the node has several steps."""
+    several = {step.node for step in steps if step.index > 0}
+    return {step.key: f"{step.node}[{step.index}]" if step.node in several else step.node for step in steps}
+
+
+def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dict[tuple[str, int], str]:
+    """Step key to why it runs when it does.
+
+    Args:
+        model: the steps.
+        order: their order.
+        chosen: what picked the order where it was not memory: `program order`.
+    """
+    names = step_names(model.steps)
+    place = {step: number for number, step in enumerate(order)}
+    left = list(model.toucher_count)
+    missing = [len(steps) for steps in model.before]
+    ready = [step for step, number in enumerate(missing) if not number]
+    waiting = len(ready)
+    reasons: dict[tuple[str, int], str] = {}
+    for number, step in enumerate(order):
+        while ready and place[ready[0]] < number:
+            heappop(ready)
+        freed = []
+        for resource in model.touched[step]:
+            left[resource] -= 1
+            if not left[resource]:
+                freed.append(resource)
+        release = ""
+        if freed:
+            largest = max(freed, key=lambda r: model.sizes[r])
+            more = f" and {len(freed) - 1} more" if len(freed) > 1 else ""
+            release = f"releases {model.names[largest]}{more} ({mebibytes(sum(model.sizes[r] for r in freed))})"
+        if waiting == 1:
+            text = "nothing else can run yet" if number + 1 < len(order) else "everything else has run"
+        elif chosen:
+            text = f"{chosen}, of {waiting} that could run"
+        elif step == ready[0]:
+            text = f"first of {waiting} that could run, reading from the outputs"
+        else:
+            text = f"before {names[model.steps[ready[0]].key]}, as less memory is held this way"
+        reasons[model.steps[step].key] = f"{text}; {release}" if release else text
+        waiting -= 1
+        for other in model.after[step]:
+            missing[other] -= 1
+            if not missing[other]:
+                heappush(ready, other)
+                waiting += 1
+    return reasons
+
+
+def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versions) -> Mapping[str, str]:
+    """Node id to why none of its steps runs."""
+    running = {step.node for step in kept}
+    culled: dict[str, str] = {}
+    for node in dict.fromkeys(step.node for step in steps):
+        if node in running:
+            continue
+        ids = list(dict.fromkeys(write.resource for step in steps if step.node == node for write in step.writes))
+        readers = {other.node for id in ids for _, other in versions.readers.get(id, ()) if other.node != node}
+        if not ids:
+            culled[node] = "it writes nothing"
+        elif readers:
+            culled[node] = f"only {_listed(sorted(readers))} would read {_listed(ids)}, and that does not run"
+        else:
+            culled[node] = f"nothing reads {_listed(ids)}"
+    return culled
+
+
+def _listed(words: Sequence[str]) -> str:
+    if len(words) > 3:
+        words = [*words[:3], f"{len(words) - 3} more"]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

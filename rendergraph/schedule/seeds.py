@@ -1,0 +1,158 @@
+"""Cheap good orders: the byte-weighted post-order and the memory-delta list schedule; random and program order."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Sequence
+from heapq import heapify, heappop, heappush
+
+from rendergraph.schedule.model import Model
+
+
+def seeds(model: Model) -> Iterator[list[int]]:
+    """Legal orders to start from: the reading order, both post-orders, both list schedules."""
+    yield list(range(len(model)))
+    yield post_order(model)
+    yield list_schedule(model)
+    yield list(reversed(list_schedule(model, backwards=True)))
+
+
+def post_order(model: Model) -> list[int]:
+    """Depth first from the sinks, the input that needs most and leaves least first.
+
+    The rule of R. Sethi and J. D. Ullman ("The Generation of Optimal Code for Arithmetic Expressions", 1970) with bytes
+    in place of registers. It is optimal on trees; a step with several readers is counted for each of them.
+    """
+    count = len(model)
+    left = model.toucher_count
+    # What a step leaves behind: what is born there and somebody else touches.
+    leaves = [0] * count
+    seen = bytearray(len(model.sizes))
+    for step in range(count):
+        for resource in model.touched[step]:
+            if not seen[resource]:
+                seen[resource] = 1
+                leaves[step] += model.sizes[resource] if left[resource] > 1 else 0
+    need = [0] * count
+    children: list[list[int]] = [[]] * count
+
+    def sequence(steps: Sequence[int]) -> tuple[list[int], int, int]:
+        ordered = sorted(steps, key=lambda step: (leaves[step] - need[step], step))
+        held = most = 0
+        for step in ordered:
+            most = max(most, held + need[step])
+            held += leaves[step]
+        return ordered, most, held
+
+    for step in range(count):
+        children[step], most, held = sequence(model.before[step])
+        need[step] = max(most, held + model.born[step])
+    roots, _, _ = sequence([step for step in range(count) if not model.after[step]])
+    order: list[int] = []
+    placed = bytearray(count)
+    for root in roots:
+        stack = [(root, iter(children[root]))]
+        placed[root] = 1
+        while stack:
+            step, waiting = stack[-1]
+            for child in waiting:
+                if not placed[child]:
+                    placed[child] = 1
+                    stack.append((child, iter(children[child])))
+                    break
+            else:
+                order.append(step)
+                stack.pop()
+    return order
+
+
+def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
+    """Of the ready steps always the one after which least is alive; backwards, of those that may come last.
+
+    A step's gain changes while it waits, whenever it becomes the last to touch a resource; it is then queued again.
+    """
+    count = len(model)
+    before, after = (model.after, model.before) if backwards else (model.before, model.after)
+    left = list(model.toucher_count)
+    begun = bytearray(len(model.sizes))
+    waiting: list[list[int]] = [[] for _ in model.sizes]  # ready steps that touch a resource
+    missing = [len(steps) for steps in before]
+    done = bytearray(count)
+
+    def entry(step: int) -> tuple[int, int]:
+        change = 0
+        for resource in model.touched[step]:
+            change += 0 if begun[resource] else model.sizes[resource]
+            change -= model.sizes[resource] if left[resource] == 1 else 0
+        return change, -step if backwards else step
+
+    queue: list[tuple[int, int]] = []
+
+    def release(step: int) -> None:
+        for resource in model.touched[step]:
+            waiting[resource].append(step)
+        heappush(queue, entry(step))
+
+    for step in range(count):
+        if not missing[step]:
+            release(step)
+    order: list[int] = []
+    while queue:
+        change, signed = heappop(queue)
+        step = abs(signed)
+        if done[step] or (change, signed) != entry(step):
+            continue
+        done[step] = 1
+        order.append(step)
+        for resource in model.touched[step]:
+            left[resource] -= 1
+            fresh = not begun[resource]
+            begun[resource] = 1
+            if fresh or left[resource] == 1:
+                waiting[resource] = [other for other in waiting[resource] if not done[other]]
+                for other in waiting[resource]:
+                    heappush(queue, entry(other))
+        for other in after[step]:
+            missing[other] -= 1
+            if not missing[other]:
+                release(other)
+    return order
+
+
+def random_order(model: Model, seed: int) -> list[int]:
+    """A legal order drawn by the seed: of the ready steps any with equal chance."""
+    chooser = random.Random(seed)
+    missing = [len(steps) for steps in model.before]
+    ready = [step for step, number in enumerate(missing) if not number]
+    order: list[int] = []
+    while ready:
+        place = chooser.randrange(len(ready))
+        ready[place], ready[-1] = ready[-1], ready[place]
+        step = ready.pop()
+        order.append(step)
+        for other in model.after[step]:
+            missing[other] -= 1
+            if not missing[other]:
+                ready.append(other)
+    return order
+
+
+def program_order(model: Model, rank: Sequence[int]) -> list[int]:
+    """The order of nodes in the file and of recording, as far as it is legal.
+
+    Args:
+        model: the steps.
+        rank: place of each step in the program.
+    """
+    missing = [len(steps) for steps in model.before]
+    ready = [(rank[step], step) for step, number in enumerate(missing) if not number]
+    heapify(ready)
+    order: list[int] = []
+    while ready:
+        _, step = heappop(ready)
+        order.append(step)
+        for other in model.after[step]:
+            missing[other] -= 1
+            if not missing[other]:
+                heappush(ready, (rank[other], other))
+    return order
