@@ -1,0 +1,24 @@
+"""Pictures on disk: the only module that meets OpenImageIO, which is imported on first use.
+
+`decode` makes a scene's image ready for the GPU, `write` and `read` are the plain ends, `viewable` turns any texture
+into something an eye can read, and `save_outputs` says what of a frame goes into which kind of file.
+"""
+
+from rendergraph.images.decode import Limits, decode, read, read_metadata
+from rendergraph.images.encode import EXTENSIONS, write
+from rendergraph.images.saving import (
+    PictureInfo,
+    Saved,
+    check_target,
+    is_numbered,
+    numbered,
+    output_for,
+    save_output,
+    save_outputs,
+)
+from rendergraph.images.view import from_srgb, to_srgb, viewable
+
+__all__ = [
+    "EXTENSIONS", "Limits", "PictureInfo", "Saved", "check_target", "decode", "from_srgb", "is_numbered", "numbered",
+    "output_for", "read", "read_metadata", "save_output", "save_outputs", "to_srgb", "viewable", "write",
+]  # fmt: skip

@@ -1,0 +1,352 @@
+"""Reading images: a scene's textures and environments, and pictures written earlier.
+
+Images are untrusted: only regular files of six kinds, told by their first bytes, are opened, and the header is held
+against limits before anything is decoded.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.images.encode import HALF_MAX, PREFIX
+from rendergraph.scene.model import ImageSource
+
+if TYPE_CHECKING:
+    import OpenImageIO as oiio
+
+Pixels: TypeAlias = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an image may claim.
+
+    Attributes:
+        side: pixels of the longer side; a driver's own limit may be lower.
+        bytes: decoded size as RGBA.
+        ratio: decoded to encoded size, where the decoded size is above `ratio_from` bytes.
+    """
+
+    side: int = 16384
+    bytes: int = 2 << 30
+    ratio: int = 1000
+    ratio_from: int = 64 << 20
+
+
+_KINDS: tuple[tuple[bytes, str], ...] = (
+    (b"\x89PNG\r\n\x1a\n", ".png"),
+    (b"\xff\xd8\xff", ".jpg"),
+    (b"v/1\x01", ".exr"),
+    (b"#?", ".hdr"),
+    (b"BM", ".bmp"),
+)
+_READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"
+_MOST_CHANNELS = 256
+
+
+def decode(
+    source: ImageSource,
+    *,
+    srgb: bool,
+    warn: Callable[[Problem], None] | None = None,
+    limits: Limits = Limits(),
+) -> Pixels:
+    """A scene's image, ready to be uploaded.
+
+    Grey becomes three equal channels and a missing alpha 1; alpha is not multiplied in. Integer images keep their
+    encoding (`srgb` ones are uploaded to an sRGB format); images of more than 8 bits that are not sRGB become floats
+    0…1. HDR and EXR values are linear light, whatever `srgb` says; NaN becomes 0 and what is beyond the largest half
+    float becomes 65504, with a warning that counts the pixels.
+
+    Args:
+        source: a file, or the bytes of one.
+        srgb: whether the values are sRGB encoded.
+        warn: told what was replaced.
+        limits: what the header may claim.
+
+    Returns:
+        (height, width, 4), top row first, uint8 or float16.
+
+    Raises:
+        InputError: missing, of another kind, broken, or beyond a limit.
+    """
+    with _opened(source, limits) as image:
+        light = image.kind in (".hdr", ".exr")
+        wide = image.spec.format.basesize() > 1
+        pixels = image.read(_color_channels(image), "half" if light or (wide and not srgb) else "uint8")
+        pixels = _in_display_window(image, pixels, limits)
+    if light:
+        pixels = _finite(image, pixels, warn)
+    return _as_rgba(pixels)
+
+
+def read(path: Path | str) -> Pixels:
+    """A picture's values as they are: uint8, uint16, float16 or float32, top row first.
+
+    Returns:
+        (height, width, channels) in the order `R,G,B,A`, or (layers, height, width, channels) where channels are named
+        `000.Y`, `001.Y` and so on.
+
+    Raises:
+        InputError: missing, of another kind, broken, or beyond a limit.
+    """
+    with _opened(ImageSource(Path(path)), Limits()) as image:
+        names = list(image.spec.channelnames)
+        pixels = image.read(range(len(names)), None)
+    order = sorted(range(len(names)), key=lambda i: _channel_order(names[i]))
+    pixels = pixels[..., order]
+    layers = {name.partition(".")[0] for name in names if "." in name}
+    if layers and all(name.partition(".")[0].isdigit() for name in names) and len(names) % len(layers) == 0:
+        height, width, _ = pixels.shape
+        pixels = np.moveaxis(pixels.reshape(height, width, len(layers), -1), 2, 0)
+    return np.ascontiguousarray(pixels)
+
+
+def read_metadata(path: Path | str) -> dict[str, str]:
+    """The texts `write` put into an EXR or PNG file; empty where there are none.
+
+    Raises:
+        InputError: missing, not an image, or broken.
+    """
+    with _opened(ImageSource(Path(path)), Limits()) as image:
+        found = [(entry.name, entry.value) for entry in image.spec.extra_attribs]
+    return {name[len(PREFIX) :]: text for name, text in found if name.startswith(PREFIX) and isinstance(text, str)}
+
+
+# --- opening ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Image:
+    source: ImageSource
+    kind: str
+    path: str
+    size: int
+    handle: oiio.ImageInput
+    spec: oiio.ImageSpec
+    limits: Limits
+
+    def read(self, channels: range, kind: str | None) -> Pixels:
+        """Decoded pixels of these channels, as `kind` or as the file holds them."""
+        import OpenImageIO as oiio
+
+        wanted = oiio.TypeDesc(kind) if kind else self.spec.format
+        _check_size(self, len(channels), wanted.basesize())
+        with _quiet():
+            pixels = self.handle.read_image(0, 0, channels.start, channels.stop, wanted)
+        problem = _error_of(self.handle)
+        if pixels is None or problem:
+            _broken(self, problem)
+        return np.asarray(pixels)
+
+
+@contextlib.contextmanager
+def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
+    import OpenImageIO as oiio
+
+    start, size = _beginning(source)
+    kind = _kind_of(source, start)
+    with contextlib.ExitStack() as stack:
+        path = os.path.abspath(source.path)
+        if source.data is not None or Path(path).suffix.lower() != kind:
+            # OpenImageIO chooses the decoder by the extension and reads no memory: give the file the name it deserves.
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))
+            named = Path(folder, f"image{kind}")
+            if source.data is not None:
+                named.write_bytes(source.data)
+            else:
+                named.symlink_to(path)
+            path = str(named)
+        config = oiio.ImageSpec()
+        config.attribute("oiio:UnassociatedAlpha", 1)
+        with _quiet():
+            handle = oiio.ImageInput.open(path, config)
+        if handle is None:
+            _refuse(source, "RG352", f"the image is broken: {_plain(_error_of(oiio), path)}")
+        stack.callback(handle.close)
+        image = _Image(source, kind, path, size, handle, handle.spec(), limits)
+        if handle.format_name() != _FORMAT_NAMES[kind]:
+            _refuse(source, "RG351", f"the image is not what it claims to be; {_READ}")
+        if image.spec.deep:
+            _refuse(source, "RG354", "the image is deep (several samples a pixel); flatten it first")
+        if image.spec.nchannels > _MOST_CHANNELS:
+            _refuse(source, "RG353", f"the image has {image.spec.nchannels} channels; {_MOST_CHANNELS} are the limit")
+        _check_size(image, 1, 1)
+        yield image
+
+
+_FORMAT_NAMES = {
+    ".png": "png", ".jpg": "jpeg", ".exr": "openexr", ".hdr": "hdr", ".bmp": "bmp", ".tga": "targa",
+}  # fmt: skip
+
+
+def _beginning(source: ImageSource) -> tuple[bytes, int]:
+    """The first bytes and the length of the encoded image."""
+    if source.data is not None:
+        return source.data[:16], len(source.data)
+    try:
+        mode = os.stat(source.path)
+        if not stat.S_ISREG(mode.st_mode):
+            what = "a folder" if stat.S_ISDIR(mode.st_mode) else "not a regular file"
+            _refuse(source, "RG350", f"the image cannot be read: it is {what}")
+        with open(source.path, "rb") as file:
+            return file.read(16), mode.st_size
+    except FileNotFoundError:
+        _refuse(source, "RG350", "there is no such image")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        _refuse(source, "RG350", f"the image cannot be read: {reason}")
+
+
+def _kind_of(source: ImageSource, start: bytes) -> str:
+    for magic, kind in _KINDS:
+        if start.startswith(magic):
+            return kind
+    if not start:
+        _refuse(source, "RG352", "the image is broken: the file is empty")
+    if source.path.suffix.lower() != ".tga" or source.data is not None:
+        _refuse(source, "RG351", f"this is no image of a known kind; {_READ}")
+    return ".tga"  # has no magic number
+
+
+def _check_size(image: _Image, channels: int, item: int) -> None:
+    spec, limits = image.spec, image.limits
+    width, height = max(spec.width, spec.full_width), max(spec.height, spec.full_height)
+    if max(width, height) > limits.side or spec.depth > 1:
+        depth = f"×{spec.depth}" if spec.depth > 1 else ""
+        text = f"the image is {width}×{height}{depth} pixels; the limit is {limits.side} a side"
+        _refuse(image.source, "RG353", text)
+    decoded = width * height * max(4, channels) * item
+    if decoded > limits.bytes:
+        text = f"the image takes {decoded >> 20} MB decoded; the limit is {limits.bytes >> 20} MB"
+        _refuse(image.source, "RG353", text)
+    if decoded > limits.ratio_from and decoded > limits.ratio * image.size:
+        text = (
+            f"the image claims {decoded >> 20} MB in a file of {image.size} bytes; "
+            f"above {limits.ratio_from >> 20} MB the limit is {limits.ratio}:1"
+        )
+        _refuse(image.source, "RG353", text)
+
+
+def _name(source: ImageSource) -> str:
+    return source.label or str(source.path)
+
+
+def _refuse(source: ImageSource, code: str, text: str) -> NoReturn:
+    raise InputError(Problem(code, text, Place(_name(source))))
+
+
+def _broken(image: _Image, problem: str) -> NoReturn:
+    _refuse(image.source, "RG352", f"the image is broken: {_plain(problem, image.path)}")
+
+
+def _error_of(thing: Any) -> str:
+    """OpenImageIO's words; they may quote the file's own bytes, which need not be text."""
+    try:
+        return str(thing.geterror())
+    except UnicodeDecodeError as error:
+        return bytes(error.object).decode("ascii", "replace")
+
+
+def _plain(problem: str, path: str) -> str:
+    lines = [line for line in problem.splitlines() if line.strip()] or ["it cannot be decoded"]
+    line = lines[0].replace(path, "the file").replace(f'"{os.path.basename(path)}"', "the file")
+    return "".join(c if c.isprintable() else "?" for c in line)[:200]
+
+
+_stderr_lock = threading.Lock()
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps libpng from writing to stderr beside our message: it does so itself, past Python."""
+    with _stderr_lock, contextlib.ExitStack() as stack:
+        try:
+            kept = os.dup(2)
+        except OSError:  # no stderr at all
+            yield
+            return
+        stack.callback(os.close, kept)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        stack.callback(os.close, nowhere)
+        os.dup2(nowhere, 2)
+        stack.callback(os.dup2, kept, 2)
+        yield
+
+
+# --- pixels ----------------------------------------------------------------------------------------------------------
+
+
+def _color_channels(image: _Image) -> range:
+    """The channels that are the colour, side by side as OpenImageIO sorts them."""
+    names = [name.upper() for name in image.spec.channelnames]
+    if image.kind != ".exr":
+        return range(min(len(names), 4))
+    if "RY" in names or "BY" in names:
+        _refuse(image.source, "RG354", "the image holds luminance and chroma; convert it to R, G, B")
+    wanted = [name for name in ("R", "G", "B", "A") if name in names] if "R" in names else ["Y"]
+    if not all(name in names for name in (("R", "G", "B") if "R" in names else ("Y",))):
+        listed = ", ".join(image.spec.channelnames[:8])
+        _refuse(image.source, "RG354", f"the image has the channels {listed}; R, G, B (and A) or Y are needed")
+    first = names.index(wanted[0])
+    if names[first : first + len(wanted)] != wanted:
+        _refuse(image.source, "RG354", "the image's channels R, G, B, A are not side by side")
+    return range(first, first + len(wanted))
+
+
+def _in_display_window(image: _Image, pixels: Pixels, limits: Limits) -> Pixels:
+    """An EXR may hold a part of its picture, or more than it."""
+    spec = image.spec
+    window = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
+    if image.kind != ".exr" or window == (spec.x, spec.y, spec.width, spec.height):
+        return pixels
+    whole = np.zeros((spec.full_height, spec.full_width, pixels.shape[-1]), dtype=pixels.dtype)
+    left, top = max(spec.x, spec.full_x), max(spec.y, spec.full_y)
+    right = min(spec.x + spec.width, spec.full_x + spec.full_width)
+    bottom = min(spec.y + spec.height, spec.full_y + spec.full_height)
+    if right > left and bottom > top:
+        part = pixels[top - spec.y : bottom - spec.y, left - spec.x : right - spec.x]
+        whole[top - spec.full_y : bottom - spec.full_y, left - spec.full_x : right - spec.full_x] = part
+    return whole
+
+
+def _finite(image: _Image, pixels: Pixels, warn: Callable[[Problem], None] | None) -> Pixels:
+    if np.isfinite(pixels).all():
+        return pixels
+    unknown = int((np.isnan(pixels) | np.isneginf(pixels)).any(axis=-1).sum())
+    large = int(np.isposinf(pixels).any(axis=-1).sum())
+    said = [f"{unknown} pixels are NaN or -inf and become 0"] if unknown else []
+    said += [f"{large} pixels are infinite or beyond {HALF_MAX:.0f} and become {HALF_MAX:.0f}"] if large else []
+    if warn:
+        warn(Problem("RG355", "; ".join(said), Place(_name(image.source)), severity="warning"))
+    return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+
+
+def _as_rgba(pixels: Pixels) -> Pixels:
+    height, width, count = pixels.shape
+    one = 255 if pixels.dtype == np.uint8 else 1
+    rgba = np.full((height, width, 4), one, dtype=pixels.dtype)
+    if count <= 2:
+        rgba[..., :3] = pixels[..., :1]
+        rgba[..., 3:] = pixels[..., 1:] if count == 2 else one
+    else:
+        rgba[..., :count] = pixels
+    return rgba
+
+
+def _channel_order(name: str) -> tuple[str, int, str]:
+    layer, dot, channel = name.rpartition(".")
+    known = "RGBAYZ"
+    return layer if dot else "", known.find(channel) if channel in known else len(known), channel

@@ -1,0 +1,178 @@
+"""Writing one picture file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.images.files import failed, staged
+from rendergraph.images.view import from_srgb, to_bytes, to_srgb
+
+Pixels: TypeAlias = npt.NDArray[Any]
+Encoding: TypeAlias = Literal["linear", "display", "data"]
+
+EXTENSIONS: dict[str, str] = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg", ".exr": "openexr", ".hdr": "hdr"}
+"""Extension, in lower case, to OpenImageIO's name of the format."""
+HALF_MAX = 65504.0
+PREFIX = "rendergraph:"
+"""What our metadata's names begin with."""
+
+_NAMES = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+_EXACT_INTEGER = 1 << 24
+# OpenEXR stamps the time of writing; equal pictures shall be equal files.
+_NO_DATE = "1970:01:01 00:00:00"
+
+
+def write(
+    path: Path | str,
+    pixels: Pixels,
+    *,
+    channels: Sequence[str] | None = None,
+    encoding: Encoding = "data",
+    metadata: Mapping[str, str] | None = None,
+    half: bool = False,
+) -> None:
+    """One picture, whole or not at all; the extension chooses the format.
+
+    PNG and JPEG hold 8 bits: floats are clipped to 0…1 and rounded, after the sRGB curve where they are `linear`. EXR
+    and HDR hold linear light: `display` values are decoded first. `data` is written as it is everywhere.
+
+    Args:
+        path: `.png`, `.jpg`, `.jpeg`, `.exr` or `.hdr`.
+        pixels: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
+        channels: names for EXR; by default `Y`, `R,G`, `R,G,B` or `R,G,B,A`. Layers put `000.` and so on before them.
+        encoding: what the values are.
+        metadata: texts kept in EXR and PNG files; `read_metadata` gives them back.
+        half: 16-bit floats in EXR; values beyond ±65504 become that.
+
+    Raises:
+        InputError: the format cannot hold these pixels.
+        RenderError: the disk or the folder does not take it.
+    """
+    write_all([(Path(path), pixels, channels, encoding, half)], metadata or {})
+
+
+Job: TypeAlias = "tuple[Path, Pixels, Sequence[str] | None, Encoding, bool]"
+
+
+def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
+    """Several pictures that appear together; each job is the arguments of `write`."""
+    with staged([job[0] for job in jobs]) as parts:
+        for part, (path, pixels, channels, encoding, half) in zip(parts, jobs, strict=True):
+            shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+            if EXTENSIONS[path.suffix.lower()] in ("png", "jpeg"):
+                shaped, names, kind = _eight_bits(path, shaped, encoding), None, "uint8"
+            else:
+                names = tuple(channels or _NAMES[shaped.shape[-1]])
+                shaped = _values(path, shaped)
+                if encoding == "display":
+                    shaped = np.concatenate([from_srgb(shaped[..., :3]), shaped[..., 3:]], axis=-1)
+                kind = "half" if half else "float"
+                if path.suffix.lower() == ".hdr":
+                    shaped, names, kind = _three(path, shaped), None, "float"
+                elif shaped.ndim == 4:
+                    names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
+                    shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
+            _write_file(path, part, shaped, names, kind, metadata)
+
+
+def _eight_bits(path: Path, pixels: Pixels, encoding: Encoding) -> Pixels:
+    count = pixels.shape[-1]
+    if pixels.ndim != 3 or count == 2:
+        what = "layers" if pixels.ndim != 3 else "two channels"
+        raise _refused(path, f"{what} do not fit a {path.suffix[1:].upper()} picture; write an EXR")
+    if encoding == "linear" and pixels.dtype != np.uint8:
+        colors = to_bytes(to_srgb(np.nan_to_num(pixels[..., :3], nan=0.0, posinf=1.0, neginf=0.0)))
+        pixels = np.concatenate([colors, to_bytes(pixels[..., 3:])], axis=-1)
+    return to_bytes(pixels[..., :3] if count == 4 and EXTENSIONS[path.suffix.lower()] == "jpeg" else pixels)
+
+
+def _values(path: Path, pixels: Pixels) -> Pixels:
+    """Float values that are the texels' own."""
+    if np.issubdtype(pixels.dtype, np.floating):
+        return pixels
+    if pixels.size and max(int(pixels.max()), -int(pixels.min())) > _EXACT_INTEGER:
+        raise _refused(path, f"whole numbers above {_EXACT_INTEGER} (24 bits) cannot be kept in a picture")
+    # 8-bit arrays are colours 0…1 that have not been divided yet, wider integers are numbers.
+    return pixels.astype(np.float32) / (255 if pixels.dtype == np.uint8 else 1)
+
+
+def _three(path: Path, pixels: Pixels) -> Pixels:
+    """What Radiance's format can hold: three channels, no layers, nothing negative."""
+    if pixels.ndim == 4:
+        raise _refused(path, "layers do not fit an HDR picture; write an EXR")
+    if pixels.shape[-1] == 1:
+        pixels = np.repeat(pixels, 3, axis=-1)
+    elif pixels.shape[-1] == 2:
+        pixels = np.concatenate([pixels, np.zeros_like(pixels[..., :1])], axis=-1)
+    return np.nan_to_num(np.maximum(pixels[..., :3].astype(np.float32), 0), nan=0.0, posinf=1e38)
+
+
+def _refused(path: Path, reason: str) -> InputError:
+    return InputError(Problem("RG508", reason, Place(str(path))))
+
+
+def _write_file(
+    path: Path, part: Path, pixels: Pixels, names: Sequence[str] | None, kind: str, metadata: Mapping[str, str]
+) -> None:
+    import OpenImageIO as oiio
+
+    height, width, count = pixels.shape
+    spec = oiio.ImageSpec(width, height, count, kind)
+    if names:
+        spec.channelnames = tuple(names)
+    spec.attribute("oiio:UnassociatedAlpha", 1)  # PNG: take the values as given, do not divide by alpha
+    if path.suffix.lower() == ".exr":
+        spec.attribute("compression", "zip")
+        spec.attribute("DateTime", _NO_DATE)
+        spec.attribute("oiio:UnassociatedAlpha", 0)
+    elif EXTENSIONS[path.suffix.lower()] == "jpeg":
+        spec.attribute("Compression", "jpeg:95")
+        spec.attribute("jpeg:subsampling", "4:4:4")
+    for key, text in metadata.items():
+        spec.attribute(key if key.startswith(PREFIX) else PREFIX + key, text)
+    if kind == "half":
+        finite = np.isfinite(pixels)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            pixels = np.where(finite, np.clip(pixels, -HALF_MAX, HALF_MAX), pixels).astype(np.float16)
+    elif kind == "float":
+        pixels = pixels.astype(np.float32)
+    with _safe_place(path, part) as place:
+        out = oiio.ImageOutput.create(EXTENSIONS[path.suffix.lower()])
+        done = out is not None and out.open(place, spec) and out.write_image(np.ascontiguousarray(pixels))
+        done = out is not None and out.close() and done
+        if not done:
+            reason = ((out and out.geterror()) or oiio.geterror() or "the disk may be full").splitlines()[0]
+            raise failed(path, reason.replace(place, path.name))
+
+
+@contextlib.contextmanager
+def _safe_place(path: Path, part: Path) -> Iterator[str]:
+    """The name to give to OpenImageIO.
+
+    On a full disk libpng and the Radiance writer report success and libjpeg ends the process, so those write to memory
+    first; OpenEXR says what happened.
+    """
+    if path.suffix.lower() == ".exr" or not hasattr(os, "memfd_create"):
+        yield str(part)
+        return
+    memory = os.memfd_create(path.name[:100])
+    try:
+        yield f"/proc/self/fd/{memory}"
+        try:
+            with open(memory, "rb", closefd=False) as source, open(part, "wb") as target:
+                shutil.copyfileobj(source, target, 1 << 20)
+        except OSError as error:
+            raise failed(path, error.strerror or str(error)) from error
+    finally:
+        os.close(memory)

@@ -1,0 +1,60 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rendergraph.errors import Place, Problem, RenderError
+
+
+def failed(path: Path, reason: str) -> RenderError:
+    """The error for a picture that could not be written."""
+    return RenderError(Problem("RG507", f"the picture cannot be written: {reason}", Place(str(path))))
+
+
+@contextlib.contextmanager
+def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Temporary files beside each path, which take the paths' places together when the block ends well.
+
+    A link is followed, so that it stays a link. Each temporary file is flushed to the disk before the rename and its
+    folder after it; whatever ends the block early, an interrupt included, leaves nothing behind.
+
+    Args:
+        paths: where the files shall appear.
+
+    Yields:
+        One path for each, in the same folder, to be written by the caller.
+
+    Raises:
+        RenderError: flushing or renaming failed.
+    """
+    targets = [Path(os.path.realpath(path)) for path in paths]
+    temporary = [target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part") for target in targets]
+    try:
+        yield temporary
+        try:
+            for part in temporary:
+                _flush(part)
+            for part, target in zip(temporary, targets, strict=True):
+                os.replace(part, target)
+            for folder in {target.parent for target in targets}:
+                _flush(folder)
+        except OSError as error:
+            shown = dict(zip(map(str, temporary), paths, strict=True)).get(str(error.filename), paths[0])
+            raise failed(shown, error.strerror or str(error)) from error
+    finally:
+        for part in temporary:
+            with contextlib.suppress(OSError):
+                part.unlink()
+
+
+def _flush(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

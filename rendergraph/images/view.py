@@ -1,0 +1,129 @@
+"""Turning any texture into something an eye can read.
+
+| texels mean | 8-bit picture |
+|---|---|
+| `display_color` | as they are |
+| `radiance`, `albedo`, `emissive`, `luminance`: linear light | clipped to 0…1, sRGB curve |
+| `normal` | −1…1 becomes 0…1, no curve |
+| `depth`, `linear_depth`, `shadow_map` | nearest black, farthest white, what nothing covers white |
+| `visibility`, `occlusion`, `material` | 0…1 as it is, no curve |
+| whole numbers | a colour each, 0 black |
+| anything else | 0…1 as it is; where values lie outside, scaled from the least to the greatest |
+
+One channel is grey, two are red and green, a fourth is left out; layers lie in a grid, row by row. NaN is magenta.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Pixels: TypeAlias = npt.NDArray[Any]
+Bytes: TypeAlias = npt.NDArray[np.uint8]
+
+_LIGHT = frozenset({"radiance", "albedo", "emissive", "luminance"})
+_DEPTH = frozenset({"depth", "linear_depth", "shadow_map"})
+_UNIT = frozenset({"display_color", "visibility", "occlusion", "material"})
+_NAN_COLOR = (255, 0, 255)
+
+
+def to_srgb(linear: Pixels) -> npt.NDArray[np.float32]:
+    """Linear values 0…1 to sRGB-encoded ones (IEC 61966-2-1); what lies outside is clipped."""
+    values = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
+    encoded = np.where(values <= 0.0031308, values * 12.92, 1.055 * np.power(values, 1 / 2.4) - 0.055)
+    return encoded.astype(np.float32)
+
+
+def from_srgb(encoded: Pixels) -> npt.NDArray[np.float32]:
+    """sRGB-encoded values 0…1 (or 0…255 as uint8) to linear ones (IEC 61966-2-1)."""
+    values: npt.NDArray[np.float32] = np.asarray(encoded, dtype=np.float32)
+    values = values / np.float32(255) if encoded.dtype == np.uint8 else values
+    linear = np.where(values <= 0.04045, values / 12.92, np.power((np.maximum(values, 0) + 0.055) / 1.055, 2.4))
+    return linear.astype(np.float32)
+
+
+def to_bytes(unit: Pixels) -> Bytes:
+    """Values 0…1 to the nearest of 0…255; NaN becomes 0."""
+    if unit.dtype == np.uint8:
+        return unit
+    values = np.nan_to_num(np.asarray(unit, dtype=np.float32), nan=0.0, posinf=1.0, neginf=0.0)
+    return (np.clip(values, 0.0, 1.0) * 255 + 0.5).astype(np.uint8)
+
+
+def viewable(array: Pixels, semantic: str = "any") -> Bytes:
+    """A picture of a texture; the module's table says how each meaning is shown.
+
+    Args:
+        array: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
+        semantic: what the texels mean, a name in `textures.SEMANTICS` or a plugin's own.
+
+    Returns:
+        uint8, (height, width, 1) grey or (height, width, 3).
+    """
+    array = array[..., np.newaxis] if array.ndim == 2 else array
+    colors = _colors(array[..., :3], semantic)
+    if np.issubdtype(array.dtype, np.floating):
+        broken = np.isnan(array[..., :3]).any(axis=-1)
+        if broken.any():
+            colors = np.repeat(colors, 3, axis=-1) if colors.shape[-1] == 1 else colors.copy()
+            colors[broken] = _NAN_COLOR
+    if colors.shape[-1] == 2:
+        colors = np.concatenate([colors, np.zeros_like(colors[..., :1])], axis=-1)
+    return np.ascontiguousarray(_grid(colors) if colors.ndim == 4 else colors)
+
+
+def _colors(array: Pixels, semantic: str) -> Bytes:
+    if np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
+        return _palette(array)
+    if semantic in _DEPTH:
+        return to_bytes(_stretched(array, background=1.0 if semantic != "linear_depth" else math.inf))
+    values = array.astype(np.float32) / 255 if array.dtype == np.uint8 else array
+    if semantic in _LIGHT:
+        return to_bytes(to_srgb(np.nan_to_num(values, nan=0.0, posinf=1.0)))
+    if semantic == "normal":
+        return to_bytes(values * np.float32(0.5) + np.float32(0.5))
+    finite = values[np.isfinite(values)]
+    if semantic not in _UNIT and finite.size and (finite.min() < 0 or finite.max() > 1):
+        return to_bytes(_stretched(values, background=math.inf))
+    return to_bytes(values)
+
+
+def _stretched(array: Pixels, background: float) -> npt.NDArray[np.float32]:
+    """Least to greatest becomes 0 to 1; texels at `background` or beyond become 1 and do not count."""
+    values = np.asarray(array, dtype=np.float32)
+    covered = values[np.isfinite(values) & (values < background)]
+    if not covered.size:
+        return np.where(values < background, np.float32(0), np.float32(1))
+    low, high = float(covered.min()), float(covered.max())
+    scaled = (values - low) / max(high - low, 1e-30)
+    return np.where(values < background, scaled, np.float32(1)).astype(np.float32)
+
+
+def _palette(array: Pixels) -> Bytes:
+    """A colour for each whole number, far apart for neighbours: the golden ratio's multiples as hues."""
+    number = array[..., 0].astype(np.int64) if array.shape[-1] == 1 else _joined(array)
+    hue = (number % 65536 * 0.6180339887) % 1.0
+    thirds = np.array([1.0, 2 / 3, 1 / 3])
+    rgb = np.clip(np.abs((hue[..., np.newaxis] + thirds) % 1.0 * 6 - 3) - 1, 0, 1) * 0.75 + 0.25
+    return to_bytes(np.where(number[..., np.newaxis] == 0, 0.0, rgb))
+
+
+def _joined(array: Pixels) -> npt.NDArray[np.int64]:
+    total = np.zeros(array.shape[:-1], dtype=np.int64)
+    for channel in range(array.shape[-1]):
+        total = total * 7919 + array[..., channel].astype(np.int64)
+    return total
+
+
+def _grid(layers: Bytes) -> Bytes:
+    count, height, width, channels = layers.shape
+    columns = math.ceil(math.sqrt(count))
+    rows = math.ceil(count / columns)
+    sheet = np.zeros((rows * height, columns * width, channels), dtype=np.uint8)
+    for index in range(count):
+        top, left = index // columns * height, index % columns * width
+        sheet[top : top + height, left : left + width] = layers[index]
+    return sheet
