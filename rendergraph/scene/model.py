@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -41,6 +42,11 @@ class Mesh:
     uv0: Floats | None = None
     uv1: Floats | None = None
     colors: Floats | None = None
+
+    @cached_property
+    def box(self) -> tuple[Floats, Floats]:
+        """Minimum and maximum corner, float32 (3,) each."""
+        return self.positions.min(axis=0), self.positions.max(axis=0)
 
 
 @dataclass(frozen=True)
@@ -135,6 +141,8 @@ class Object:
         transform: object to world, float64 (4, 4), affine.
         casts_shadow: false for names ending in `NS` and where a file says so.
         hidden: not drawn.
+        node: the name of the node it is a part of, shared by the parts of one node (one for each material, or each
+            instance); a scene file's `overrides` name it.
     """
 
     name: str
@@ -143,6 +151,7 @@ class Object:
     transform: Matrix
     casts_shadow: bool = True
     hidden: bool = False
+    node: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,234 @@
+"""What every reader shares: where paths may lead, how much may be read, and what was left out.
+
+Scene files are untrusted data. A path found in one is resolved, links followed, and handed to the caller's root rule
+before anything is opened; only regular files are read, and only up to a limit.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path, PureWindowsPath
+from typing import Literal, TypeAlias
+
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.scene import image_header
+from rendergraph.scene.model import ImageSource
+
+CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
+"""The root rule: returns the resolved path, or raises InputError where it leaves every root."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much a scene may ask for.
+
+    Attributes:
+        file_bytes: bytes of one mesh or buffer file.
+        vertices: vertices of one scene, before and after corners are split.
+        objects: placed objects of one scene.
+        memory_bytes: memory for what a file declares without holding it, such as accessors without a view.
+        image_side: texels along one side of an image.
+        image_bytes: decoded bytes of one image.
+        image_ratio: decoded bytes for each byte of the file, where an image is above 64 MB.
+    """
+
+    file_bytes: int = 2 << 30
+    vertices: int = 100_000_000
+    objects: int = 500_000
+    memory_bytes: int = 256 << 20
+    image_side: int = 16384
+    image_bytes: int = 2 << 30
+    image_ratio: int = 1000
+
+
+def inside(folder: Path) -> CheckPath:
+    """The root rule that keeps everything under one folder, links followed."""
+
+    def check(path: Path, place: Place | None) -> Path:
+        root, resolved = folder.resolve(), path.resolve()
+        if not resolved.is_relative_to(root):
+            text = f"'{shown(str(path))}' leaves the folder {root}; add its folder with --asset-root"
+            raise InputError(Problem("RG302", text, place))
+        return resolved
+
+    return check
+
+
+def shown(text: str, most: int = 80) -> str:
+    """Text from a file made fit for one line of a message."""
+    clean = "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
+    return clean if len(clean) <= most else clean[: most - 1] + "…"
+
+
+def named(text: str) -> str:
+    """A name from a file as text that can be printed and encoded."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace") if text.isascii() or _sane(text) else (
+        "".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in text)
+    )
+
+
+def _sane(text: str) -> bool:
+    return not any("\ud800" <= c <= "\udfff" for c in text)
+
+
+class Names:
+    """Hands out names that are unique within a file: `Box`, `Box_1`, `Box_2`."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set()
+        self._next: dict[str, int] = {}
+
+    def unique(self, wanted: str, fallback: str) -> str:
+        """`wanted`, or `fallback` where that is empty, with a number where it is taken."""
+        base = named(wanted) or fallback
+        name, number = base, self._next.get(base, 1)
+        while name in self._taken:
+            name = f"{base}_{number}"
+            number += 1
+        self._next[base] = number
+        self._taken.add(name)
+        return name
+
+
+@dataclass
+class Reading:
+    """One file being read: its path, the root rule, the limits, and the warnings so far (once a kind and file)."""
+
+    path: Path
+    check_path: CheckPath
+    limits: Limits = Limits()
+    _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What was left out, replaced or clamped, in the order it was found."""
+        return tuple(self._warnings.values())
+
+    def warn(self, code: str, kind: str, text: str, *, line: int = 0, file: Path | None = None) -> None:
+        """Say something once: a second warning of the same kind about the same file is dropped."""
+        place = Place(str(file or self.path), line, 1 if line else 0)
+        self._warnings.setdefault((code, kind, place.file), Problem(code, text, place, severity="warning"))
+
+    def add_warnings(self, problems: Iterable[Problem]) -> None:
+        """Take over what another file's reader warned of."""
+        for problem in problems:
+            self._warnings.setdefault((problem.code, problem.text, str(problem.place)), problem)
+
+    def error(self, code: str, text: str, *, line: int = 0, file: Path | None = None) -> InputError:
+        """An error in this file, to be raised by the caller."""
+        return InputError(Problem(code, text, Place(str(file or self.path), line, 1 if line else 0)))
+
+    def over(self, what: str, limit: str) -> InputError:
+        """An error for a limit passed; names the limit."""
+        return self.error("RG307", f"{what} (limit '{limit}', {getattr(self.limits, limit):,})")
+
+    def beside(self, name: str, *, line: int = 0, file: Path | None = None) -> Path:
+        """The file `name` means, relative to this one, inside the roots; it need not exist.
+
+        Raises:
+            InputError: it is a URL, holds a NUL, or leaves the roots.
+        """
+        holder = file or self.path
+        if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name) or "\0" in name:
+            raise self.error("RG302", f"'{shown(name)}' is no path; only files are read", line=line, file=holder)
+        if PureWindowsPath(name).is_absolute() or name.startswith(("/", "\\\\")):
+            raise self.error("RG302", f"'{shown(name)}' is absolute; paths in a file are relative to it", line=line,
+                             file=holder)  # fmt: skip
+        place = Place(str(holder), line, 1 if line else 0)
+        try:
+            return self.check_path(holder.parent / name, place)
+        except (OSError, ValueError, RuntimeError) as problem:
+            raise self.error("RG301", f"'{shown(name)}' cannot be followed: {reason(problem)}", line=line,
+                             file=holder) from None  # fmt: skip
+
+    def read(self, path: Path, what: str, *, line: int = 0) -> bytes:
+        """The bytes of a regular file within `file_bytes`.
+
+        Raises:
+            InputError: it is missing, unreadable, no regular file, or too large.
+        """
+        self.exists(path, what, line=line)
+        try:
+            if path.stat().st_size > self.limits.file_bytes:
+                raise self.over(f"{what} {shown(str(path))} has {path.stat().st_size:,} bytes", "file_bytes")
+            return path.read_bytes()
+        except (OSError, ValueError) as problem:
+            raise self.error("RG301", f"{what} '{shown(str(path))}' cannot be read: {reason(problem)}") from None
+
+    def exists(self, path: Path, what: str, *, line: int = 0) -> None:
+        """Check that a path is a regular file that can be opened.
+
+        Raises:
+            InputError: it is not.
+        """
+        kind = file_kind(path)
+        if kind == "file":
+            return
+        if path == self.path:
+            raise InputError(Problem("RG301", f"{what} '{shown(str(path))}' {_NOT[kind]}"))
+        raise self.error("RG301", f"{what} '{shown(str(path))}' {_NOT[kind]}", line=line)
+
+    def image(self, path: Path, what: str, *, line: int = 0) -> ImageSource:
+        """An image file whose header is plausible.
+
+        Raises:
+            InputError: it is missing, no image, or beyond the limits.
+        """
+        self.exists(path, what, line=line)
+        try:
+            size = path.stat().st_size
+            with path.open("rb") as file:
+                head = file.read(image_header.HEAD_BYTES)
+        except OSError as problem:
+            raise self.error("RG301", f"{what} '{shown(str(path))}' cannot be read: {reason(problem)}") from None
+        label = shown(path.name)
+        self._check_header(head, size, f"{what} '{label}'", path.suffix, line)
+        return ImageSource(path, None, label)
+
+    def embedded_image(self, data: bytes, what: str) -> ImageSource:
+        """An image inside this file whose header is plausible.
+
+        Raises:
+            InputError: it is no image, or beyond the limits.
+        """
+        self._check_header(data[: image_header.HEAD_BYTES], len(data), what, "", 0)
+        return ImageSource(self.path, data, f"{what} in {shown(self.path.name)}")
+
+    def _check_header(self, head: bytes, size: int, what: str, suffix: str, line: int) -> None:
+        try:
+            facts = image_header.read(head, suffix)
+        except ValueError as problem:
+            raise self.error("RG310", f"{what} {problem}", line=line) from None
+        if facts.width is None or facts.height is None:
+            return
+        if facts.width < 1 or facts.height < 1:
+            raise self.error("RG310", f"{what} is {facts.width}×{facts.height} texels", line=line)
+        if max(facts.width, facts.height) > self.limits.image_side:
+            raise self.over(f"{what} is {facts.width}×{facts.height} texels", "image_side")
+        decoded = facts.width * facts.height * facts.channels * facts.channel_bytes
+        if decoded > self.limits.image_bytes:
+            raise self.over(f"{what} decodes to {decoded:,} bytes", "image_bytes")
+        if decoded > 64 << 20 and decoded > self.limits.image_ratio * size:
+            raise self.over(f"{what} decodes to {decoded:,} bytes from {size:,}", "image_ratio")
+
+
+_NOT = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}
+
+
+def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
+    """What stands at a path, links followed."""
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return "missing"
+    except (OSError, ValueError):
+        return "unreadable"
+    return "file" if stat.S_ISREG(mode) else "other"
+
+
+def reason(problem: Exception) -> str:
+    """The operating system's words without path and number."""
+    return getattr(problem, "strerror", None) or shown(str(problem))

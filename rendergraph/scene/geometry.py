@@ -1,0 +1,146 @@
+"""Normals, triangles and affine matrices: the arithmetic that readers and shapes share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.scene.model import Floats, Matrix, Mesh, Vec3
+
+Doubles = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.uint32]
+
+
+def unit(vectors: npt.ArrayLike) -> Doubles:
+    """Vectors along the last axis made unit length; those of length zero stay zero."""
+    values = np.asarray(vectors, np.float64)
+    peak = np.abs(values).max(axis=-1, keepdims=True, initial=0.0)
+    scaled = values / np.where(peak > 0, peak, 1.0)  # so that neither tiny nor huge vectors lose their square
+    length = np.sqrt((scaled * scaled).sum(axis=-1, keepdims=True))
+    return scaled / np.where(length > 0, length, 1.0)
+
+
+def face_normals(positions: npt.ArrayLike, triangles: npt.NDArray[np.integer]) -> Doubles:
+    """Unit normals `(B-A)×(C-A)` of shape (m, 3); zero for triangles without area."""
+    points = np.asarray(positions, np.float64)
+    a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
+    return unit(np.cross(b - a, c - a))
+
+
+def mean_normals(normals: Doubles, corners: npt.NDArray[np.integer], faces: npt.NDArray[np.integer], count: int) -> Doubles:
+    """The mean of the adjacent face normals, `N = Σ Ni / n`, not weighted by area (techniques.md §1), unit length.
+
+    Args:
+        normals: (f, 3) unit face normals.
+        corners: vertex of each corner, (k,).
+        faces: face of each corner, (k,).
+        count: number of vertices.
+    """
+    total = np.stack([np.bincount(corners, weights=normals[faces, axis], minlength=count) for axis in range(3)], axis=1)
+    return unit(total)
+
+
+def filled_normals(positions: Floats, triangles: Indices, normals: Doubles) -> tuple[Floats, int]:
+    """Normals of unit length, where zero ones are replaced by the mean of the adjacent faces'; and how many were."""
+    result = unit(normals)
+    zero = ~result.any(axis=1)
+    missing = int(zero.sum())
+    if missing:
+        faces = np.repeat(np.arange(len(triangles)), 3)
+        mean = mean_normals(face_normals(positions, triangles), triangles.reshape(-1), faces, len(positions))
+        mean[~mean.any(axis=1)] = (0.0, 0.0, 1.0)
+        result[zero] = mean[zero]
+    return result.astype(np.float32), missing
+
+
+def flat(mesh: Mesh) -> Mesh:
+    """The same triangles with a vertex of its own for each corner and the face's normal; tangents are dropped."""
+    corners = mesh.indices.reshape(-1)
+    normals = face_normals(mesh.positions, mesh.indices)
+    normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
+    split = {name: None if (v := getattr(mesh, name)) is None else v[corners] for name in ("uv0", "uv1", "colors")}
+    return Mesh(
+        mesh.name, mesh.positions[corners], np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        np.repeat(normals, 3, axis=0).astype(np.float32), None, **split,
+    )  # fmt: skip
+
+
+def strip_triangles(indices: Indices) -> Indices:
+    """Triangles of a strip, every second one turned so that all have the same winding; those without area left out."""
+    a, b, c = indices[:-2], indices[1:-1], indices[2:]
+    odd = (np.arange(len(a)) & 1).astype(bool)
+    triangles = np.stack([a, np.where(odd, c, b), np.where(odd, b, c)], axis=1)
+    return proper(triangles)
+
+
+def fan_triangles(indices: Indices) -> Indices:
+    """Triangles of a fan."""
+    first = np.broadcast_to(indices[:1], indices[1:-1].shape)
+    return proper(np.stack([first, indices[1:-1], indices[2:]], axis=1))
+
+
+def proper(triangles: Indices) -> Indices:
+    """Triangles with three distinct corners."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    keep = (a != b) & (b != c) & (c != a)
+    return np.ascontiguousarray(triangles if keep.all() else triangles[keep], np.uint32)
+
+
+def translation(at: Sequence[float]) -> Matrix:
+    """Affine matrix that moves by `at`."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = at
+    return matrix
+
+
+def quaternion_matrix(x: float, y: float, z: float, w: float) -> Matrix:
+    """Rotation matrix (3, 3) of a quaternion, normalised first.
+
+    Raises:
+        ValueError: all of it is zero.
+    """
+    q = unit([x, y, z, w])
+    if not q.any():
+        raise ValueError("a rotation of zero length")
+    x, y, z, w = (float(v) for v in q)
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+def euler_matrix(degrees: Sequence[float]) -> Matrix:
+    """Rotation (3, 3) about X, then Y, then Z (`Rz·Ry·Rx`), angles in degrees."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return np.asarray(rz @ ry @ rx, np.float64)
+
+
+def placement(at: Sequence[float], rotation: Matrix, scale: Sequence[float]) -> Matrix:
+    """Scale, then rotate, then move: `T·R·S` as (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * np.asarray(scale, np.float64)
+    matrix[:3, 3] = at
+    return matrix
+
+
+def rigid(matrix: Matrix) -> Matrix:
+    """A transform without its scale and shear, for cameras: -Z and +Y keep their directions as well as they can."""
+    back = unit(matrix[:3, 2])
+    side = unit(np.cross(matrix[:3, 1], back))
+    if not back.any() or not side.any():
+        return translation(matrix[:3, 3])
+    result = np.eye(4)
+    result[:3, 0], result[:3, 1], result[:3, 2], result[:3, 3] = side, np.cross(back, side), back, matrix[:3, 3]
+    return result
+
+
+def vec3(values: npt.ArrayLike) -> Vec3:
+    """Three plain floats."""
+    x, y, z = (float(value) for value in np.asarray(values))
+    return x, y, z

@@ -1,0 +1,235 @@
+"""A scene as arrays for the GPU, packed once: geometry streams, instance records, materials, lights and views.
+
+Layouts are those of the GLSL structs in `shaders/include/` (std140: everything is a vec4 or a mat4 by columns). Sizes in
+bytes: `View` 432, `Light` 64, `MaterialData` 128, an instance record 56.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.scene.model import Floats, Light, Material, Mesh, Scene
+from rendergraph.scene.pack_order import first_use, ordered
+from rendergraph.scene.phong import dielectric_f0, phong_of
+from rendergraph.steps import ViewMatrices
+
+Records: TypeAlias = npt.NDArray[np.void]
+Bools: TypeAlias = npt.NDArray[np.bool_]
+Ints: TypeAlias = npt.NDArray[np.int32]
+
+SLOTS = ("base_color", "metallic_roughness", "normal", "occlusion", "emissive", "anisotropy", "specular", "specular_color")
+"""Texture slots in the order of a material's rows in `material_uvs`."""
+
+_VEC4 = ("<f4", (4,))
+INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
+"""Rows of the affine object-to-world matrix (`in_object0`…`2`), material and object index (`in_ids`)."""
+MESH = np.dtype([("first_index", "<u4"), ("count", "<u4"), ("base_vertex", "<i4"), ("vertices", "<u4"),
+                 ("low", "<f4", (3,)), ("high", "<f4", (3,))])  # fmt: skip
+"""Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
+MATERIAL = np.dtype([(name, *_VEC4) for name in ("base_color", "emissive", "surface", "specular", "extra", "phong_diffuse",
+                                                 "phong_specular", "phong_ambient")])  # fmt: skip
+LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
+VIEW = np.dtype([(name, "<f4", (4, 4)) for name in ("view", "projection", "view_projection", "inverse_view",
+                                                    "inverse_projection", "inverse_view_projection")]
+                + [(name, *_VEC4) for name in ("eye", "viewport", "range")])  # fmt: skip
+_LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
+
+Attribute: TypeAlias = Literal["tangent", "uv0", "uv1", "color"]
+
+
+@dataclass(frozen=True, eq=False)
+class PackedScene:
+    """The arrays of a scene. v vertices, i indices, n objects, m materials.
+
+    Attributes:
+        positions, normals: float32 (v, 3).
+        tangents: float32 (v, 4), zero for meshes without; None where no mesh has tangents. So with `uv0`, `uv1` (v, 2)
+            and `colors` (v, 4), white for meshes without.
+        indices: uint32 (i,), relative to the mesh's base vertex, three a triangle.
+        meshes: `MESH` records, indexed as `Scene.meshes`.
+        mesh_attributes: for each mesh which optional attributes it really has.
+        instances: `INSTANCE` records, one an object in the scene's order; a draw of objects that are not neighbours
+            gathers their records into its own order.
+        materials: `MATERIAL` records.
+        material_uvs: float32 (m, 16, 4): per material the eight `SLOTS`' two rows (a, b, c, 0) of the uv transform.
+        material_moved: bool (m,), whether any slot's transform is not the identity (`HAS_UV_TRANSFORM`).
+        lights: `LIGHT` records.
+        object_mesh, object_material: int32 (n,).
+        mirrored: bool (n,), the transform turns the winding round (determinant below 0).
+        casts_shadow, hidden, double_sided: bool (n,).
+        alpha_mode: `opaque`, `mask` or `blend` for each object.
+        centers, radii: float32 (n, 3) and (n,), world-space bounding spheres, for sorting by depth.
+        names: of the objects.
+    """
+
+    positions: Floats
+    normals: Floats
+    tangents: Floats | None
+    uv0: Floats | None
+    uv1: Floats | None
+    colors: Floats | None
+    indices: npt.NDArray[np.uint32]
+    meshes: Records
+    mesh_attributes: tuple[frozenset[Attribute], ...]
+    instances: Records
+    materials: Records
+    material_uvs: Floats
+    material_moved: Bools
+    lights: Records
+    object_mesh: Ints
+    object_material: Ints
+    mirrored: Bools
+    casts_shadow: Bools
+    hidden: Bools
+    double_sided: Bools
+    alpha_mode: tuple[str, ...]
+    centers: Floats
+    radii: Floats
+    names: tuple[str, ...]
+
+
+def pack(scene: Scene) -> PackedScene:
+    """Lay a scene out for the GPU; triangles in vertex-cache order, vertices in the order of first use."""
+    orders = []
+    for mesh in scene.meshes:
+        orders.append(first_use(ordered(mesh.positions, mesh.indices), len(mesh.positions)))
+    streams = {name: _stream(scene.meshes, [old for old, _ in orders], name, width, fill) for name, width, fill in (
+        ("positions", 3, 0.0), ("normals", 3, 0.0), ("tangents", 4, 0.0), ("uv0", 2, 0.0), ("uv1", 2, 0.0),
+        ("colors", 4, 1.0))}  # fmt: skip
+    records = np.zeros(len(scene.meshes), MESH)
+    first, base = 0, 0
+    for record, mesh, (old, triangles) in zip(records, scene.meshes, orders, strict=True):
+        low, high = mesh.box
+        record["first_index"], record["count"], record["base_vertex"] = first, triangles.size, base
+        record["vertices"], record["low"], record["high"] = len(old), low, high
+        first, base = first + triangles.size, base + len(old)
+    indices = np.concatenate([np.zeros(0, np.uint32), *(triangles.reshape(-1) for _, triangles in orders)])
+    positions, normals = streams["positions"], streams["normals"]
+    assert positions is not None  # every mesh has both
+    assert normals is not None
+    return PackedScene(
+        positions, normals, streams["tangents"], streams["uv0"], streams["uv1"], streams["colors"], indices, records,
+        tuple(_attributes(mesh) for mesh in scene.meshes), **_placed(scene, records),
+    )  # fmt: skip
+
+
+def update(packed: PackedScene, scene: Scene) -> PackedScene:
+    """The same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame."""
+    return replace(packed, **_placed(scene, packed.meshes))
+
+
+def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
+    """Everything that may change from frame to frame."""
+    objects = scene.objects
+    mesh = np.array([entry.mesh for entry in objects], np.int32)
+    material = np.array([entry.material for entry in objects], np.int32)
+    transforms = np.array([entry.transform for entry in objects], np.float64).reshape(-1, 4, 4)
+    instances = np.zeros(len(objects), INSTANCE)
+    instances["rows"] = transforms[:, :3, :]
+    instances["ids"] = np.stack([material, np.arange(len(objects), dtype=np.int32)], axis=1)
+    low, high = meshes["low"][mesh].astype(np.float64), meshes["high"][mesh].astype(np.float64)
+    center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
+    extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
+    uvs, moved = pack_material_uvs(scene.materials)
+    return {
+        "instances": instances, "materials": pack_materials(scene.materials), "material_uvs": uvs,
+        "material_moved": moved, "lights": pack_lights(scene.lights), "object_mesh": mesh, "object_material": material,
+        "mirrored": np.linalg.det(transforms[:, :3, :3]) < 0,
+        "casts_shadow": np.array([entry.casts_shadow for entry in objects], bool),
+        "hidden": np.array([entry.hidden for entry in objects], bool),
+        "double_sided": np.array([scene.materials[entry.material].double_sided for entry in objects], bool),
+        "alpha_mode": tuple(scene.materials[entry.material].alpha_mode for entry in objects),
+        "centers": center.astype(np.float32), "radii": np.linalg.norm(extent, axis=1).astype(np.float32),
+        "names": tuple(entry.name for entry in objects),
+    }  # fmt: skip
+
+
+def _attributes(mesh: Mesh) -> frozenset[Attribute]:
+    pairs: tuple[tuple[Attribute, Floats | None], ...] = (
+        ("tangent", mesh.tangents), ("uv0", mesh.uv0), ("uv1", mesh.uv1), ("color", mesh.colors))  # fmt: skip
+    return frozenset(name for name, values in pairs if values is not None)
+
+
+def _stream(meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], name: str, width: int, fill: float) -> Floats | None:
+    """One attribute of all meshes behind each other; None where no mesh has it (positions and normals always are)."""
+    if name not in ("positions", "normals") and all(getattr(mesh, name) is None for mesh in meshes):
+        return None
+    stream = np.full((sum(map(len, orders)), width), fill, np.float32)
+    at = 0
+    for mesh, old in zip(meshes, orders, strict=True):
+        values = getattr(mesh, name)
+        if values is not None:
+            np.take(values, old, axis=0, out=stream[at : at + len(old)])
+        at += len(old)
+    return stream
+
+
+def pack_materials(materials: Sequence[Material]) -> Records:
+    """`MaterialData` records (shaders/include/materials.glsl)."""
+    table = np.zeros(len(materials), MATERIAL)
+    for record, material in zip(table, materials, strict=True):
+        ambient, diffuse, specular, n = phong_of(material)
+        record["base_color"] = material.base_color
+        record["emissive"] = (*material.emissive, material.alpha_cutoff)
+        record["surface"] = (material.metallic, material.roughness, material.occlusion_strength, material.normal_scale)
+        record["specular"] = (*material.specular_color, material.specular)
+        record["extra"] = (dielectric_f0(material.ior), material.anisotropy_strength, material.anisotropy_rotation, 0.0)
+        record["phong_diffuse"] = (*diffuse, n)
+        record["phong_specular"] = (*specular, 0.0)
+        record["phong_ambient"] = (*ambient, 0.0)
+    return table
+
+
+def pack_material_uvs(materials: Sequence[Material]) -> tuple[Floats, Bools]:
+    """Two rows (a, b, c, 0) for each slot of each material, `u' = a·u + b·v + c`; and which materials need them."""
+    rows = np.zeros((len(materials), len(SLOTS), 2, 4), np.float32)
+    rows[:, :, 0, 0] = rows[:, :, 1, 1] = 1.0
+    moved = np.zeros(len(materials), bool)
+    for number, material in enumerate(materials):
+        for slot, texture in material.textures.items():
+            if texture.transform is not None:
+                rows[number, SLOTS.index(slot), :, :3] = np.reshape(texture.transform, (2, 3))
+                moved[number] = True
+    return rows.reshape(len(materials), 2 * len(SLOTS), 4), moved
+
+
+def pack_lights(lights: Sequence[Light]) -> Records:
+    """`Light` records (shaders/include/lights.glsl), in the scene's order."""
+    table = np.zeros(len(lights), LIGHT)
+    for record, light in zip(table, lights, strict=True):
+        directional = light.type == "directional"
+        place = [-value for value in light.direction] if directional else light.position
+        record["position"] = (*place, 0.0 if directional else 1.0)
+        record["color"] = (*(value * light.intensity for value in light.color), 1 / light.range if light.range else 0.0)
+        record["direction"] = (*light.direction, _LIGHT_TYPES[light.type])
+        record["cone"] = (0.0, 1.0, 0.0, 0.0)
+        if light.type == "spot":
+            s = 1 / max(0.001, np.cos(light.inner) - np.cos(light.outer))
+            record["cone"] = (s, -np.cos(light.outer) * s, 0.0, 0.0)
+    return table
+
+
+def pack_view(view: ViewMatrices) -> bytes:
+    """A `View` block (shaders/include/view.glsl), 432 bytes; inverses are computed in float64."""
+    record = np.zeros((), VIEW)
+    inverse_view, inverse_projection = np.linalg.inv(view.view), np.linalg.inv(view.projection)
+    both = view.projection @ view.view
+    for name, matrix in (
+        ("view", view.view), ("projection", view.projection), ("view_projection", both), ("inverse_view", inverse_view),
+        ("inverse_projection", inverse_projection), ("inverse_view_projection", inverse_view @ inverse_projection),
+    ):  # fmt: skip
+        record[name] = matrix.T  # columns behind each other
+    if view.projection[3, 2] != 0:
+        record["eye"] = (*inverse_view[:3, 3], 1.0)
+    else:
+        back = inverse_view[:3, 2]
+        record["eye"] = (*(back / np.linalg.norm(back)), 0.0)
+    width, height = view.size
+    record["viewport"] = (width, height, 1 / width, 1 / height)
+    record["range"] = (view.near, view.far, 0.0, 0.0)
+    return record.tobytes()
