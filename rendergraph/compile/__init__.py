@@ -1,0 +1,10 @@
+"""Plan to programs, framebuffers and a flat list of calls: everything a frame does, looked up and allocated before."""
+
+from __future__ import annotations
+
+from rendergraph.compile.executable import CompiledStep, Executable
+from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.steps import compile_plan
+
+__all__ = ["CompiledStep", "Executable", "GpuScene", "ProgramCache", "compile_plan"]

@@ -1,0 +1,160 @@
+"""What compiling yields: draws with their uniforms and state, assembled into a flat list of calls.
+
+Uniforms that all users of a program agree on are written once when the pipeline becomes active; only what differs is
+written by each draw. A changed parameter assembles the lists anew: no GL object is made, no shader compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.gl.programs import Program
+from rendergraph.gl.state import Pieces, changes
+from rendergraph.steps import Step
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from rendergraph.allocate import ResourcePlan
+    from rendergraph.compile.memory import Memory
+    from rendergraph.compile.views import ViewBuffers
+    from rendergraph.gl.device import Device
+
+Call = Callable[[], object]
+
+
+@dataclass(eq=False)
+class Draw:
+    """One draw call or dispatch with what must be set before it.
+
+    Attributes:
+        program: what runs.
+        uniforms: name to value, all that the program may look at.
+        state: calls that set the fixed function, None for compute.
+        call: the draw itself.
+        binds: texture binds of its own, empty unless the driver's units ran out.
+    """
+
+    program: Program
+    uniforms: dict[str, Any]
+    state: Pieces | None
+    call: Call
+    binds: list[Call] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class CompiledStep:
+    """A step of one parity.
+
+    Attributes:
+        step: what it came from.
+        before: framebuffer, clears.
+        draws: in order.
+        after: barriers, poison.
+        refresh: calls that must run once a frame before the step where the order of its objects depends on the eye.
+        calls: all of it, flat; filled by `Executable.assemble`.
+    """
+
+    step: Step
+    before: list[Call] = field(default_factory=list)
+    draws: list[Draw] = field(default_factory=list)
+    after: list[Call] = field(default_factory=list)
+    calls: tuple[Call, ...] = ()
+
+
+@dataclass(eq=False)
+class Executable:
+    """A compiled pipeline of one size.
+
+    Attributes:
+        plan: what it was compiled from.
+        memory: its textures.
+        views: its view tables on the GPU.
+        binds: the calls that bind textures, samplers and blocks, a list a parity.
+        steps: compiled steps, a list a parity.
+        statics: uniform writes that hold for the whole frame.
+        sorters: called with the view tables when a view has changed: objects front to back.
+        queries: one time query a step.
+    """
+
+    device: Device
+    plan: ResourcePlan
+    memory: Memory
+    views: ViewBuffers
+    binds: list[list[Call]]
+    steps: list[list[CompiledStep]]
+    statics: list[Call] = field(default_factory=list)
+    sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
+    queries: list[moderngl.Query] = field(default_factory=list)
+    fresh: bool = True
+
+    def assemble(self) -> None:
+        """Fill every step's flat list from its draws, leaving out what changes nothing."""
+        shared = _differing(draw for steps in self.steps[:1] for step in steps for draw in step.draws)
+        self.statics = []
+        written: set[tuple[int, str]] = set()
+        for steps in self.steps:
+            state: Pieces | None = None
+            for compiled in steps:
+                calls: list[Call] = list(compiled.before)
+                for draw in compiled.draws:
+                    calls += draw.binds
+                    if draw.state is not None:
+                        calls += changes(state, draw.state)
+                        state = draw.state
+                    for name, value in draw.uniforms.items():
+                        key = (draw.program.glo, name)
+                        if key not in shared and key in written:
+                            continue
+                        write = draw.program.writer(name, value)
+                        if write is None:
+                            continue
+                        written.add(key)
+                        if key in shared:
+                            calls.append(write)
+                        else:
+                            self.statics.append(write)
+                    calls.append(draw.call)
+                compiled.calls = (*calls, *compiled.after)
+        self.fresh = True
+
+    def set_uniforms(self, steps: Iterable[Step]) -> None:
+        """Take over changed parameter values; the steps must be the same but for their uniforms."""
+        values: Mapping[tuple[str, int], Step] = {step.key: step for step in steps}
+        for compiled in (c for steps_of in self.steps for c in steps_of):
+            step = values[compiled.step.key]
+            compiled.step = step
+            for draw in compiled.draws:
+                draw.uniforms.update(step_uniforms(step))
+        self.assemble()
+
+    def release(self) -> None:
+        """Free what it owns; programs and scenes are the session's."""
+        self.memory.release()
+        self.views.release()
+
+
+def step_uniforms(step: Step) -> dict[str, Any]:
+    """A step's uniforms and, under their prefixed names, those of the functions it calls."""
+    from rendergraph.glsl import prefix
+
+    values: dict[str, Any] = dict(step.uniforms)
+    for function in step.functions:
+        values |= {prefix(function.node) + name: value for name, value in function.uniforms}
+    if step.view_index is not None:
+        values["view_index"] = step.view_index
+    return values
+
+
+def _differing(draws: Iterable[Draw]) -> set[tuple[int, str]]:
+    """Uniforms that two draws of one program want to be different."""
+    first: dict[tuple[int, str], Any] = {}
+    differ: set[tuple[int, str]] = set()
+    for draw in draws:
+        for name, value in draw.uniforms.items():
+            key = (draw.program.glo, name)
+            if first.setdefault(key, value) != value:
+                differ.add(key)
+    return differ

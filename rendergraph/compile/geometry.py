@@ -1,0 +1,213 @@
+"""Geometry steps to batches: one indirect multi-draw a batch, whether it draws ten objects or ten thousand.
+
+A batch is what can be drawn without changing anything: same macros, textures, culling and winding. How finely objects
+must be told apart depends on what the step's shader looks at: a depth pass puts everything opaque into one batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.compile.executable import Call, Draw
+from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.views import ViewBuffers
+from rendergraph.errors import Problem, RenderError
+from rendergraph.expand import CAMERA
+from rendergraph.scene.model import Material, Mesh, Object, Texture
+from rendergraph.steps import Step
+
+COMMAND = np.dtype(
+    [("count", np.uint32), ("instances", np.uint32), ("first_index", np.uint32), ("base_vertex", np.int32),
+     ("base_instance", np.uint32)]
+)  # fmt: skip
+"""DrawElementsIndirectCommand."""
+
+
+@dataclass(frozen=True)
+class BatchKey:
+    """What makes two objects drawable together."""
+
+    defines: tuple[tuple[str, str], ...]
+    textures: tuple[tuple[str, Texture], ...]
+    cull: str
+    clockwise: bool
+
+
+@dataclass(eq=False)
+class Batch:
+    """Objects drawn by one indirect multi-draw.
+
+    Attributes:
+        defines: macros for the program.
+        textures: sampler name to GL texture and sampler.
+        cull: `back`, `front` or `none`.
+        clockwise: whether front faces are clockwise.
+        objects: object indices in the order they are drawn.
+        commands: the buffer of draw commands.
+    """
+
+    defines: Mapping[str, str]
+    textures: Mapping[str, tuple[int, int]]
+    cull: str
+    clockwise: bool
+    objects: npt.NDArray[np.int64]
+    commands: moderngl.Buffer
+
+    def call(self, vertex_array: Any) -> Call:
+        """The draw."""
+        return partial(vertex_array.render_indirect, self.commands, moderngl.TRIANGLES, len(self.objects))
+
+
+@dataclass(eq=False)
+class GeometryCompiler:
+    """Batches of a scene's objects, and what keeps them front to back."""
+
+    scene: GpuScene
+    sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
+    _batches: dict[tuple[Any, ...], list[Batch]] = field(default_factory=dict)
+    buffers: list[moderngl.Buffer] = field(default_factory=list)
+
+    def draws(self, step: Step, make: Callable[[Batch], Draw]) -> list[Draw]:
+        """The draws of a step."""
+        objects = select(self.scene.scene.objects, self.scene.scene.materials, step)
+        if step.order == "front_to_back":
+            return [make(batch) for batch in self._grouped(step, objects)]
+        return self._in_order(step, objects, make)
+
+    def _grouped(self, step: Step, objects: list[int]) -> list[Batch]:
+        view = (step.view or CAMERA, step.view_index or 0)
+        key = (view, tuple(objects), step.materials, step.state.cull)
+        if key not in self._batches:
+            groups: dict[BatchKey, list[int]] = {}
+            for index in objects:
+                groups.setdefault(self._key(step, index), []).append(index)
+            self._batches[key] = [self._batch(batch, members) for batch, members in groups.items()]
+            for batch in self._batches[key]:
+                if len(batch.objects) > 1:
+                    self.sorters.append(partial(self._sort, batch, *view))
+        return self._batches[key]
+
+    def _in_order(self, step: Step, objects: list[int], make: Callable[[Batch], Draw]) -> list[Draw]:
+        """A draw for each run of neighbours that can be drawn together, in the order the step asks for.
+
+        The order of `back_to_front` is the eye's of the moment, so each object is a batch whose place may change: the
+        runs are found anew when the view changes, over draws compiled once.
+        """
+        keys = {index: self._key(step, index) for index in objects}
+        if step.order == "scene":
+            runs: list[tuple[BatchKey, list[int]]] = []
+            for index in objects:
+                if runs and runs[-1][0] == keys[index]:
+                    runs[-1][1].append(index)
+                else:
+                    runs.append((keys[index], [index]))
+            return [make(self._batch(key, members)) for key, members in runs]
+        return []
+
+    def _batch(self, key: BatchKey, members: list[int]) -> Batch:
+        self.scene.load_images([texture for _, texture in key.textures])
+        objects = np.array(members, np.int64)
+        commands = self.scene.device.ctx.buffer(self._commands(objects).tobytes())
+        self.buffers.append(commands)
+        found = {name: self.scene.texture(texture) for name, texture in key.textures}
+        return Batch(dict(key.defines), found, key.cull, key.clockwise, objects, commands)
+
+    def _commands(self, objects: npt.NDArray[np.int64]) -> npt.NDArray[np.void]:
+        packed = self.scene.packed
+        meshes = packed.meshes[packed.object_mesh[objects]]
+        commands = np.zeros(len(objects), COMMAND)
+        commands["count"] = meshes["count"]
+        commands["instances"] = 1
+        commands["first_index"] = meshes["first_index"]
+        commands["base_vertex"] = meshes["base_vertex"]
+        commands["base_instance"] = objects
+        return commands
+
+    def _sort(self, batch: Batch, table: str, index: int, views: ViewBuffers) -> None:
+        view = views.current[table][index]
+        centers = self.scene.packed.centers[batch.objects]
+        depth = -(centers @ view.view[2, :3] + view.view[2, 3])
+        batch.objects = batch.objects[np.argsort(depth, kind="stable")]
+        batch.commands.write(self._commands(batch.objects).tobytes())
+
+    def _key(self, step: Step, index: int) -> BatchKey:
+        scene = self.scene.scene
+        placed = scene.objects[index]
+        material = scene.materials[placed.material]
+        defines, found = features(material, scene.meshes[placed.mesh], step.materials)
+        mirrored = bool(self.scene.packed.mirrored[index])
+        cull = step.state.cull
+        if cull == "material":
+            cull = "none" if material.double_sided else "back"
+        return BatchKey(tuple(defines.items()), tuple(found.items()), cull, mirrored)
+
+
+def select(objects: Iterable[Object], materials: tuple[Material, ...], step: Step) -> list[int]:
+    """The objects a step draws, in the scene's order.
+
+    Raises:
+        RenderError: a name that no object has.
+    """
+    placed = list(objects)
+    if isinstance(step.objects, tuple):
+        names = {p.name: number for number, p in enumerate(placed)}
+        missing = [name for name in step.objects if name not in names]
+        if missing:
+            text = f"node '{step.node}' draws object '{missing[0]}', which the scene does not have"
+            raise RenderError(Problem("RG431", text))
+        return [names[name] for name in step.objects]
+    tests: dict[str, Callable[[Object], bool]] = {
+        "all": lambda p: True,
+        "opaque": lambda p: materials[p.material].alpha_mode != "blend",
+        "transparent": lambda p: materials[p.material].alpha_mode == "blend",
+        "casters": lambda p: p.casts_shadow and materials[p.material].alpha_mode != "blend",
+    }
+    test = tests[step.objects]
+    return [number for number, p in enumerate(placed) if not p.hidden and test(p)]
+
+
+def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
+    """Macros and textures a material needs of a shader that looks at `level` of it.
+
+    Only what makes a difference is named, so that objects which differ in nothing else share a batch.
+    """
+    defines: dict[str, str] = {}
+    if level == "none":
+        return defines, {}
+    masked = material.alpha_mode == "mask"
+    slots = material.textures if level == "full" else {
+        slot: texture for slot, texture in material.textures.items() if masked and slot == "base_color"
+    }  # fmt: skip
+    found: dict[str, Texture] = {}
+    for slot, texture in slots.items():
+        if (mesh.uv1 if texture.uv else mesh.uv0) is None:
+            continue
+        defines[f"HAS_{slot.upper()}_TEXTURE"] = "1"
+        defines[f"{slot.upper()}_UV"] = str(texture.uv)
+        defines[f"HAS_UV{texture.uv}"] = "1"
+        if texture.transform is not None:
+            defines["HAS_UV_TRANSFORM"] = "1"
+        found[f"{slot}_texture"] = texture
+    if masked:
+        defines["ALPHA_MASK"] = "1"
+    if mesh.colors is not None and (masked or level == "full"):
+        defines["HAS_VERTEX_COLOR"] = "1"
+    if level == "full":
+        if material.alpha_mode == "blend":
+            defines["ALPHA_BLEND"] = "1"
+        if material.double_sided:
+            defines["DOUBLE_SIDED"] = "1"
+        if material.unlit:
+            defines["UNLIT"] = "1"
+        if material.anisotropy_strength > 0:
+            defines["ANISOTROPIC"] = "1"
+        if mesh.tangents is not None and ("normal" in slots or material.anisotropy_strength > 0):
+            defines["HAS_TANGENT"] = "1"
+    return defines, found

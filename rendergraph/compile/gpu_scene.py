@@ -1,0 +1,175 @@
+"""A scene on the GPU: packed once into buffers, its images decoded and uploaded once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.views import FIXED_BLOCKS
+from rendergraph.gl import textures
+from rendergraph.gl.device import Device
+from rendergraph.gl.programs import Program
+from rendergraph.gl.textures import GpuTexture
+from rendergraph.scene import pack
+from rendergraph.scene.model import ImageSource, Scene, Texture
+from rendergraph.scene.pack import PackedScene
+from rendergraph.textures import TextureDesc, full_mip_count
+
+Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
+"""Image to (height, width, 4) uint8 or float32, top row first; the flag says that colours are sRGB."""
+
+_MIN = {"nearest": 0x2600, "linear": 0x2601, "nearest_mipmap_nearest": 0x2700, "linear_mipmap_nearest": 0x2701,
+        "nearest_mipmap_linear": 0x2702, "linear_mipmap_linear": 0x2703}  # fmt: skip
+_MAG = {"nearest": 0x2600, "linear": 0x2601}
+_WRAP = {"repeat": 0x2901, "mirror": 0x8370, "clamp": 0x812F}
+_INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "4f"), ("in_ids", "2i"))
+_PADDING = {"4f": "16x", "2i": "8x"}
+
+
+@dataclass(eq=False)
+class GpuScene:
+    """Buffers, material textures and the macros a scene gives to shaders.
+
+    Attributes:
+        packed: the arrays the buffers were made from.
+        scene: the scene they were packed from.
+    """
+
+    device: Device
+    scene: Scene
+    packed: PackedScene
+    decode: Decode
+    _streams: dict[str, tuple[moderngl.Buffer, str]] = field(default_factory=dict)
+    _images: dict[tuple[ImageSource, bool], GpuTexture] = field(default_factory=dict)
+    _samplers: dict[tuple[int, ...], int] = field(default_factory=dict)
+    _blocks: dict[str, tuple[moderngl.Buffer, bool]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        ctx, packed = self.device.ctx, self.packed
+        for name, array, layout in (
+            ("in_position", packed.positions, "3f"), ("in_normal", packed.normals, "3f"),
+            ("in_tangent", packed.tangents, "4f"), ("in_uv0", packed.uv0, "2f"), ("in_uv1", packed.uv1, "2f"),
+            ("in_color", packed.colors, "4f"),
+        ):  # fmt: skip
+            if array is not None and array.size:
+                self._streams[name] = (ctx.buffer(array.tobytes()), layout)
+        self._indices = ctx.buffer(packed.indices.tobytes() or bytes(4))
+        self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
+        for block, array in (
+            ("light_block", packed.lights),
+            ("material_block", packed.materials),
+            ("material_uv_block", packed.material_uvs if packed.material_moved.any() else None),
+        ):
+            if array is not None and array.size:
+                storage = array.nbytes > self.device.limits["uniform_block"]
+                self._blocks[block] = (ctx.buffer(array.tobytes()), storage)
+
+    @property
+    def light_defines(self) -> dict[str, str]:
+        """Macros about the lights, for every shader."""
+        kinds = [light.type for light in self.scene.lights]
+        macros = {
+            "LIGHT_COUNT": str(len(kinds)),
+            "LIGHT_DIRECTIONALS": str(kinds.count("directional")),
+            "LIGHT_POINTS": str(kinds.count("point")),
+            "LIGHT_SPOTS": str(kinds.count("spot")),
+        }
+        if self._blocks.get("light_block", (None, False))[1]:
+            macros["LIGHT_STORAGE"] = "1"
+        return macros
+
+    @property
+    def defines(self) -> dict[str, str]:
+        """Macros about the materials, for geometry steps."""
+        macros = {"MATERIAL_COUNT": str(max(1, len(self.scene.materials)))}
+        if self._blocks.get("material_block", (None, False))[1]:
+            macros["MATERIAL_STORAGE"] = "1"
+        if self._blocks.get("material_uv_block", (None, False))[1]:
+            macros["MATERIAL_UV_STORAGE"] = "1"
+        return macros
+
+    def bind(self) -> None:
+        """Bind lights and materials to their points; once a frame."""
+        for name, (buffer, storage) in self._blocks.items():
+            if storage:
+                buffer.bind_to_storage_buffer(FIXED_BLOCKS[name])
+            else:
+                buffer.bind_to_uniform_block(FIXED_BLOCKS[name])
+
+    def update(self, scene: Scene) -> None:
+        """Take over an animated scene's lights and transforms; the meshes stay."""
+        packed = pack.update(self.packed, scene)
+        for block, array, before in (
+            ("light_block", packed.lights, self.packed.lights),
+            ("material_block", packed.materials, self.packed.materials),
+        ):
+            if block in self._blocks and array.tobytes() != before.tobytes():
+                self._blocks[block][0].write(array.tobytes())
+        if packed.instances.tobytes() != self.packed.instances.tobytes():
+            self._instances.write(packed.instances.tobytes())
+        self.scene, self.packed = scene, packed
+
+    def vertex_array(self, programs: ProgramCache, program: Program) -> Any:
+        """The streams a program looks at, the object's transform once an instance, and the index buffer."""
+        names = set(program.object)
+        content: list[tuple[Any, ...]] = [
+            (buffer, layout, name) for name, (buffer, layout) in self._streams.items() if name in names
+        ]
+        used = [name for name, _ in _INSTANCE_FORMAT if name in names]
+        if used:
+            layout = " ".join(f if name in names else _PADDING[f] for name, f in _INSTANCE_FORMAT)
+            content.append((self._instances, f"{layout}/i", *used))
+        return programs.vertex_array(program, (id(self), "scene"), content, self._indices)
+
+    # Images ---------------------------------------------------------------------------------------------------------
+
+    def texture(self, texture: Texture) -> tuple[int, int]:
+        """GL names of a material texture and its sampler."""
+        image = self._images[texture.image, texture.srgb].glo
+        key = (_MIN.get(texture.min_filter, 0x2703), _MAG[texture.mag_filter], _WRAP[texture.wrap_s], _WRAP[texture.wrap_t])
+        if key not in self._samplers:
+            self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=1)
+        return image, self._samplers[key]
+
+    def load_images(self, wanted: list[Texture]) -> None:
+        """Decode and upload what is missing; decoding runs on all cores."""
+        missing = list(dict.fromkeys((t.image, t.srgb) for t in wanted if (t.image, t.srgb) not in self._images))
+        if not missing:
+            return
+        with ThreadPoolExecutor() as pool:
+            for key, pixels in zip(missing, pool.map(lambda k: self.decode(*k), missing), strict=True):
+                self._images[key] = self._upload(pixels, srgb=key[1])
+
+    def _upload(self, pixels: npt.NDArray[Any], *, srgb: bool) -> GpuTexture:
+        height, width = pixels.shape[:2]
+        if pixels.dtype == np.uint8:
+            format_name = "srgb8_a8" if srgb else "rgba8"
+        else:
+            format_name = "rgba32f" if pixels.dtype == np.float32 else "rgba16f"
+        desc = TextureDesc("texture2d", format_name, width, height, mips=full_mip_count(width, height))
+        made = textures.create(self.device, desc, "a material texture")
+        if format_name == "srgb8_a8":
+            textures.upload_bytes(self.device, made, pixels)
+        else:
+            textures.upload(self.device, made, pixels)
+        self.device.raw.glGenerateTextureMipmap(made.glo)
+        return made
+
+    def release(self, programs: ProgramCache) -> None:
+        """Free everything."""
+        programs.forget(id(self))
+        for buffer, _ in (*self._streams.values(), *self._blocks.values()):
+            buffer.release()
+        self._indices.release()
+        self._instances.release()
+        for image in self._images.values():
+            textures.delete(self.device, image)
+        for sampler in self._samplers.values():
+            self.device.raw.delete("glDeleteSamplers", sampler)

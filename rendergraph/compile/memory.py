@@ -1,0 +1,217 @@
+"""The plan's physical textures as GL objects, and the views, framebuffers and samplers that look at them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import moderngl
+import numpy as np
+
+from rendergraph.allocate import ResourcePlan
+from rendergraph.gl import textures
+from rendergraph.gl.device import Device
+from rendergraph.gl.textures import GpuTexture
+from rendergraph.steps import Read, Write
+from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
+
+_TEXTURE_LABEL = 0x1702
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A texture level and layer a framebuffer draws to; `layer` None attaches all layers."""
+
+    texture: GpuTexture
+    mip: int = 0
+    layer: int | None = None
+
+
+@dataclass(eq=False)
+class Memory:
+    """Everything a pipeline allocates for one size.
+
+    `parity` is the frame number's: history textures swap their two copies with it.
+    """
+
+    device: Device
+    plan: ResourcePlan
+    physicals: list[GpuTexture | moderngl.Buffer] = field(default_factory=list)
+    _views: dict[tuple[object, ...], GpuTexture] = field(default_factory=dict)
+    _samplers: dict[Sampler, int] = field(default_factory=dict)
+    _framebuffers: dict[tuple[object, ...], moderngl.Framebuffer] = field(default_factory=dict)
+    _dummies: dict[tuple[int, bool], moderngl.Renderbuffer] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        try:
+            for physical in self.plan.physicals:
+                if isinstance(physical.desc, BufferDesc):
+                    self.physicals.append(self.device.ctx.buffer(reserve=max(16, physical.desc.bytes)))
+                else:
+                    label = ", ".join(physical.members)
+                    made = textures.create(self.device, physical.desc, label)
+                    self.physicals.append(made)
+                    if self.device.ctx.supports_labels:
+                        self.device.ctx.mglo.set_label(_TEXTURE_LABEL, made.glo, label[:200])
+        except BaseException:
+            self.release()
+            raise
+
+    @property
+    def parities(self) -> int:
+        """2 where any texture has a history, else 1."""
+        return 2 if any(len(places) == 2 for places in self.plan.placement.values()) else 1
+
+    # Looking up ------------------------------------------------------------------------------------------------------
+
+    def texture(self, resource: str, parity: int = 0, *, previous: bool = False) -> GpuTexture:
+        """A resource's texture in its own format."""
+        places = self.plan.placement[resource]
+        place = places[(parity + previous) % 2] if len(places) == 2 else places[0]
+        base = self.physicals[place]
+        assert isinstance(base, GpuTexture), f"{resource} is a buffer"
+        desc = self.plan.resources[resource].desc
+        assert isinstance(desc, TextureDesc)
+        if desc.format == base.desc.format:
+            return base
+        return self._view(base, desc.format, None, None)
+
+    def part(self, resource: str, parity: int, read: Read) -> GpuTexture:
+        """What a reader samples: the texture, or a view of one mip or layer."""
+        texture = self.texture(resource, parity, previous=read.previous)
+        if read.mip is None and read.layer is None:
+            return texture
+        return self._view(texture, texture.desc.format, read.mip, read.layer)
+
+    def buffer(self, resource: str) -> moderngl.Buffer:
+        """A resource's buffer."""
+        found = self.physicals[self.plan.placement[resource][0]]
+        assert isinstance(found, moderngl.Buffer), f"{resource} is a texture"
+        return found
+
+    def sampler(self, sampler: Sampler) -> int:
+        """The GL sampler object."""
+        if sampler not in self._samplers:
+            self._samplers[sampler] = textures.create_sampler(self.device, sampler)
+        return self._samplers[sampler]
+
+    def _view(self, texture: GpuTexture, format: str, mip: int | None, layer: int | None) -> GpuTexture:
+        key = (texture.glo, format, mip, layer)
+        if key not in self._views:
+            self._views[key] = textures.view(self.device, texture, format=format, mip=mip, layer=layer)
+        return self._views[key]
+
+    # Framebuffers ----------------------------------------------------------------------------------------------------
+
+    def framebuffer(
+        self,
+        colors: Sequence[Attachment],
+        depth: Attachment | None,
+        size: tuple[int, int],
+        *,
+        color_mask: tuple[bool, bool, bool, bool] = (True, True, True, True),
+        depth_mask: bool = True,
+        scissor: tuple[int, int, int, int] | None = None,
+    ) -> moderngl.Framebuffer:
+        """A framebuffer whose `use()` also sets viewport, masks and scissor.
+
+        moderngl cannot attach wrapped depth textures, mips or layers, so it is made over 1×1 renderbuffers, which raw
+        calls then replace by the real attachments.
+        """
+        key = (tuple(_key(c) for c in colors), _key(depth), size, color_mask, depth_mask, scissor)
+        if key in self._framebuffers:
+            return self._framebuffers[key]
+        stencil = depth is not None and FORMATS[depth.texture.desc.format].family == "depth_stencil"
+        made = self.device.ctx.framebuffer(
+            [self._dummy(number, depth=False) for number in range(len(colors))],
+            self._dummy(0, depth=True) if depth is not None else None,
+        )
+        raw = self.device.raw
+        for number, color in enumerate(colors):
+            self._attach(made.glo, 0x8CE0 + number, color)
+        if depth is not None:
+            if stencil:
+                raw.glNamedFramebufferTexture(made.glo, 0x8D00, 0, 0)
+            self._attach(made.glo, 0x821A if stencil else 0x8D00, depth)
+        status = raw.glCheckNamedFramebufferStatus(made.glo, 0x8D40)
+        assert status == 0x8CD5, f"framebuffer incomplete: {status:#x} for {colors} {depth}"
+        made.viewport = (0, 0, *size)
+        if colors:
+            made.color_mask = color_mask if len(colors) == 1 else (color_mask,) * len(colors)
+        made.depth_mask = depth_mask
+        made.scissor = scissor
+        self._framebuffers[key] = made
+        return made
+
+    def attachment(self, write: Write | Read, parity: int) -> Attachment:
+        """Where a step draws to."""
+        previous = isinstance(write, Read) and write.previous
+        return Attachment(self.texture(write.resource, parity, previous=previous), write.mip or 0, write.layer)
+
+    def _attach(self, framebuffer: int, point: int, attachment: Attachment) -> None:
+        texture, raw = attachment.texture, self.device.raw
+        if attachment.layer is None:
+            raw.glNamedFramebufferTexture(framebuffer, point, texture.glo, attachment.mip)
+        else:
+            raw.glNamedFramebufferTextureLayer(framebuffer, point, texture.glo, attachment.mip, attachment.layer)
+
+    def _dummy(self, number: int, *, depth: bool) -> moderngl.Renderbuffer:
+        key = (number, depth)
+        if key not in self._dummies:
+            ctx = self.device.ctx
+            self._dummies[key] = ctx.depth_renderbuffer((1, 1)) if depth else ctx.renderbuffer((1, 1))
+        return self._dummies[key]
+
+    # The end ---------------------------------------------------------------------------------------------------------
+
+    def release(self) -> None:
+        """Free everything."""
+        for framebuffer in self._framebuffers.values():
+            framebuffer.release()
+        for renderbuffer in self._dummies.values():
+            renderbuffer.release()
+        for view in self._views.values():
+            textures.delete(self.device, view)
+        for sampler in self._samplers.values():
+            self.device.raw.delete("glDeleteSamplers", sampler)
+        for physical in self.physicals:
+            if isinstance(physical, GpuTexture):
+                textures.delete(self.device, physical)
+            else:
+                physical.release()
+        for table in (self._framebuffers, self._dummies, self._views, self._samplers):
+            table.clear()
+        self.physicals.clear()
+
+
+def _key(attachment: Attachment | None) -> tuple[object, ...] | None:
+    return None if attachment is None else (attachment.texture.glo, attachment.mip, attachment.layer)
+
+
+class ClearTarget:
+    """Clears one attachment of a bound framebuffer, prepared once; only colour 0… or depth with stencil 0."""
+
+    def __init__(
+        self, device: Device, framebuffer: moderngl.Framebuffer, index: int | None, format: str,
+        value: float | tuple[float, ...],
+    ) -> None:  # fmt: skip
+        raw, glo, family = device.raw, framebuffer.glo, FORMATS[format].family
+        values = np.zeros(4)
+        given = np.atleast_1d(np.asarray(value, np.float64))
+        values[: len(given)] = given
+        values[len(given) :] = given[-1] if len(given) == 1 else 0
+        dtype = {"uint": np.uint32, "int": np.int32}.get(family, np.float32)
+        self._data = values.astype(dtype)  # kept alive: the call holds its address
+        address = self._data.ctypes.data
+        if family == "depth":
+            self._call, self._args = raw.glClearNamedFramebufferfv, (glo, 0x1801, 0, address)
+        elif family == "depth_stencil":
+            self._call, self._args = raw.glClearNamedFramebufferfi, (glo, 0x84F9, 0, float(given[0]), 0)
+        else:
+            name = {"uint": "glClearNamedFramebufferuiv", "int": "glClearNamedFramebufferiv"}.get(
+                family, "glClearNamedFramebufferfv"
+            )
+            self._call, self._args = getattr(raw, name), (glo, 0x1800, index or 0, address)
+
+    def __call__(self) -> None:
+        self._call(*self._args)

@@ -1,0 +1,79 @@
+"""Programs by source: compiled once a session, errors at the author's line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rendergraph.catalog import NodeType
+from rendergraph.errors import InputError
+from rendergraph.expand import ViewTable
+from rendergraph.gl import programs
+from rendergraph.gl.device import Device
+from rendergraph.gl.programs import Program
+from rendergraph.glsl import compile_problems, link_problems, stage_texts
+from rendergraph.steps import Resource, Step
+
+
+@dataclass(eq=False)
+class ProgramCache:
+    """Programs by their text, their outputs and the binding points of their blocks."""
+
+    device: Device
+    compiled: int = 0
+    _programs: dict[tuple[object, ...], Program] = field(default_factory=dict)
+    _vertex_arrays: dict[tuple[object, ...], Any] = field(default_factory=dict)
+
+    def get(
+        self,
+        step: Step,
+        types: Mapping[str, NodeType],
+        resources: Mapping[str, Resource],
+        views: Mapping[str, ViewTable],
+        defines: Mapping[str, str],
+        blocks: Mapping[str, int],
+        outputs: Sequence[str],
+    ) -> Program:
+        """The program of a step with these macros.
+
+        Raises:
+            InputError: the driver refused a shader, or a shader samples what its step does not read.
+        """
+        texts = stage_texts(step, types, resources, views, defines=defines)
+        sources = {stage: text.text for stage, text in texts.items()}
+        key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
+        if key in self._programs:
+            return self._programs[key]
+        try:
+            program = programs.link(self.device, sources, outputs)
+        except programs.ProgramError as error:
+            stage, message = programs.driver_message(error)
+            found = compile_problems(message, texts[stage]) if stage in texts else link_problems(message, texts)
+            raise InputError(found) from error
+        for name, binding in blocks.items():
+            program.bind_block(name, binding)
+        self._programs[key] = program
+        self.compiled += 1
+        return program
+
+    def vertex_array(self, program: Program, key: tuple[object, ...], content: Any, index: Any = None) -> Any:
+        """The vertex array of a program over buffers, made once; `content` is moderngl's."""
+        full = (program.glo, *key)
+        if full not in self._vertex_arrays:
+            self._vertex_arrays[full] = self.device.ctx.vertex_array(program.object, content, index)
+        return self._vertex_arrays[full]
+
+    def forget(self, marker: object) -> None:
+        """Free the vertex arrays over buffers that go away; `marker` is the first part of their keys."""
+        for key in [key for key in self._vertex_arrays if len(key) > 1 and key[1] == marker]:
+            self._vertex_arrays.pop(key).release()
+
+    def release(self) -> None:
+        """Free everything."""
+        for vertex_array in self._vertex_arrays.values():
+            vertex_array.release()
+        for program in self._programs.values():
+            program.release()
+        self._vertex_arrays.clear()
+        self._programs.clear()

@@ -1,0 +1,306 @@
+"""Each step of a plan to its draws: program, units, blocks, framebuffer, state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import moderngl
+
+from rendergraph.allocate import ResourcePlan
+from rendergraph.catalog import NodeType
+from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, step_uniforms
+from rendergraph.compile.geometry import Batch, GeometryCompiler
+from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.memory import ClearTarget, Memory
+from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.units import Units
+from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
+from rendergraph.errors import Problem, RenderError
+from rendergraph.expand import CAMERA, ViewTable
+from rendergraph.gl import state as gl_state
+from rendergraph.gl.device import Device
+from rendergraph.gl.programs import Program
+from rendergraph.gl.textures import Clear, poison_value
+from rendergraph.glsl import prefix
+from rendergraph.steps import Read, Step, Write
+from rendergraph.textures import FORMATS, TextureDesc
+
+_TOPOLOGY = {
+    "points": moderngl.POINTS, "lines": moderngl.LINES, "line_strip": moderngl.LINE_STRIP,
+    "triangles": moderngl.TRIANGLES, "triangle_strip": moderngl.TRIANGLE_STRIP,
+    "triangles_adjacency": moderngl.TRIANGLES_ADJACENCY,
+}  # fmt: skip
+_ALL_BARRIERS = 0xFFFFFFFF
+
+
+def compile_plan(
+    device: Device,
+    plan: ResourcePlan,
+    types: Mapping[str, NodeType],
+    views: Mapping[str, ViewTable],
+    scene: GpuScene,
+    programs: ProgramCache,
+    *,
+    poison: bool = False,
+) -> Executable:
+    """Everything a plan needs on the GPU.
+
+    Args:
+        device: where.
+        plan: order and memory.
+        types: node id to type, for shaders.
+        views: view tables by id.
+        scene: the scene on the GPU.
+        programs: the session's programs.
+        poison: overwrite released textures with a value that no picture should show.
+
+    Raises:
+        RenderError: no memory.
+        InputError: a shader does not compile.
+    """
+    memory = Memory(device, plan)
+    buffers = ViewBuffers(device, views)
+    try:
+        compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
+        return compiler.executable()
+    except BaseException:
+        memory.release()
+        buffers.release()
+        raise
+
+
+@dataclass(eq=False)
+class _Compiler:
+    device: Device
+    plan: ResourcePlan
+    types: Mapping[str, NodeType]
+    view_tables: Mapping[str, ViewTable]
+    scene: GpuScene
+    programs: ProgramCache
+    memory: Memory
+    views: ViewBuffers
+    poison: bool
+
+    def __post_init__(self) -> None:
+        self.units = Units(self.device, self.memory.parities)
+        self.geometry = GeometryCompiler(self.scene)
+        self._cleared: dict[tuple[str, int], Any] = {}
+
+    def executable(self) -> Executable:
+        steps = [
+            [self._step(step, position, parity) for position, step in enumerate(self.plan.schedule.steps)]
+            for parity in range(self.memory.parities)
+        ]
+        binds: list[list[Call]] = [
+            [*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()
+        ]
+        made = Executable(self.device, self.plan, self.memory, self.views, binds, steps)
+        made.sorters = list(self.geometry.sorters)
+        made.queries = [self.device.ctx.query(time=True) for _ in self.plan.schedule.steps]
+        made.assemble()
+        return made
+
+    # One step -------------------------------------------------------------------------------------------------------
+
+    def _step(self, step: Step, position: int, parity: int) -> CompiledStep:
+        compiled = CompiledStep(step)
+        {
+            "fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw, "compute": self._compute,
+            "clear": self._clear, "mipmaps": self._mipmaps,
+        }[step.kind](step, compiled, parity)  # fmt: skip
+        if self.poison:
+            compiled.after += self._poison(position, parity)
+        return compiled
+
+    def _fullscreen(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        program, binds, uniforms = self._program(step, {})
+        self._target(step, compiled, parity)
+        vertex_array = self.programs.vertex_array(program, ("none",), [])
+        call = partial(vertex_array.render, moderngl.TRIANGLES, 3, 0, 1)
+        compiled.draws.append(Draw(program, uniforms, self._state(step, depth_default=False), call, binds))
+
+    def _draw(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        program, binds, uniforms = self._program(step, {"PASS_VIEW_COUNT": str(self._view_count(step))})
+        self._target(step, compiled, parity)
+        content = []
+        for layout, resource in step.attributes:
+            words = layout.split()
+            half = len(words) // 2
+            content.append((self.memory.buffer(resource), " ".join(words[:half]), *words[half:]))
+        key = ("draw", *(c[0].glo for c in content), *(layout for layout, _ in step.attributes))
+        vertex_array = self.programs.vertex_array(program, key, content)
+        mode = _TOPOLOGY[step.topology]
+        if isinstance(step.vertices, str):
+            call: Call = partial(vertex_array.render_indirect, self.memory.buffer(step.vertices), mode, 1)
+        else:
+            call = partial(vertex_array.render, mode, step.vertices, 0, step.instances)
+        compiled.draws.append(Draw(program, uniforms, self._state(step, depth_default=True), call, binds))
+
+    def _geometry(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        self._target(step, compiled, parity)
+        defines = {"PASS_VIEW_COUNT": str(self._view_count(step)), **self.scene.defines}
+
+        def make(batch: Batch) -> Draw:
+            program, binds, uniforms = self._program(step, {**defines, **batch.defines}, geometry=True)
+            for slot, (texture, sampler) in batch.textures.items():
+                uniforms[slot] = self.units.unit((texture,), sampler, binds)
+            vertex_array = self.scene.vertex_array(self.programs, program)
+            state = self._state(step, depth_default=True, cull=batch.cull, clockwise=batch.clockwise)
+            return Draw(program, uniforms, state, batch.call(vertex_array), binds)
+
+        compiled.draws += self.geometry.draws(step, make)
+
+    def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        program, binds, uniforms = self._program(step, {})
+        image = 0
+        for touched in (*(r for r in step.reads if r.use == "image"), *(w for w in step.writes if w.use == "image")):
+            uniform = program.uniforms.get(touched.name)
+            texture = self.memory.texture(
+                touched.resource, parity, previous=isinstance(touched, Read) and touched.previous
+            )
+            layered = touched.layer is None and texture.desc.kind != "texture2d"
+            gl_format = FORMATS[texture.desc.format].gl
+            compiled.before.append(
+                partial(
+                    self.device.raw.glBindImageTexture, image, texture.glo, touched.mip or 0, int(layered),
+                    touched.layer or 0, 0x88BA, gl_format,
+                )
+            )  # fmt: skip
+            if uniform is not None:
+                uniforms[touched.name] = image
+            image += 1
+        for write in step.writes:
+            if write.load == "clear" and write.use == "image":
+                texture = self.memory.texture(write.resource, parity)
+                compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
+            elif write.load == "clear" and write.use == "buffer":
+                compiled.before.append(partial(_clear_buffer, self.memory.buffer(write.resource)))
+        call = partial(program.object.run, *step.groups)
+        compiled.draws.append(Draw(program, uniforms, None, call, binds))
+        compiled.after.append(partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS))
+
+    def _clear(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        for write in step.writes:
+            if write.use == "buffer":
+                compiled.before.append(partial(_clear_buffer, self.memory.buffer(write.resource)))
+                continue
+            texture = self.memory.texture(write.resource, parity)
+            compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
+
+    def _mipmaps(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        for write in step.writes:
+            texture = self.memory.texture(write.resource, parity)
+            compiled.before.append(partial(self.device.raw.glGenerateTextureMipmap, texture.glo))
+
+    # Parts ----------------------------------------------------------------------------------------------------------
+
+    def _view_count(self, step: Step) -> int:
+        return max(1, self.view_tables[step.view or CAMERA].count)
+
+    def _program(
+        self, step: Step, defines: Mapping[str, str], *, geometry: bool = False
+    ) -> tuple[Program, list[Call], dict[str, Any]]:
+        """The program of a step with blocks bound and samplers given units."""
+        outputs = [write.name for write in step.writes if write.use == "color"]
+        blocks = dict(FIXED_BLOCKS)
+        if step.view is not None:
+            blocks["pass_view_block"] = self.views.binding(step.view)
+        named = [("", read) for read in step.reads]
+        named += [(prefix(function.node), read) for function in step.functions for read in function.reads]
+        storage = 0
+        buffers: list[Call] = []
+        for before, read in (*named, *(("", write) for write in step.writes)):
+            resource = self.plan.resources[read.resource]
+            if read.use == "buffer":
+                if before + read.name not in blocks:
+                    blocks[before + read.name] = storage
+                    buffers.append(partial(self.memory.buffer(read.resource).bind_to_storage_buffer, storage))
+                    storage += 1
+            elif resource.view is not None and isinstance(read, Read):
+                blocks[f"{before}{read.name}_view_block"] = self.views.binding(resource.view)
+        program = self.programs.get(
+            step, self.types, self.plan.resources, self.view_tables, {**self.scene.light_defines, **defines}, blocks,
+            outputs,
+        )  # fmt: skip
+        binds: list[Call] = buffers
+        uniforms = step_uniforms(step)
+        sampled: set[str] = set()
+        for before, read in named:
+            if read.use != "sample":
+                continue
+            sampled.add(before + read.name)
+            if before + read.name in program.uniforms:
+                names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
+                uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
+        self._check(step, program, uniforms, sampled, geometry)
+        return program, binds, uniforms
+
+    def _check(
+        self, step: Step, program: Program, uniforms: Mapping[str, Any], sampled: set[str], geometry: bool
+    ) -> None:
+        """A sampler that nothing is bound to would silently read another pass's texture."""
+        images = {touched.name for touched in (*step.reads, *step.writes) if touched.use == "image"}
+        for name, uniform in program.uniforms.items():
+            known = name in sampled or name in images or name in uniforms or (geometry and name.endswith("_texture"))
+            if uniform.opaque and not known:
+                files = ", ".join(file for _, file in step.shaders)
+                text = (f"node '{step.node}': {files} samples '{name}', but the step reads no texture of that name; "
+                        f"it reads {', '.join(sorted(sampled)) or 'none'}")  # fmt: skip
+                raise RenderError(Problem("RG430", text))
+
+    def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        """Bind the framebuffer, clearing first what the step says."""
+        colors = [write for write in step.writes if write.use == "color"]
+        depth_write = next((write for write in step.writes if write.use == "depth"), None)
+        depth: Write | Read | None = depth_write or next((r for r in step.reads if r.use == "depth_test"), None)
+        attachments = [self.memory.attachment(write, parity) for write in colors]
+        at_depth = self.memory.attachment(depth, parity) if depth is not None else None
+        state = step.state
+        depth_mask = depth_write is not None if state.depth_write is None else state.depth_write
+        whole = self.memory.framebuffer(attachments, at_depth, step.size)
+        drawn = self.memory.framebuffer(
+            attachments, at_depth, step.size, color_mask=state.color_mask, depth_mask=depth_mask, scissor=state.scissor
+        )
+        clears: list[Call] = []
+        for number, write in enumerate(colors):
+            if write.load == "clear":
+                desc = self.plan.resources[write.resource].desc
+                assert isinstance(desc, TextureDesc)
+                clears.append(ClearTarget(self.device, whole, number, desc.format, write.clear))
+        if depth_write is not None and depth_write.load == "clear":
+            desc = self.plan.resources[depth_write.resource].desc
+            assert isinstance(desc, TextureDesc)
+            clears.append(ClearTarget(self.device, whole, None, desc.format, depth_write.clear))
+        if clears:
+            compiled.before += [whole.use, *clears]
+        if not clears or drawn is not whole:
+            compiled.before.append(drawn.use)
+
+    def _state(
+        self, step: Step, *, depth_default: bool, cull: str | None = None, clockwise: bool = False
+    ) -> gl_state.Pieces:
+        has_depth = any(write.use == "depth" for write in step.writes) or any(
+            read.use == "depth_test" for read in step.reads
+        )
+        depth_test = has_depth and depth_default if step.state.depth_test is None else step.state.depth_test
+        resolved = cull or ("none" if step.state.cull == "material" else step.state.cull)
+        targets = sum(write.use == "color" for write in step.writes)
+        return gl_state.pieces(
+            self.device.raw, step.state, depth_test=depth_test, cull=resolved, clockwise=clockwise, targets=targets
+        )
+
+    def _poison(self, position: int, parity: int) -> list[Call]:
+        calls: list[Call] = []
+        for name in self.plan.released.get(position, ()):
+            resource = self.plan.resources[name]
+            if resource.role in ("transient", "internal") and isinstance(resource.desc, TextureDesc):
+                texture = self.memory.texture(name, parity)
+                calls.append(Clear(self.device, texture, poison_value(resource.desc.format)))
+        return calls
+
+
+def _clear_buffer(buffer: moderngl.Buffer) -> None:
+    buffer.clear()

@@ -1,0 +1,69 @@
+"""Texture units: each pair of texture and sampler has its own, bound once a frame.
+
+Where a pipeline has more pairs than the driver has units, the last ones are shared and bound by the step itself.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+from rendergraph.gl.device import Device
+
+SHARED_UNITS = 24
+
+
+@dataclass(eq=False)
+class Units:
+    """Units handed out while compiling, then bound by one call a frame."""
+
+    device: Device
+    parities: int
+    _pairs: dict[tuple[tuple[int, ...], int], int] = field(default_factory=dict)
+
+    def unit(self, textures: tuple[int, ...], sampler: int, taken: list[Callable[[], None]]) -> int:
+        """The unit of a texture (one name a parity) with a sampler.
+
+        `taken` collects the binds that the asking draw has to make itself, empty unless units ran out.
+        """
+        pair = (textures, sampler)
+        if pair in self._pairs:
+            return self._pairs[pair]
+        own = self.device.limits["units"] - SHARED_UNITS
+        if len(self._pairs) < own:
+            self._pairs[pair] = len(self._pairs)
+            return self._pairs[pair]
+        unit = own + len(taken)
+        taken.append(_Rebind(self.device, unit, textures, sampler))
+        return unit
+
+    def binds(self) -> list[list[Callable[[], object]]]:
+        """The calls that bind everything, a list a parity."""
+        raw, count = self.device.raw, len(self._pairs)
+        result: list[list[Callable[[], object]]] = []
+        for parity in range(self.parities):
+            names = (ctypes.c_uint * max(1, count))(*(t[parity % len(t)] for t, _ in self._pairs))
+            samplers = (ctypes.c_uint * max(1, count))(*(sampler for _, sampler in self._pairs))
+            calls: list[Callable[[], object]] = []
+            if count:
+                calls = [
+                    partial(raw.glBindTextures, 0, count, names),
+                    partial(raw.glBindSamplers, 0, count, samplers),
+                ]
+            result.append(calls)
+        return result
+
+
+class _Rebind:
+    """Binds one pair to a shared unit; with history it alternates like the frames do."""
+
+    def __init__(self, device: Device, unit: int, textures: tuple[int, ...], sampler: int) -> None:
+        self._device, self._unit, self._textures, self._sampler = device, unit, textures, sampler
+        self.parity = 0
+
+    def __call__(self) -> None:
+        self._device.raw.glBindTextureUnit(self._unit, self._textures[self.parity % len(self._textures)])
+        self._device.raw.glBindSampler(self._unit, self._sampler)
+        self.parity += 1

@@ -1,0 +1,227 @@
+"""Walks the steps, times them, reads back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.compile import Executable
+from rendergraph.declare import Node, Port, Views
+from rendergraph.errors import Problem, RenderError
+from rendergraph.expand import CAMERA
+from rendergraph.gl import state as gl_state
+from rendergraph.gl import textures
+from rendergraph.link import Graph, GraphNode
+from rendergraph.scene.model import Scene
+from rendergraph.steps import ViewMatrices
+from rendergraph.textures import BufferDesc, TextureDesc
+
+
+@dataclass(frozen=True)
+class StepTime:
+    """Milliseconds of one step in one frame; `gpu_ms` is None where the driver has no timer."""
+
+    node: str
+    cpu_ms: float
+    gpu_ms: float | None
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """What one frame took: wall time until the device was done, and each step in order."""
+
+    frame_ms: float
+    steps: tuple[StepTime, ...]
+
+
+@dataclass(eq=False)
+class FrameContext:
+    """What a node's `update` sees and does in one frame (`steps.Frame`)."""
+
+    executable: Executable
+    node: GraphNode
+    index: int
+    time: float
+    camera: ViewMatrices
+    scene: Any
+
+    def connected(self, port: Port) -> bool:
+        return bool(self.node.inputs.get(port.name))
+
+    def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
+        self.executable.views.set(f"{self.node.id}.{port.name}", views)
+
+    def write(self, port: Port, values: npt.NDArray[Any]) -> None:
+        name = f"{self.node.id}.{port.name}"
+        if name not in self.executable.plan.placement:
+            return  # nobody reads the buffer in this pipeline
+        data = np.ascontiguousarray(values).tobytes()
+        buffer = self.executable.memory.buffer(name)
+        if len(data) > buffer.size:
+            text = f"node '{self.node.id}' writes {len(data)} bytes into '{port.name}', which holds {buffer.size}"
+            raise RenderError(Problem("RG432", text))
+        buffer.write(data)
+
+
+@dataclass(eq=False)
+class Runner:
+    """Runs an executable frame by frame.
+
+    Attributes:
+        executable: what runs.
+        graph: for the nodes that compute something each frame.
+    """
+
+    executable: Executable
+    graph: Graph
+    _updating: list[GraphNode] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        active = {step.node for step in self.executable.plan.schedule.steps}
+        active |= {f.node for step in self.executable.plan.schedule.steps for f in step.functions}
+        self._updating = [
+            node for node in self.graph.nodes if node.id in active and type(node.node).update is not Node.update
+        ]
+        self.reset()
+
+    def reset(self) -> None:
+        """Start history afresh: both copies hold the port's first value."""
+        memory, plan = self.executable.memory, self.executable.plan
+        for name, places in plan.placement.items():
+            resource = plan.resources[name]
+            if len(places) < 2 or isinstance(resource.desc, BufferDesc):
+                continue
+            for parity in (0, 1):
+                textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
+
+    def run(
+        self, index: int, time: float, delta: float, scene: Scene, camera: ViewMatrices, *, timed: bool = False
+    ) -> FrameTimes | None:
+        """Draw one frame.
+
+        Args:
+            index: frame number, from 1.
+            time: seconds since frame 1.
+            delta: seconds since the frame before.
+            scene: the scene at that time.
+            camera: its camera's view.
+            timed: measure each step; otherwise nothing is measured and None returned.
+
+        Raises:
+            RenderError: the driver reported an error, or a node's `update` failed.
+        """
+        executable, views = self.executable, self.executable.views
+        start = perf_counter()
+        views.set_frame(time, delta, index)
+        views.set(CAMERA, (camera,))
+        for node in self._updating:
+            self._update(node, index, time, camera, scene)
+        if views.changed:
+            for sort in executable.sorters:
+                sort(views)
+            views.changed = False
+        if executable.fresh or not executable.device.owned:
+            self.activate()
+        parity = index % len(executable.steps)
+        for call in executable.binds[parity]:
+            call()
+        if not timed:
+            for step in executable.steps[parity]:
+                for call in step.calls:
+                    call()
+            return None
+        times = []
+        for number, step in enumerate(executable.steps[parity]):
+            query = executable.queries[number]
+            before = perf_counter()
+            scope: AbstractContextManager[object] = query if step.draws else nullcontext()
+            with scope:
+                for call in step.calls:
+                    call()
+            times.append((step.step.node, perf_counter() - before, query if step.draws else None))
+        executable.device.ctx.finish()
+        frame_ms = (perf_counter() - start) * 1e3
+        steps = tuple(StepTime(n, cpu * 1e3, _gpu_ms(q)) for n, cpu, q in times)
+        return FrameTimes(frame_ms, steps)
+
+    def activate(self) -> None:
+        """Write what holds for all frames; needed once, and again when another pipeline used the programs."""
+        gl_state.baseline(self.executable.device.raw)
+        for call in self.executable.statics:
+            call()
+        self.executable.fresh = False
+
+    def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: Scene) -> None:
+        frame = FrameContext(self.executable, node, index, time, camera, scene)
+        try:
+            node.node.update(frame)
+        except RenderError:
+            raise
+        except Exception as error:
+            text = f"node '{node.id}' ({node.type.name}) failed in update: {type(error).__name__}: {error}"
+            raise RenderError(Problem("RG433", text, node.place)) from error
+
+    def check(self) -> None:
+        """Raise what the driver has complained about since the last check.
+
+        Raises:
+            RenderError: there was a GL error.
+        """
+        error = self.executable.device.raw.error()
+        if error:
+            raise RenderError(Problem("RG604", f"the driver reported {error} while drawing"))
+
+    def read(self, resource: str, index: int) -> npt.NDArray[Any]:
+        """A resource's texels after frame `index`: (height, width, channels), with layers before where it has them.
+
+        The top row comes first.
+        """
+        executable = self.executable
+        desc = executable.plan.resources[resource].desc
+        if isinstance(desc, BufferDesc):
+            executable.device.ctx.finish()
+            return np.frombuffer(executable.memory.buffer(resource).read(), np.uint8)
+        parity = index % len(executable.steps)
+        texels = textures.read(executable.device, executable.memory.texture(resource, parity))
+        assert isinstance(desc, TextureDesc)
+        return texels[0] if desc.kind == "texture2d" else texels
+
+
+def _gpu_ms(query: Any) -> float | None:
+    """Milliseconds of a time query; None where the driver has given its largest number instead of an answer."""
+    nanoseconds = query.elapsed if query is not None else 0xFFFFFFFF
+    return None if nanoseconds == 0xFFFFFFFF else nanoseconds * 1e-6
+
+
+def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:
+    """Per node, in order of execution, the median over frames of its steps' summed times."""
+    sums: dict[str, list[tuple[float, float | None]]] = {}
+    for frame in frames:
+        totals: dict[str, tuple[float, float | None]] = {}
+        for step in frame.steps:
+            cpu, gpu = totals.get(step.node, (0.0, None))
+            if step.gpu_ms is not None:
+                gpu = (gpu or 0.0) + step.gpu_ms
+            totals[step.node] = (cpu + step.cpu_ms, gpu)
+        for node, total in totals.items():
+            sums.setdefault(node, []).append(total)
+    result = []
+    for node, totals_of in sums.items():
+        gpus = [gpu for _, gpu in totals_of if gpu is not None]
+        gpu_median = float(np.median(gpus)) if gpus else None
+        result.append(StepTime(node, float(np.median([cpu for cpu, _ in totals_of])), gpu_median))
+    return result
+
+
+def summary(values: Sequence[float]) -> Mapping[str, float]:
+    """Median, least and most."""
+    return {"median": float(np.median(values)), "min": float(min(values)), "max": float(max(values))}
+
+
+__all__ = ["Callable", "FrameContext", "FrameTimes", "Runner", "StepTime", "median_times", "summary"]

@@ -1,0 +1,1 @@
+"""All of OpenGL: moderngl for context, programs, draws and queries; raw calls for what it lacks."""

@@ -1,0 +1,102 @@
+"""The GL device: opening a context, what it is, what it can."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import moderngl
+
+from rendergraph.errors import DeviceError, Problem
+from rendergraph.gl.raw import RawGL
+
+REQUIRED_VERSION = 450
+SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+
+
+@dataclass(eq=False)
+class Device:
+    """An OpenGL context with its raw functions.
+
+    Attributes:
+        ctx: moderngl's context.
+        raw: the raw functions.
+        owned: whether `release` ends the context; a borrowed one stays its owner's.
+    """
+
+    ctx: moderngl.Context
+    raw: RawGL
+    owned: bool = True
+    limits: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def renderer(self) -> str:
+        """GL_RENDERER."""
+        return str(self.ctx.info["GL_RENDERER"])
+
+    @property
+    def software(self) -> bool:
+        """Whether it is a rasteriser on the CPU, whose times say nothing about GPUs."""
+        return any(name in self.renderer.lower() for name in SOFTWARE_RENDERERS)
+
+    def as_json(self) -> dict[str, object]:
+        """What pictures and reports say about it."""
+        return {
+            "renderer": self.renderer,
+            "vendor": str(self.ctx.info["GL_VENDOR"]),
+            "version": str(self.ctx.info["GL_VERSION"]),
+            "software": self.software,
+        }
+
+    def release(self) -> None:
+        """End the context if it is ours."""
+        if self.owned:
+            self.ctx.release()
+
+
+def open_device(index: int | None = None) -> Device:
+    """A headless context on the machine's GL device.
+
+    Args:
+        index: EGL device number as `doctor` lists them; None for the default, or RENDERGRAPH_DEVICE where set.
+
+    Raises:
+        DeviceError: no driver, no such device, or OpenGL older than 4.5.
+    """
+    import glcontext
+
+    chosen = index if index is not None else int(os.environ.get("RENDERGRAPH_DEVICE", "0"))
+    try:
+        backend = glcontext.get_backend_by_name("egl")
+        context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen)
+        ctx = moderngl.create_context(context=context)
+    except Exception as error:  # glcontext raises bare Exception, with a different text a cause
+        text = f"no usable OpenGL {REQUIRED_VERSION / 100:.1f} device: {error}; `rendergraph doctor` says what to install"
+        raise DeviceError(Problem("RG601", text)) from error
+    return wrap(ctx, context.load, owned=True)
+
+
+def borrow_device(ctx: moderngl.Context) -> Device:
+    """The caller's current context; it stays the caller's, and its state is set afresh each frame."""
+    import glcontext
+
+    return wrap(ctx, glcontext.get_backend_by_name("egl")(mode="detect", glversion=330).load, owned=False)
+
+
+def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
+    """A `Device` of a context, checked for what we need."""
+    if ctx.version_code < REQUIRED_VERSION:
+        text = f"{ctx.info['GL_RENDERER']} offers OpenGL {ctx.version_code / 100:.1f}; rendergraph needs 4.5"
+        raise DeviceError(Problem("RG601", text))
+    raw = RawGL(load)
+    limits = {
+        "units": raw.integer(0x8B4D),  # MAX_COMBINED_TEXTURE_IMAGE_UNITS
+        "uniform_block": raw.integer(0x8A30),  # MAX_UNIFORM_BLOCK_SIZE
+        "uniform_bindings": raw.integer(0x8A2F),
+        "texture_size": raw.integer(0x0D33),
+        "layers": raw.integer(0x88FF),
+        "samples": raw.integer(0x8D57),
+    }
+    raw.glEnable(0x884F)  # TEXTURE_CUBE_MAP_SEAMLESS
+    return Device(ctx, raw, owned, limits)

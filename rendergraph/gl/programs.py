@@ -1,0 +1,166 @@
+"""Programs: compiled through moderngl, looked into and written to by raw calls.
+
+moderngl knows no shadow-array samplers and rebinds storage blocks wrongly, so the active interface is read from the
+driver and written by location.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import moderngl
+import numpy as np
+
+from rendergraph.gl.device import Device
+
+if TYPE_CHECKING:
+    from rendergraph.steps import UniformValue
+
+_UNIFORM, _UNIFORM_BLOCK, _STORAGE_BLOCK = 0x92E1, 0x92E2, 0x92E6
+_NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92FB, 0x92FD, 0x930E
+_ACTIVE = 0x92F5
+
+_WRITERS: dict[int, tuple[str, Any, int]] = {  # GL type: raw function, NumPy type, numbers per element
+    0x1406: ("glProgramUniform1fv", np.float32, 1), 0x8B50: ("glProgramUniform2fv", np.float32, 2),
+    0x8B51: ("glProgramUniform3fv", np.float32, 3), 0x8B52: ("glProgramUniform4fv", np.float32, 4),
+    0x1404: ("glProgramUniform1iv", np.int32, 1), 0x8B53: ("glProgramUniform2iv", np.int32, 2),
+    0x8B54: ("glProgramUniform3iv", np.int32, 3), 0x8B55: ("glProgramUniform4iv", np.int32, 4),
+    0x1405: ("glProgramUniform1uiv", np.uint32, 1), 0x8DC6: ("glProgramUniform2uiv", np.uint32, 2),
+    0x8DC7: ("glProgramUniform3uiv", np.uint32, 3), 0x8DC8: ("glProgramUniform4uiv", np.uint32, 4),
+    0x8B56: ("glProgramUniform1iv", np.int32, 1), 0x8B57: ("glProgramUniform2iv", np.int32, 2),
+    0x8B58: ("glProgramUniform3iv", np.int32, 3), 0x8B59: ("glProgramUniform4iv", np.int32, 4),
+    0x8B5A: ("glProgramUniformMatrix2fv", np.float32, 4), 0x8B5B: ("glProgramUniformMatrix3fv", np.float32, 9),
+    0x8B5C: ("glProgramUniformMatrix4fv", np.float32, 16),
+}  # fmt: skip
+
+ProgramError = moderngl.Error
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """One active uniform of the default block."""
+
+    name: str
+    type: int
+    size: int
+    location: int
+
+    @property
+    def opaque(self) -> bool:
+        """Whether it is a sampler or an image."""
+        return self.type not in _WRITERS
+
+
+@dataclass(eq=False)
+class Program:
+    """A linked program with its active interface.
+
+    Attributes:
+        object: moderngl's Program or ComputeShader.
+        uniforms: active uniforms outside blocks, by name.
+        blocks, storage: active uniform and storage blocks, name to index.
+    """
+
+    device: Device
+    object: Any
+    uniforms: dict[str, Uniform] = field(default_factory=dict)
+    blocks: dict[str, int] = field(default_factory=dict)
+    storage: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def glo(self) -> int:
+        """The GL name."""
+        return int(self.object.glo)
+
+    def writer(self, name: str, value: UniformValue) -> Callable[[], None] | None:
+        """A call that writes one uniform, None where the program does not look at it."""
+        uniform = self.uniforms.get(name)
+        if uniform is None:
+            return None
+        if uniform.opaque:
+            return partial(self.device.raw.glProgramUniform1i, self.glo, uniform.location, int(value))  # type: ignore[arg-type]
+        function, dtype, numbers = _WRITERS[uniform.type]
+        data = np.ascontiguousarray(value, dtype).ravel()
+        count = max(1, data.size // numbers)
+        arguments = (self.glo, uniform.location, min(count, uniform.size))
+        if "Matrix" in function:
+            arguments += (0,)
+        # The array travels with the call, so that its address stays good.
+        return partial(_call_with, getattr(self.device.raw, function), arguments, data)
+
+    def bind_block(self, name: str, binding: int) -> None:
+        """Give a uniform or storage block its binding point."""
+        if name in self.blocks:
+            self.device.raw.glUniformBlockBinding(self.glo, self.blocks[name], binding)
+        elif name in self.storage:
+            self.device.raw.glShaderStorageBlockBinding(self.glo, self.storage[name], binding)
+
+    def release(self) -> None:
+        """Free it."""
+        self.object.release()
+
+
+def _call_with(function: Any, arguments: tuple[int, ...], data: np.ndarray[Any, Any]) -> None:
+    function(*arguments, data.ctypes.data)
+
+
+def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) -> Program:
+    """Compile and link the stages; fragment outputs go to the locations of their order in `outputs`.
+
+    Raises:
+        ProgramError: the driver's message, as moderngl wraps it.
+    """
+    if "compute" in texts:
+        made: Any = device.ctx.compute_shader(texts["compute"])
+    else:
+        made = device.ctx.program(
+            vertex_shader=texts["vertex"],
+            geometry_shader=texts.get("geometry"),
+            fragment_shader=texts.get("fragment"),
+            fragment_outputs={name: number for number, name in enumerate(outputs)},
+        )
+    program = Program(device, made)
+    _inspect(program)
+    return program
+
+
+def driver_message(error: Exception) -> tuple[str | None, str]:
+    """Stage (`vertex`, … or None for linking) and the driver's own text out of moderngl's error."""
+    text = str(error)
+    match = re.search(r"(vertex|fragment|geometry|compute)_shader\s*\n=+\n(.*)", text, re.DOTALL)
+    if match:
+        return match[1], match[2].strip()
+    return None, re.sub(r"^.*?\n=+\n", "", text, count=1, flags=re.DOTALL).strip()
+
+
+def _inspect(program: Program) -> None:
+    raw, glo = program.device.raw, program.glo
+    for interface, into in ((_UNIFORM_BLOCK, program.blocks), (_STORAGE_BLOCK, program.storage)):
+        for index in range(_count(raw, glo, interface)):
+            into[_name(raw, glo, interface, index)] = index
+    properties = (ctypes.c_uint * 4)(_TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION)
+    values = (ctypes.c_int * 4)()
+    for index in range(_count(raw, glo, _UNIFORM)):
+        raw.glGetProgramResourceiv(glo, _UNIFORM, index, 4, ctypes.byref(properties), 4, None, ctypes.byref(values))
+        kind, size, block, location = values
+        if block != -1:
+            continue
+        name = _name(raw, glo, _UNIFORM, index).removesuffix("[0]")
+        program.uniforms[name] = Uniform(name, kind, size, location)
+
+
+def _count(raw: Any, glo: int, interface: int) -> int:
+    value = ctypes.c_int()
+    raw.glGetProgramInterfaceiv(glo, interface, _ACTIVE, ctypes.byref(value))
+    return value.value
+
+
+def _name(raw: Any, glo: int, interface: int, index: int) -> str:
+    buffer = ctypes.create_string_buffer(512)
+    raw.glGetProgramResourceName(glo, interface, index, 512, None, buffer)
+    return buffer.value.decode()

@@ -1,0 +1,148 @@
+"""The OpenGL functions moderngl does not offer, as a small table over the driver's own loader.
+
+PyOpenGL would do the same at 0.13 s of import time; these prototypes take well under a millisecond.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+_U, _I, _F, _P, _S = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p, ctypes.c_ssize_t
+
+PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
+    "glCreateTextures": (None, _U, _I, _P),
+    "glGenTextures": (None, _I, _P),
+    "glDeleteTextures": (None, _I, _P),
+    "glTextureStorage2D": (None, _U, _I, _U, _I, _I),
+    "glTextureStorage3D": (None, _U, _I, _U, _I, _I, _I),
+    "glTextureStorage2DMultisample": (None, _U, _I, _U, _I, _I, ctypes.c_ubyte),
+    "glTextureStorage3DMultisample": (None, _U, _I, _U, _I, _I, _I, ctypes.c_ubyte),
+    "glTextureView": (None, _U, _U, _U, _U, _U, _U, _U, _U),
+    "glTextureParameteri": (None, _U, _U, _I),
+    "glTextureSubImage2D": (None, _U, _I, _I, _I, _I, _I, _U, _U, _P),
+    "glTextureSubImage3D": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _P),
+    "glGenerateTextureMipmap": (None, _U),
+    "glGetTextureSubImage": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _I, _P),
+    "glClearTexSubImage": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _P),
+    "glClearNamedBufferData": (None, _U, _U, _U, _U, _P),
+    "glBindTextureUnit": (None, _U, _U),
+    "glBindTextures": (None, _U, _I, _P),
+    "glBindSamplers": (None, _U, _I, _P),
+    "glBindSampler": (None, _U, _U),
+    "glBindImageTexture": (None, _U, _U, _I, ctypes.c_ubyte, _I, _U, _U),
+    "glCreateSamplers": (None, _I, _P),
+    "glDeleteSamplers": (None, _I, _P),
+    "glSamplerParameteri": (None, _U, _U, _I),
+    "glSamplerParameterfv": (None, _U, _U, _P),
+    "glNamedFramebufferTexture": (None, _U, _U, _U, _I),
+    "glNamedFramebufferTextureLayer": (None, _U, _U, _U, _I, _I),
+    "glCheckNamedFramebufferStatus": (_U, _U, _U),
+    "glBlitNamedFramebuffer": (None, _U, _U, _I, _I, _I, _I, _I, _I, _I, _I, _U, _U),
+    "glClearNamedFramebufferfv": (None, _U, _U, _I, _P),
+    "glClearNamedFramebufferfi": (None, _U, _U, _I, _F, _I),
+    "glClearNamedFramebufferuiv": (None, _U, _U, _I, _P),
+    "glClearNamedFramebufferiv": (None, _U, _U, _I, _P),
+    "glGetProgramResourceiv": (None, _U, _U, _U, _I, _P, _I, _P, _P),
+    "glDrawArraysIndirect": (None, _U, _P),
+    "glProgramUniform1fv": (None, _U, _I, _I, _P),
+    "glProgramUniform2fv": (None, _U, _I, _I, _P),
+    "glProgramUniform3fv": (None, _U, _I, _I, _P),
+    "glProgramUniform4fv": (None, _U, _I, _I, _P),
+    "glProgramUniform1iv": (None, _U, _I, _I, _P),
+    "glProgramUniform2iv": (None, _U, _I, _I, _P),
+    "glProgramUniform3iv": (None, _U, _I, _I, _P),
+    "glProgramUniform4iv": (None, _U, _I, _I, _P),
+    "glProgramUniform1uiv": (None, _U, _I, _I, _P),
+    "glProgramUniform2uiv": (None, _U, _I, _I, _P),
+    "glProgramUniform3uiv": (None, _U, _I, _I, _P),
+    "glProgramUniform4uiv": (None, _U, _I, _I, _P),
+    "glProgramUniformMatrix2fv": (None, _U, _I, _I, ctypes.c_ubyte, _P),
+    "glProgramUniformMatrix3fv": (None, _U, _I, _I, ctypes.c_ubyte, _P),
+    "glProgramUniformMatrix4fv": (None, _U, _I, _I, ctypes.c_ubyte, _P),
+    "glGetUniformLocation": (_I, _U, ctypes.c_char_p),
+    "glProgramUniform1i": (None, _U, _I, _I),
+    "glGetProgramResourceIndex": (_U, _U, _U, ctypes.c_char_p),
+    "glGetProgramInterfaceiv": (None, _U, _U, _U, _P),
+    "glGetProgramResourceName": (None, _U, _U, _U, _I, _P, _P),
+    "glShaderStorageBlockBinding": (None, _U, _U, _U),
+    "glUniformBlockBinding": (None, _U, _U, _U),
+    "glGetUniformBlockIndex": (_U, _U, ctypes.c_char_p),
+    "glEnable": (None, _U),
+    "glDisable": (None, _U),
+    "glEnablei": (None, _U, _U),
+    "glDisablei": (None, _U, _U),
+    "glBlendFuncSeparatei": (None, _U, _U, _U, _U, _U),
+    "glBlendEquationi": (None, _U, _U),
+    "glDepthFunc": (None, _U),
+    "glCullFace": (None, _U),
+    "glFrontFace": (None, _U),
+    "glPolygonMode": (None, _U, _U),
+    "glPolygonOffset": (None, _F, _F),
+    "glStencilFuncSeparate": (None, _U, _U, _I, _U),
+    "glStencilOpSeparate": (None, _U, _U, _U, _U),
+    "glStencilMaskSeparate": (None, _U, _U),
+    "glDispatchCompute": (None, _U, _U, _U),
+    "glUseProgram": (None, _U),
+    "glMemoryBarrier": (None, _U),
+    "glPixelStorei": (None, _U, _I),
+    "glBindBuffer": (None, _U, _U),
+    "glGetIntegerv": (None, _U, _P),
+    "glGetError": (_U,),
+    "glIsTexture": (ctypes.c_ubyte, _U),
+    "glIsBuffer": (ctypes.c_ubyte, _U),
+    "glIsFramebuffer": (ctypes.c_ubyte, _U),
+    "glIsVertexArray": (ctypes.c_ubyte, _U),
+    "glIsSampler": (ctypes.c_ubyte, _U),
+    "glIsProgram": (ctypes.c_ubyte, _U),
+    "glIsQuery": (ctypes.c_ubyte, _U),
+    "glIsRenderbuffer": (ctypes.c_ubyte, _U),
+}
+
+
+class RawGL:
+    """Raw functions by name, without moderngl's checks: `raw.glDepthFunc(0x0203)`.
+
+    A function the driver lacks is an AttributeError when it is first asked for.
+    """
+
+    def __init__(self, load: Callable[[str], int]) -> None:
+        self._load = load
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in PROTOTYPES:
+            raise AttributeError(name)
+        address = self._load(name)
+        if not address:
+            raise AttributeError(f"this driver has no {name}")
+        result, *arguments = PROTOTYPES[name]
+        function = ctypes.CFUNCTYPE(result, *arguments)(address)
+        setattr(self, name, function)  # found once: the next look-up never comes here
+        return function
+
+    def make(self, function: str, *arguments: int) -> int:
+        """The one name that a `glCreate…` or `glGen…` function returns."""
+        name = _U()
+        getattr(self, function)(*arguments, 1, ctypes.byref(name))
+        return name.value
+
+    def delete(self, function: str, name: int) -> None:
+        """Delete one name."""
+        getattr(self, function)(1, ctypes.byref(_U(name)))
+
+    def integer(self, parameter: int) -> int:
+        """`glGetIntegerv` of one value."""
+        value = _I()
+        self.glGetIntegerv(parameter, ctypes.byref(value))
+        return value.value
+
+    def error(self) -> str | None:
+        """The first pending GL error's name, None where there is none; clears them all."""
+        first: int = self.glGetError()
+        code = first
+        while code:
+            code = self.glGetError()
+        names = {0x500: "INVALID_ENUM", 0x501: "INVALID_VALUE", 0x502: "INVALID_OPERATION", 0x503: "STACK_OVERFLOW",
+                 0x504: "STACK_UNDERFLOW", 0x505: "OUT_OF_MEMORY", 0x506: "INVALID_FRAMEBUFFER_OPERATION"}  # fmt: skip
+        return names.get(first, hex(first)) if first else None

@@ -1,0 +1,241 @@
+"""Textures as immutable storage and views of it; reading back and clearing in one place each.
+
+Storage is immutable because views need it; samplers are separate objects because two readers of one texture may
+differ and aliased textures would otherwise share filter state.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import Problem, RenderError
+from rendergraph.gl.device import Device
+from rendergraph.textures import FORMATS, Sampler, TextureDesc
+
+_TARGETS = {"texture2d": 0x0DE1, "texture2d_array": 0x8C1A, "texture_cube": 0x8513}
+_MULTISAMPLE_TARGETS = {"texture2d": 0x9100, "texture2d_array": 0x9102}
+_CHANNELS = {1: 0x1903, 2: 0x8227, 3: 0x1907, 4: 0x1908}
+_INTEGER_CHANNELS = {1: 0x8D94, 2: 0x8228, 4: 0x8D99}
+_FLOAT, _UINT, _INT, _UBYTE = 0x1406, 0x1405, 0x1404, 0x1401
+_DEPTH_COMPONENT, _DEPTH_STENCIL, _FLOAT_32_UNSIGNED_INT_24_8_REV = 0x1902, 0x84F9, 0x8DAD
+
+
+@dataclass(frozen=True)
+class GpuTexture:
+    """A GL texture name with what it was created from."""
+
+    glo: int
+    target: int
+    desc: TextureDesc
+    view_of: int | None = None
+
+
+def target_of(desc: TextureDesc) -> int:
+    """The GL texture target."""
+    return _MULTISAMPLE_TARGETS[desc.kind] if desc.samples > 1 else _TARGETS[desc.kind]
+
+
+def create(device: Device, desc: TextureDesc, label: str = "") -> GpuTexture:
+    """Allocate a texture.
+
+    Raises:
+        RenderError: the driver refused, mostly for lack of memory.
+    """
+    raw = device.raw
+    raw.error()
+    target, gl_format = target_of(desc), FORMATS[desc.format].gl
+    glo = raw.make("glCreateTextures", target)
+    layered = desc.kind == "texture2d_array"
+    if desc.samples > 1 and layered:
+        raw.glTextureStorage3DMultisample(glo, desc.samples, gl_format, desc.width, desc.height, desc.layers, 1)
+    elif desc.samples > 1:
+        raw.glTextureStorage2DMultisample(glo, desc.samples, gl_format, desc.width, desc.height, 1)
+    elif layered:
+        raw.glTextureStorage3D(glo, desc.mips, gl_format, desc.width, desc.height, desc.layers)
+    else:
+        raw.glTextureStorage2D(glo, desc.mips, gl_format, desc.width, desc.height)
+    error = raw.error()
+    if error:
+        raw.delete("glDeleteTextures", glo)
+        text = (f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
+                f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})")  # fmt: skip
+        raise RenderError(Problem("RG602", text))
+    return GpuTexture(glo, target, desc)
+
+
+def view(
+    device: Device, texture: GpuTexture, *, format: str | None = None, mip: int | None = None, layer: int | None = None
+) -> GpuTexture:
+    """The same storage seen in another format of its texel class, or one mip or layer as a 2D texture."""
+    desc = texture.desc
+    shown = TextureDesc(
+        kind=desc.kind if layer is None else "texture2d",
+        format=format or desc.format,
+        width=desc.mip_size(mip or 0)[0],
+        height=desc.mip_size(mip or 0)[1],
+        layers=desc.layers if layer is None else 1,
+        mips=desc.mips if mip is None else 1,
+        samples=desc.samples,
+    )
+    raw = device.raw
+    glo = raw.make("glGenTextures")
+    target = target_of(shown)
+    raw.glTextureView(
+        glo, target, texture.glo, FORMATS[shown.format].gl, mip or 0, shown.mips, layer or 0, max(1, shown.layers)
+    )
+    error = raw.error()
+    if error:
+        raise RenderError(Problem("RG602", f"the driver refused a texture view of {desc} as {shown} ({error})"))
+    return GpuTexture(glo, target, shown, view_of=texture.glo)
+
+
+def delete(device: Device, texture: GpuTexture) -> None:
+    """Free it; storage lives until its last view is gone."""
+    device.raw.delete("glDeleteTextures", texture.glo)
+
+
+def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
+    """GL format, GL type, NumPy type and components in which texels travel."""
+    fmt = FORMATS[format_name]
+    if fmt.family == "depth":
+        return _DEPTH_COMPONENT, _FLOAT, np.float32, 1
+    if fmt.family == "depth_stencil":
+        return _DEPTH_STENCIL, _FLOAT_32_UNSIGNED_INT_24_8_REV, np.float32, 2
+    if fmt.family == "uint":
+        return _INTEGER_CHANNELS[fmt.components], _UINT, np.uint32, fmt.components
+    if fmt.family == "int":
+        return _INTEGER_CHANNELS[fmt.components], _INT, np.int32, fmt.components
+    if fmt.family == "unorm" and fmt.bytes == fmt.components:
+        return _CHANNELS[fmt.components], _UBYTE, np.uint8, fmt.components
+    return _CHANNELS[fmt.components], _FLOAT, np.float32, fmt.components
+
+
+def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[Any]:
+    """Texels as (layers, height, width, channels), the top row first; samples must be resolved before.
+
+    `finish` comes first: without it a software rasteriser has returned stale texels.
+    """
+    desc = texture.desc
+    width, height = desc.mip_size(mip)
+    gl_format, gl_type, dtype, channels = transfer_format(desc.format)
+    if FORMATS[desc.format].srgb:
+        gl_type, dtype = _FLOAT, np.float32  # linear values, not the encoded bytes
+    texels = np.empty((desc.layers, height, width, channels), dtype)
+    device.ctx.finish()
+    device.raw.glBindBuffer(0x88EB, 0)  # PIXEL_PACK_BUFFER: a borrowed context may have left one
+    device.raw.glPixelStorei(0x0D05, 1)
+    device.raw.glGetTextureSubImage(
+        texture.glo, mip, 0, 0, 0, width, height, desc.layers, gl_format, gl_type, texels.nbytes, texels.ctypes.data
+    )
+    error = device.raw.error()
+    if error:
+        raise RenderError(Problem("RG603", f"reading back a {desc.format} texture failed ({error})"))
+    if FORMATS[desc.format].family == "depth_stencil":
+        texels = texels[..., :1]
+    return texels[:, ::-1]
+
+
+def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip: int = 0) -> None:
+    """Write (layers, height, width, channels) or (height, width, channels) into one mip, rows as given."""
+    desc = texture.desc
+    width, height = desc.mip_size(mip)
+    gl_format, gl_type, dtype, channels = transfer_format(desc.format)
+    data = np.ascontiguousarray(texels, dtype)
+    assert data.size == width * height * desc.layers * channels, (data.shape, desc)
+    device.raw.glBindBuffer(0x88EC, 0)  # PIXEL_UNPACK_BUFFER
+    device.raw.glPixelStorei(0x0CF5, 1)
+    if desc.kind == "texture2d":
+        device.raw.glTextureSubImage2D(texture.glo, mip, 0, 0, width, height, gl_format, gl_type, data.ctypes.data)
+    else:
+        device.raw.glTextureSubImage3D(
+            texture.glo, mip, 0, 0, 0, width, height, desc.layers, gl_format, gl_type, data.ctypes.data
+        )
+
+
+def upload_bytes(device: Device, texture: GpuTexture, texels: npt.NDArray[np.uint8]) -> None:
+    """Write (height, width, 4) bytes into mip 0 as they are, sRGB-encoded where the format says so."""
+    data = np.ascontiguousarray(texels)
+    height, width = data.shape[:2]
+    device.raw.glBindBuffer(0x88EC, 0)
+    device.raw.glPixelStorei(0x0CF5, 1)
+    device.raw.glTextureSubImage2D(texture.glo, 0, 0, 0, width, height, 0x1908, _UBYTE, data.ctypes.data)
+
+
+class Clear:
+    """A clear of a texture, one mip or one layer, prepared once and called in every frame."""
+
+    def __init__(
+        self, device: Device, texture: GpuTexture, value: float | tuple[float, ...], *, mip: int | None = None,
+        layer: int | None = None,
+    ) -> None:  # fmt: skip
+        desc = texture.desc
+        gl_format, gl_type, dtype, channels = transfer_format(desc.format)
+        if FORMATS[desc.format].srgb or (dtype is np.uint8):
+            gl_type, dtype = _FLOAT, np.float32
+        values = np.zeros(channels, dtype)
+        given = np.broadcast_to(np.asarray(value, np.float64), (channels,) if np.ndim(value) == 0 else np.shape(value))
+        if FORMATS[desc.format].family == "depth_stencil":
+            values[0] = given[0]
+        else:
+            values[:] = given[:channels].astype(dtype) if np.issubdtype(dtype, np.floating) else given[:channels]
+        self._values = values  # kept alive: the calls below hold its address
+        self._clear = device.raw.glClearTexSubImage
+        levels = range(desc.mips) if mip is None else (mip,)
+        self._calls = []
+        for level in levels:
+            width, height = desc.mip_size(level)
+            first, count = (0, desc.layers) if layer is None else (layer, 1)
+            self._calls.append(
+                (texture.glo, level, 0, 0, first, width, height, count, gl_format, gl_type, values.ctypes.data)
+            )
+
+    def __call__(self) -> None:
+        for call in self._calls:
+            self._clear(*call)
+
+
+def poison_value(format_name: str) -> float:
+    """A value no pass should ever show: NaN, or the largest where the format has none."""
+    family = FORMATS[format_name].family
+    if family == "float" and format_name != "r11f_g11f_b10f":
+        return float("nan")
+    return {"uint": float(0x7FFFFFFF), "int": float(0x7FFFFFFF)}.get(family, 0.7319)
+
+
+# --- samplers --------------------------------------------------------------------------------------------------------
+
+_MIN_FILTERS = {"nearest": 0x2600, "linear": 0x2601, "trilinear": 0x2703}
+_MAG_FILTERS = {"nearest": 0x2600, "linear": 0x2601, "trilinear": 0x2601}
+_WRAPS = {"clamp": 0x812F, "repeat": 0x2901, "mirror": 0x8370, "border": 0x812D}
+
+
+def create_sampler(device: Device, sampler: Sampler) -> int:
+    """A GL sampler object; the border is 1 in every channel, which is open and lit."""
+    names = (_MIN_FILTERS[sampler.filter], _MAG_FILTERS[sampler.filter], _WRAPS[sampler.wrap], _WRAPS[sampler.wrap])
+    return create_gl_sampler(device, *names, compare=sampler.compare, anisotropy=sampler.anisotropy)
+
+
+def create_gl_sampler(
+    device: Device, min_filter: int, mag_filter: int, wrap_s: int, wrap_t: int, *, compare: bool = False,
+    anisotropy: int = 1,
+) -> int:  # fmt: skip
+    """A GL sampler object from GL enums."""
+    raw = device.raw
+    glo = raw.make("glCreateSamplers")
+    raw.glSamplerParameteri(glo, 0x2801, min_filter)
+    raw.glSamplerParameteri(glo, 0x2800, mag_filter)
+    raw.glSamplerParameteri(glo, 0x2802, wrap_s)
+    raw.glSamplerParameteri(glo, 0x2803, wrap_t)
+    border = (ctypes.c_float * 4)(1.0, 1.0, 1.0, 1.0)
+    raw.glSamplerParameterfv(glo, 0x1004, ctypes.byref(border))
+    if compare:
+        raw.glSamplerParameteri(glo, 0x884C, 0x884E)  # COMPARE_MODE, COMPARE_REF_TO_TEXTURE
+        raw.glSamplerParameteri(glo, 0x884D, 0x0203)  # COMPARE_FUNC, LEQUAL
+    if anisotropy > 1:
+        raw.glSamplerParameteri(glo, 0x84FE, anisotropy)
+    return glo

@@ -1,0 +1,270 @@
+"""A pipeline from file to plan: pure, immutable, and without GL until it is rendered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.link import Endpoint, Graph
+
+if TYPE_CHECKING:
+    from rendergraph.allocate import ResourcePlan
+    from rendergraph.catalog import Catalog
+    from rendergraph.expand import Expansion
+    from rendergraph.resolve import PipelineSpec
+    from rendergraph.scene.model import Scene
+    from rendergraph.session.frame import Frame
+    from rendergraph.session.session import Session
+
+
+def load(
+    source: str | Path,
+    *,
+    scene: str | Path | None = None,
+    environment: str | Path | None = None,
+    camera: str | None = None,
+    size: tuple[int, int] | None = None,
+    sets: Sequence[str] = (),
+    patches: Sequence[str | Path | Mapping[str, Any]] = (),
+    asset_roots: Sequence[str | Path] = (),
+    plugins: Sequence[str | Path] = (),
+) -> Pipeline:
+    """A pipeline by shipped name or file; nothing is read until it is asked for.
+
+    Args:
+        source: a shipped name (`forward`) or a path.
+        scene, size: override the file's; `size` is width and height in pixels.
+        environment: an equirectangular image that replaces the scene's.
+        camera: name of the scene's camera; its first by default.
+        sets: what `-s` takes on the command line, such as `ao.radius=0.8`.
+        patches: merge patches, as files or mappings.
+        asset_roots: more folders that the file may reach.
+        plugins: Python files or folders with node types.
+    """
+    return Pipeline(
+        source=str(source),
+        scene_name=None if scene is None else str(scene),
+        environment=None if environment is None else Path(environment),
+        camera=camera,
+        size=size,
+        sets=tuple(sets),
+        patches=tuple(Path(p) if isinstance(p, str) else p for p in patches),
+        asset_roots=tuple(Path(root) for root in asset_roots),
+        plugins=tuple(Path(plugin) for plugin in plugins),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Pipeline:
+    """A pipeline with everything that is said about it; `set` and the like return changed copies."""
+
+    source: str
+    scene_name: str | None = None
+    environment: Path | None = None
+    camera: str | None = None
+    size: tuple[int, int] | None = None
+    sets: tuple[str, ...] = ()
+    patches: tuple[Path | Mapping[str, Any], ...] = ()
+    asset_roots: tuple[Path, ...] = ()
+    plugins: tuple[Path, ...] = ()
+    known_catalog: Catalog | None = field(default=None, repr=False)
+
+    # Changing --------------------------------------------------------------------------------------------------------
+
+    def set(self, path: str, value: object) -> Pipeline:
+        """The same with one value changed, `ao.radius` or a pipeline parameter's name, as `-s` does."""
+        import json
+
+        text = value if isinstance(value, str) else json.dumps(value)
+        return replace(self, sets=(*self.sets, f"{path}={text}"))
+
+    def patch(self, patch: str | Path | Mapping[str, Any]) -> Pipeline:
+        """The same with a merge patch applied (RFC 7386)."""
+        return replace(self, patches=(*self.patches, Path(patch) if isinstance(patch, str) else patch))
+
+    def with_scene(self, scene: str | Path) -> Pipeline:
+        """The same of another scene."""
+        return replace(self, scene_name=str(scene))
+
+    def with_size(self, size: tuple[int, int]) -> Pipeline:
+        """The same at another size."""
+        return self if self.size == size else replace(self, size=size)
+
+    # Stages ----------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def catalog(self) -> Catalog:
+        """The node types that can be used."""
+        from rendergraph.catalog import Catalog
+
+        return self.known_catalog or Catalog.discover(self.plugins)
+
+    @cached_property
+    def spec(self) -> PipelineSpec:
+        """The resolved file."""
+        from rendergraph.resolve import resolve
+
+        return resolve(
+            self.source,
+            patches=self.patches,
+            sets=self.sets,
+            scene=self.scene_name,
+            size=self.size,
+            asset_roots=self.asset_roots,
+            catalog=self.catalog,
+        )
+
+    @property
+    def name(self) -> str:
+        """The file's stem."""
+        return self.spec.name
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene, completed by a camera and a light where it has none."""
+        from rendergraph.scene import complete, load
+        from rendergraph.scene.model import Environment, ImageSource
+
+        scene = load(self.spec.scene, check_path=self.spec.roots.check)
+        if self.environment is not None:
+            scene = replace(scene, environment=Environment(ImageSource(self.environment, label=str(self.environment))))
+        return complete(scene, self.camera)
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The checked graph.
+
+        Raises:
+            InputError: with all mistakes of the file.
+        """
+        from rendergraph.link import link
+        from rendergraph.scene.cameras import light_facts
+
+        return link(self.spec, self.catalog, light_facts(self.scene))
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What was noticed in the pipeline and the scene and is no error."""
+        return (*self.spec.notes, *self.graph.warnings, *self.scene.warnings)
+
+    def wanted(self, outputs: Sequence[str] | None = None, taps: Iterable[str] = ()) -> dict[str, Endpoint]:
+        """The ports that must exist at the end of a frame, by output name or tap.
+
+        Raises:
+            InputError: an output or a port that the pipeline does not have.
+        """
+        graph = self.graph
+        names = list(graph.outputs) if outputs is None else list(outputs)
+        wanted: dict[str, Endpoint] = {}
+        problems = []
+        for name in names:
+            if name in graph.outputs:
+                wanted[name] = graph.outputs[name]
+            else:
+                hint = suggestion(name, graph.outputs)
+                problems.append(Problem("RG205", f"pipeline '{graph.name}' has no output '{name}'{hint}"))
+        for tap in taps:
+            node, _, port = tap.rpartition(".")
+            if node not in graph.dag:
+                hint = suggestion(node or tap, list(graph.dag))
+                problems.append(Problem("RG206", f"--tap {tap}: there is no node '{node or tap}'{hint}"))
+            elif Endpoint(node, port) not in graph.textures or graph.textures[Endpoint(node, port)].desc is None:
+                ports = [end.port for end, info in graph.textures.items() if end.node == node and info.desc is not None]
+                problems.append(Problem("RG206", f"--tap {tap}: '{node}' has no texture '{port}'{suggestion(port, ports)}"))
+            else:
+                wanted[tap] = Endpoint(node, port)
+        if problems:
+            raise InputError(problems)
+        return wanted
+
+    def expansion(self, outputs: Sequence[str] | None = None, taps: Iterable[str] = ()) -> Expansion:
+        """All steps with what they read and write."""
+        from rendergraph.expand import expand
+
+        return expand(self.graph, self.wanted(outputs, taps))
+
+    def plan(
+        self,
+        outputs: Sequence[str] | None = None,
+        taps: Iterable[str] = (),
+        *,
+        alias: bool = True,
+        shuffle: int | None = None,
+    ) -> ResourcePlan:
+        """Order and memory, without GL.
+
+        Args:
+            outputs: names of the outputs to keep, all of the file's by default.
+            taps: further ports, `node.port`.
+            alias: let textures share memory.
+            shuffle: seed of a random legal order instead of the best one.
+        """
+        from rendergraph.allocate import allocate
+        from rendergraph.schedule import schedule
+
+        return allocate(schedule(self.expansion(outputs, taps), shuffle=shuffle), alias=alias)
+
+    def check(self, outputs: Sequence[str] | None = None, taps: Iterable[str] = ()) -> Graph:
+        """Everything that can be wrong and be found without GL.
+
+        Raises:
+            InputError: with all mistakes found.
+        """
+        self.plan(outputs, taps)
+        return self.graph
+
+    # Drawing ---------------------------------------------------------------------------------------------------------
+
+    def render(
+        self,
+        size: tuple[int, int] | None = None,
+        *,
+        frames: range | None = None,
+        outputs: Sequence[str] | None = None,
+        taps: Sequence[str] = (),
+        alias: bool = True,
+        poison: bool = False,
+        shuffle: int | None = None,
+        fps: float = 30.0,
+        device: int | None = None,
+        on_frame: Callable[[Frame], None] | None = None,
+        session: Session | None = None,
+    ) -> Frame:
+        """Draw it and return the last frame.
+
+        Args:
+            size: width and height in pixels, the file's by default.
+            frames: frame numbers from 1, `range(1, 2)` by default; frame 1 is time 0.
+            outputs: names of the outputs to compute, all of the file's by default.
+            taps: further ports to read, `node.port`.
+            alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, a random legal order.
+            fps: frames a second.
+            device: GL device number, where no session is given.
+            on_frame: called with each frame.
+            session: where to draw; a private one for this call by default.
+
+        Raises:
+            InputError: a mistake in a file or a shader.
+            RenderError: it failed while drawing.
+            DeviceError: there is no usable GL device.
+        """
+        from rendergraph.session.session import Session
+
+        pipeline = self if size is None else self.with_size(size)
+        options: dict[str, Any] = {
+            "frames": frames, "outputs": outputs, "taps": taps, "alias": alias, "poison": poison, "shuffle": shuffle,
+            "fps": fps, "on_frame": on_frame,
+        }  # fmt: skip
+        if session is not None:
+            return session.render(pipeline, **options)
+        with Session(device=device) as own:
+            return own.render(pipeline, **options)
+
+    def _repr_html_(self) -> str:
+        from rendergraph.views import svg
+
+        return svg(self.graph)

@@ -1,0 +1,240 @@
+"""A session owns a GL context, and shares programs and scenes between pipelines."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from time import perf_counter
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
+from rendergraph.errors import Problem, RenderError
+from rendergraph.execute import FrameTimes, Runner, median_times, summary
+from rendergraph.expand import CAMERA
+from rendergraph.gl.device import Device, borrow_device, open_device
+from rendergraph.images import decode
+from rendergraph.scene import animate, pack
+from rendergraph.scene.cameras import view_matrices
+from rendergraph.scene.model import Scene
+from rendergraph.session.frame import Frame, OutputInfo
+from rendergraph.session.pipeline import Pipeline
+from rendergraph.textures import FORMATS, TextureDesc
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from rendergraph.expand import Expansion
+    from rendergraph.link import Endpoint
+
+
+class Session:
+    """Draws pipelines on one GL context.
+
+    Programs live as long as the session, keyed by source and macros; a scene stays on the GPU until another pipeline
+    asks for a different one; textures belong to the pipeline and size drawn last. A session is bound to the thread
+    that made it.
+    """
+
+    def __init__(self, device: int | None = None, *, ctx: moderngl.Context | None = None) -> None:
+        """Open a context.
+
+        Args:
+            device: EGL device number as `doctor` lists them.
+            ctx: the caller's own current context, borrowed.
+
+        Raises:
+            DeviceError: there is no usable GL device.
+        """
+        self._thread = threading.get_ident()
+        self.device: Device = open_device(device) if ctx is None else borrow_device(ctx)
+        self.programs = ProgramCache(self.device)
+        self._scenes: dict[int, tuple[Scene, GpuScene]] = {}
+        self._last: tuple[tuple[Any, ...], Executable, Runner] | None = None
+        self._expansion: Expansion | None = None
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free everything; the context too, unless it was borrowed."""
+        self._forget_executable()
+        for _, scene in self._scenes.values():
+            scene.release(self.programs)
+        self._scenes.clear()
+        self.programs.release()
+        self.device.release()
+
+    # Drawing ---------------------------------------------------------------------------------------------------------
+
+    def render(
+        self,
+        pipeline: Pipeline,
+        *,
+        frames: range | None = None,
+        outputs: Sequence[str] | None = None,
+        taps: Sequence[str] = (),
+        alias: bool = True,
+        poison: bool = False,
+        shuffle: int | None = None,
+        fps: float = 30.0,
+        on_frame: Callable[[Frame], None] | None = None,
+        warm_up: bool = True,
+    ) -> Frame:
+        """Draw a pipeline and return the last frame; see `Pipeline.render`.
+
+        `warm_up` draws the first frame once more beforehand, unmeasured, and starts history afresh after it.
+        """
+        if threading.get_ident() != self._thread:
+            raise RenderError(Problem("RG605", "a session must be used by the thread that made it; make one a thread"))
+        frames = range(1, 2) if frames is None else frames
+        wanted = pipeline.wanted(outputs, taps)
+        executable, runner = self._prepare(pipeline, outputs, taps, alias, poison, shuffle)
+        size = pipeline.graph.size
+        times: list[FrameTimes] = []
+        if warm_up:
+            self._frame(pipeline, executable, runner, frames[0], fps, size)
+            runner.check()
+            self.device.ctx.finish()
+        runner.reset()
+        frame: Frame | None = None
+        for number in frames:
+            taken = self._frame(pipeline, executable, runner, number, fps, size)
+            assert taken is not None
+            times.append(taken)
+            runner.check()
+            last = number == frames[-1]
+            if last or on_frame is not None:
+                frame = self._collect(pipeline, executable, runner, wanted, number, times)
+                if on_frame is not None:
+                    on_frame(frame)
+        assert frame is not None, "an empty range of frames"
+        return frame
+
+    def _frame(
+        self, pipeline: Pipeline, executable: Executable, runner: Runner, number: int, fps: float, size: tuple[int, int]
+    ) -> FrameTimes | None:
+        time = (number - 1) / fps
+        scene = pipeline.scene
+        if scene.keyframes or scene.orbit:
+            scene = animate.at(scene, time)
+            self._scenes[id(pipeline.scene)][1].update(scene)
+        name = pipeline.camera or next(iter(scene.cameras))
+        camera = view_matrices(scene.cameras[name], size)
+        return runner.run(number, time, 1.0 / fps, scene, camera, timed=True)
+
+    def _prepare(
+        self, pipeline: Pipeline, outputs: Sequence[str] | None, taps: Sequence[str], alias: bool, poison: bool,
+        shuffle: int | None,
+    ) -> tuple[Executable, Runner]:  # fmt: skip
+        """The executable: the last one where only uniforms differ, else a new one."""
+        expansion = pipeline.expansion(outputs, taps)
+        scene = self._scene(pipeline)
+        key = (_structure(expansion), id(pipeline.scene), alias, poison, shuffle)
+        if self._last is not None and self._last[0] == key:
+            _, executable, runner = self._last
+            executable.set_uniforms(expansion.steps)
+            runner = Runner(executable, pipeline.graph)
+            self._last = (key, executable, runner)
+            return executable, runner
+        self._forget_executable()
+        from rendergraph.allocate import allocate
+        from rendergraph.schedule import schedule
+
+        plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
+        types = {node.id: node.type for node in pipeline.graph.nodes}
+        executable = compile_plan(self.device, plan, types, expansion.views, scene, self.programs, poison=poison)
+        runner = Runner(executable, pipeline.graph)
+        self._last = (key, executable, runner)
+        return executable, runner
+
+    def _scene(self, pipeline: Pipeline) -> GpuScene:
+        scene = pipeline.scene
+        if id(scene) not in self._scenes:
+            for _, old in self._scenes.values():
+                old.release(self.programs)
+            self._forget_executable()
+            self._scenes = {id(scene): (scene, GpuScene(self.device, scene, pack.pack(scene), _decode))}
+        return self._scenes[id(scene)][1]
+
+    def _forget_executable(self) -> None:
+        if self._last is not None:
+            self._last[1].release()
+            self._last = None
+
+    # Results ---------------------------------------------------------------------------------------------------------
+
+    def _collect(
+        self, pipeline: Pipeline, executable: Executable, runner: Runner, wanted: Mapping[str, Endpoint], number: int,
+        times: Sequence[FrameTimes],
+    ) -> Frame:  # fmt: skip
+        graph, plan = pipeline.graph, executable.plan
+        resources = plan.schedule.wanted
+        arrays = {name: runner.read(resources[name], number) for name in wanted}
+        infos = {}
+        for name, end in wanted.items():
+            info = graph.textures[end]
+            desc = plan.resources[resources[name]].desc
+            infos[name] = _output_info(name, info.semantic.name, info.semantic.encoding, desc)
+        passes = tuple(
+            {"node": t.node, "type": graph[t.node].type.name, "gpu_ms": t.gpu_ms, "cpu_ms": t.cpu_ms}
+            for t in median_times(times)
+        )
+        return Frame(
+            number=number,
+            pipeline=graph.name,
+            size=graph.size,
+            arrays=arrays,
+            infos=infos,
+            device=self.device.as_json(),
+            passes=passes,
+            frame_ms=summary([t.frame_ms for t in times]),
+            memory=plan.memory.as_json(),
+            culled=dict(plan.schedule.culled),
+            metadata=self._metadata(pipeline),
+        )
+
+    def _metadata(self, pipeline: Pipeline) -> dict[str, str]:
+        from importlib.metadata import version
+
+        names = ("rendergraph", "moderngl", "numpy", "OpenImageIO")
+        return {
+            "rendergraph:pipeline": pipeline.spec.to_yaml(origins=False),
+            "rendergraph:versions": ", ".join(f"{name} {version(name)}" for name in names),
+            "rendergraph:device": f"{self.device.renderer}, OpenGL {self.device.as_json()['version']}",
+        }
+
+
+def _decode(source: Any, srgb: bool) -> Any:
+    return decode(source, srgb=srgb)
+
+
+def _structure(expansion: Expansion) -> tuple[Any, ...]:
+    """An expansion without the values that can change in a compiled pipeline."""
+    steps = tuple(
+        replace(step, uniforms=tuple((name, None) for name, _ in step.uniforms),  # type: ignore[misc]
+                functions=tuple(replace(f, uniforms=()) for f in step.functions))
+        for step in expansion.steps
+    )  # fmt: skip
+    resources = tuple(expansion.resources.values())
+    return steps, resources, tuple(expansion.wanted.items()), tuple(expansion.views.items())
+
+
+def _output_info(name: str, semantic: str, encoding: str | None, desc: object) -> OutputInfo:
+    if not isinstance(desc, TextureDesc):
+        return OutputInfo(name, semantic, "bytes", "buffer", None, ())
+    fmt = FORMATS[desc.format]
+    if fmt.is_depth or semantic in ("depth", "linear_depth", "shadow_map"):
+        channels: tuple[str, ...] = ("Z",)
+    else:
+        channels = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}[fmt.components]
+    return OutputInfo(name, semantic, desc.format, desc.kind, encoding, channels)
+
+
+__all__ = ["CAMERA", "Session", "perf_counter"]
