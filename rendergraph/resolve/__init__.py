@@ -1,0 +1,181 @@
+"""Document to PipelineSpec: `extends`, patches, `--set`, parameters and sub-pipelines applied, every origin kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rendergraph.catalog import Catalog
+from rendergraph.document import Document, Limits, Source, Value
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.read import checked, entries, read, word
+from rendergraph.resolve.files import Files, is_bare
+from rendergraph.resolve.flatten import Flattener, parameters
+from rendergraph.resolve.merge import diff, merge_patch
+from rendergraph.resolve.sets import from_plain, patch_of, settings
+from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, Parameter, PipelineSpec, Scope
+from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.settings import Roots
+
+MOST_SIDE = 16_384
+"""Largest width or height of a picture or texture."""
+
+
+def resolve(
+    source: str | Path | Document,
+    *,
+    catalog: Catalog,
+    patches: Sequence[Path | Mapping[str, Any]] = (),
+    sets: Sequence[str] | Mapping[str, object] = (),
+    scene: str | Path | None = None,
+    size: tuple[int, int] | None = None,
+    asset_roots: Sequence[Path] = (),
+    limits: Limits = Limits(),
+) -> PipelineSpec:
+    """A pipeline with everything applied that decides what it is.
+
+    Args:
+        source: a shipped name, a path, or a document that is already read.
+        catalog: to know which types there are and what they take.
+        patches: merge patches, files or plain data, applied in order.
+        sets: `PATH=VALUE` texts or a mapping of paths to values; together one patch, types first.
+        scene: instead of the file's: a shipped name or a path.
+        size: instead of the file's.
+        asset_roots: further folders that files may be read from.
+        limits: budgets of each YAML file.
+
+    Returns:
+        The spec; mistakes that do not stop the resolving are in its `problems`, for `link` to raise with its own.
+
+    Raises:
+        InputError: a file is missing, is no YAML, or leads back to itself.
+        UsageError: a setting is malformed.
+    """
+    wanted = settings(sets)
+    files = Files(catalog, asset_roots, limits)
+    document = _entry(source, limits)
+    files.own(document)
+    tree = files.chain(document)
+    for patch in patches:
+        tree = files.patched(tree, _patch(patch, files, limits))
+    overrides: dict[str, Value] = {}
+    if scene is not None:
+        overrides["scene"] = Value(str(scene), Source(f"--scene {scene}", Path.cwd() / "--scene"))
+    if size is not None:
+        overrides["size"] = from_plain(list(size), Source(f"--size {size[0]}x{size[1]}"))
+    tree = tree.with_data({**_parts(tree), **overrides})
+    settled, problems = patch_of(tree, [s for s in wanted if not s.scope], files.names_of)
+    files.problems += problems
+    if settled is not None:
+        tree = files.patched(tree, settled)
+    flat = Flattener(files)
+    tree = flat.flatten(tree, "", {}, [s for s in wanted if s.scope])
+    _complete(tree, files)
+    found, roots = _scene(tree, files, scene)
+    tree = _with_scene(tree, found, document)
+    return PipelineSpec(
+        name=document.path.stem if document.path else Path(document.file).stem,
+        path=document.path,
+        description=word(tree, "description") or "",
+        size=_size(tree, files),
+        scene=found,
+        roots=roots,
+        nodes=flat.nodes,
+        outputs=entries(tree, "outputs"),
+        parameters=parameters(tree),
+        scopes=flat.scopes,
+        tree=tree,
+        notes=tuple(files.notes),
+        problems=tuple(files.problems),
+    )
+
+
+def _parts(tree: Value) -> dict[str, Value]:
+    return dict(tree.data) if isinstance(tree.data, dict) else {}
+
+
+def _entry(source: str | Path | Document, limits: Limits) -> Document:
+    if isinstance(source, Document):
+        return checked(source, keep_going=True)
+    if isinstance(source, str) and is_bare(source):
+        shipped = shipped_pipelines()
+        if source not in shipped:
+            hint = suggestion(source, shipped)
+            if (here := next(Path().glob(f"{source}.y*ml"), None)) is not None:
+                hint = f"; the file is named '{here}'"
+            raise InputError(Problem("RG015", f"there is no shipped pipeline '{source}'{hint}"))
+        return read(shipped[source], None, limits, keep_going=True)
+    return read(Path(source), None, limits, keep_going=True)
+
+
+def _patch(patch: Path | Mapping[str, Any], files: Files, limits: Limits) -> Value:
+    if isinstance(patch, Mapping):
+        document = Document(from_plain(patch, source := Source("patch")), source)
+        document = checked(document, keep_going=True, patch=True)
+    else:
+        document = read(Path(patch), None, limits, keep_going=True, patch=True)
+    files.own(document)
+    files.problems += document.problems
+    return document.root
+
+
+def _complete(tree: Value, files: Files) -> None:
+    """Say what a pipeline lacks to be run."""
+    for part, example in (("nodes", "display: {type: tonemap, …}"), ("outputs", "{image: display.color}")):
+        if not entries(tree, part) and not any(problem.code in ("RG101", "RG106") for problem in files.problems):
+            text = f"the pipeline has no {part}; add {part}: {example}"
+            files.problems.append(tree.problem("RG125", text))
+    for name, declared in entries(tree, "inputs").items():
+        optional = declared.get("optional")
+        if not (optional and optional.data):
+            text = f"input '{name}' comes from outside: this file is the type of a node, no pipeline to run"
+            files.problems.append(declared.problem("RG124", text, key=True))
+
+
+def _size(tree: Value, files: Files) -> tuple[int, int]:
+    value = tree.get("size")
+    if value is None or not isinstance(value.data, list):
+        return DEFAULT_SIZE
+    width, height = (int(side.data) for side in value.data)  # type: ignore[arg-type]  # read() saw two whole numbers
+    if min(width, height) < 1 or max(width, height) > MOST_SIDE:
+        text = f"the size is {width}×{height}, width and height go from 1 to {MOST_SIDE}"
+        files.problems.append(value.problem("RG207", text))
+        return DEFAULT_SIZE
+    return width, height
+
+
+def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | None, Roots]:
+    value = tree.get("scene")
+    if value is None or value.data is None:
+        return None, files.roots_of(tree)
+    if typed is not None and not is_bare(str(value.data)):
+        # Named by the user, so the file itself is beyond question; what it refers to is not.
+        path = Path(typed)
+        roots = Roots.around(path, files.asset_roots)
+        found: tuple[Path, Roots] | None = (path, roots)
+        resolved = Roots((*roots.folders, path.resolve().parent)).mistake(path, str(typed))
+        if resolved:
+            files.problems.append(value.problem(*resolved))
+            found = None
+    else:
+        found = files.locate(value, shipped_scenes(), "scene")
+    return found or (None, files.roots_of(value))
+
+
+def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
+    """The scene as the resolved file has to name it: relative to where that file stands, if it lies there."""
+    value = tree.get("scene")
+    if value is None or found is None or is_bare(str(value.data)):
+        return tree
+    home = (document.path.parent if document.path else Path()).resolve()
+    path = found.resolve()
+    text = os.path.relpath(path, home) if path.is_relative_to(home) else str(path)
+    text = text if not is_bare(text) else f"./{text}"
+    return tree.with_data({**_parts(tree), "scene": value.with_data(text)})
+
+
+__all__ = [
+    "DEFAULT_SIZE", "MOST_SIDE", "NodeSpec", "Parameter", "PipelineSpec", "Scope", "diff", "merge_patch", "resolve",
+]  # fmt: skip

@@ -1,0 +1,190 @@
+"""The files a pipeline is made of: what `extends` and `type` lead to, inside the roots."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from rendergraph.catalog import Catalog
+from rendergraph.document import Document, Limits, Source, Value, shown
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.read import checked, entries, read, word
+from rendergraph.resolve.merge import TypeNames, merge_pipeline
+from rendergraph.resources import shipped_pipelines
+from rendergraph.settings import Roots
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
+
+
+def is_bare(text: str) -> bool:
+    """Whether a word names something shipped or installed, rather than a path."""
+    return bool(_BARE.match(text))
+
+
+class Files:
+    """Reads and merges files, each once; collects what is wrong with them."""
+
+    def __init__(self, catalog: Catalog, asset_roots: Sequence[Path], limits: Limits) -> None:
+        self.catalog = catalog
+        self.asset_roots = [Path(root) for root in asset_roots]
+        self.limits = limits
+        self.problems: list[Problem] = []
+        self.notes: list[Problem] = []
+        self.sources: list[Source] = []
+        self._roots: dict[Source, Roots] = {}
+        self._open: list[Path] = []
+        self._trees: dict[Path, Value | None] = {}
+        self._names: dict[str, TypeNames | None] = {}
+
+    # Roots and paths ------------------------------------------------------------------------------------------------
+
+    def roots_of(self, value: Value) -> Roots:
+        """Where the file a value stands in may read from."""
+        return self._roots.get(value.source) or Roots.around(Path("x"), self.asset_roots)
+
+    def own(self, document: Document, roots: Roots | None = None) -> None:
+        """Remember where a file may read from; its own surroundings where it was named by the user."""
+        around = document.path or Path("x")
+        self._roots[document.source] = roots or Roots.around(around, self.asset_roots)
+        self.sources.append(document.source)
+
+    def beside(self, value: Value) -> Path:
+        """A path that a file's value holds, joined to the file's folder."""
+        path = value.source.path
+        return Path(os.path.normpath((path.parent if path else Path()) / str(value.data)))
+
+    def locate(self, value: Value, shipped: dict[str, Path], what: str) -> tuple[Path, Roots] | None:
+        """The file a value names and where it may read from; None and a problem where it names none."""
+        text = str(value.data)
+        if is_bare(text):
+            if text in shipped:
+                return shipped[text], Roots((shipped[text].parent.resolve(),))
+            hint = suggestion(text, shipped)
+            if next(self.beside(value).parent.glob(f"{text}.*"), None):
+                hint = "; a file beside this one is named with its extension"
+            self.problems.append(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
+            return None
+        roots = self.roots_of(value)
+        mistake = roots.mistake(path := self.beside(value), text)
+        if mistake:
+            self.problems.append(value.problem(*mistake))
+            return None
+        return path, roots
+
+    # Merging --------------------------------------------------------------------------------------------------------
+
+    def chain(self, document: Document) -> Value:
+        """A file on top of everything it extends.
+
+        Raises:
+            InputError: a file below is missing or no YAML, or extends itself.
+        """
+        self.problems += document.problems
+        base = document.root.get("extends")
+        root = document.root.with_data({key: v for key, v in entries(document.root).items() if key != "extends"})
+        if base is None or base.data is None:
+            return root
+        found = self.locate(base, shipped_pipelines(), "pipeline")
+        if found is None:
+            raise InputError(self.problems)
+        path, roots = found
+        key = path.resolve()
+        here = document.path.resolve() if document.path else Path()
+        if key in self._open or key == here:
+            names = " → ".join(file.name for file in (*self._open, here, key))
+            raise InputError([*self.problems, base.problem("RG118", f"the file extends itself: {names}")])
+        self._open.append(here)
+        try:
+            below = self._read(path, roots, base)
+            target = self.chain(below)
+        finally:
+            self._open.pop()
+        merged, notes = merge_pipeline(target, root, self.names_of)
+        self.notes += notes
+        return merged
+
+    def patched(self, tree: Value, patch: Value) -> Value:
+        """A tree with a patch applied, as `merge_pipeline` does it."""
+        merged, notes = merge_pipeline(tree, patch, self.names_of)
+        self.notes += notes
+        return merged
+
+    def _read(self, path: Path, roots: Roots, value: Value) -> Document:
+        try:
+            document = read(path, None, self.limits, keep_going=True)
+        except InputError as error:
+            problems = [p if p.place else value.problem(p.code, p.text) for p in error.problems]
+            raise InputError([*self.problems, *problems]) from None
+        self.own(document, roots)
+        return document
+
+    # Types ----------------------------------------------------------------------------------------------------------
+
+    def sub_pipeline(self, value: Value) -> Value | None:
+        """The merged file that a node's `type` names, None where it names a node type or nothing that exists."""
+        if isinstance(value.data, dict):
+            return self._inline(value)
+        text = str(value.data)
+        if is_bare(text) and (text in self.catalog or text not in shipped_pipelines()):
+            return None
+        before = len(self.problems)
+        found = self.locate(value, shipped_pipelines(), "pipeline")
+        if found is None:
+            del self.problems[before:]
+            return None
+        path, roots = found
+        key = path.resolve()
+        if key not in self._trees:
+            self._trees[key] = None  # while it is being read, it does not know its own names
+            try:
+                self._trees[key] = self.chain(self._read(path, roots, value))
+            except InputError as error:
+                self.problems = list(error.problems)
+        return self._trees[key]
+
+    def _inline(self, value: Value) -> Value:
+        if word(value, "extends") is None:
+            return value
+        return self.chain(checked(Document(value, value.source), keep_going=True))
+
+    def path_of(self, value: Value) -> Path | None:
+        """The sub-pipeline's file, to see whether it contains itself."""
+        if not isinstance(value.data, str):
+            return None
+        text = value.data
+        return (shipped_pipelines()[text] if is_bare(text) else self.beside(value)).resolve()
+
+    def names_of(self, value: Value) -> TypeNames | None:
+        """What a type takes, None where there is no such type."""
+        sub = self.sub_pipeline(value)
+        if sub is not None:
+            return TypeNames(frozenset(entries(sub, "parameters")), frozenset(entries(sub, "inputs")), {})
+        text = str(value.data)
+        if text not in self._names:
+            self._names[text] = self._node_names(text)
+        return self._names[text]
+
+    def _node_names(self, text: str) -> TypeNames | None:
+        if text not in self.catalog:
+            return None
+        try:
+            cls = self.catalog.get(text).cls
+        except InputError:
+            return None  # `link` says what is wrong with it
+        groups = cls.groups()
+        return TypeNames(frozenset(cls.parameters()), frozenset(cls.inputs()) | frozenset(groups), groups)
+
+    def missing(self, value: Value) -> Problem | None:
+        """What is wrong with a `type` that is a path and leads to no sub-pipeline."""
+        text = str(value.data)
+        if is_bare(text):
+            return None
+        mistake = self.roots_of(value).mistake(self.beside(value), text)
+        return value.problem(*mistake) if mistake else None
+
+
+def display(text: object) -> str:
+    """A type's name for messages: a sub-pipeline written in place has none."""
+    return shown(text) if isinstance(text, str) else "sub-pipeline"

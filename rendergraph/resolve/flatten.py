@@ -1,0 +1,223 @@
+"""Sub-pipelines unfolded and `$parameters` replaced: from a merged tree to plain nodes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rendergraph.document import Value, shown
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.read import entries, word
+from rendergraph.resolve.files import Files, display
+from rendergraph.resolve.sets import Setting, patch_of
+from rendergraph.resolve.spec import NodeSpec, Parameter, Scope
+
+MOST_NODES = 10_000
+MOST_NESTED = 32
+_REFERENCE = re.compile(r"\$([A-Za-z_][A-Za-z0-9_-]*)\Z")
+
+
+class Flattener:
+    """Collects nodes and scopes of a tree and of everything nested in it."""
+
+    def __init__(self, files: Files) -> None:
+        self.files = files
+        self.nodes: dict[str, NodeSpec] = {}
+        self.scopes: dict[str, Scope] = {}
+        self._open: list[Path] = []
+
+    def flatten(self, tree: Value, scope: str, given: Mapping[str, Value], sets: Sequence[Setting]) -> Value:
+        """Add the nodes of one level; gives the tree back with its sub-pipelines in place of their names.
+
+        Args:
+            tree: a merged file.
+            scope: empty, or the id of the node whose type it is, with a slash.
+            given: parameter values from outside.
+            sets: assignments into sub-pipelines below.
+        """
+        declared = entries(tree, "parameters")
+        values = {name: self._parameter(name, value, given.get(name)) for name, value in declared.items()}
+        used: set[str] = set()
+        nodes: dict[str, Value] = {}
+        inner: dict[str, list[Setting]] = {}
+        for setting in sets:
+            inner.setdefault(setting.scope[0], []).append(setting)
+        for name, node in entries(tree, "nodes").items():
+            nodes[name] = self._node(name, node, scope, values, used, inner.pop(name, []))
+        for name, lost in inner.items():
+            for setting in lost:
+                text = f"there is no sub-pipeline '{scope}{name}'{suggestion(name, nodes)}"
+                self.files.problems.append(setting.problem("RG109", text))
+        for name, value in declared.items():
+            if name not in used:
+                self._warn(value.problem("RG151", f"the parameter '{name}' is used nowhere", key=True))
+        top = dict(tree.data) if isinstance(tree.data, dict) else {}
+        if "nodes" in top:
+            top["nodes"] = top["nodes"].with_data(nodes)
+        return tree.with_data(top)
+
+    def _warn(self, problem: Problem) -> None:
+        self.files.notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
+
+    def _node(
+        self, name: str, node: Value, scope: str, values: Mapping[str, Value | None], used: set[str],
+        sets: Sequence[Setting],
+    ) -> Value:  # fmt: skip
+        node_id = f"{scope}{name}"
+        params: dict[str, Value] = {}
+        for key, value in entries(node, "params").items():
+            replaced = self._replaced(value, values, used)
+            if replaced is not None and replaced.data is not None:
+                params[key] = replaced
+        given = node.get("inputs")
+        inputs: dict[str, Value] = dict(given.items()) if given is not None else {}
+        node_type = node.get("type")
+        sub = self.files.sub_pipeline(node_type) if node_type is not None and node_type.data is not None else None
+        if sub is None or node_type is None:
+            if sets:
+                text = f"node '{node_id}' is no sub-pipeline; there is nothing inside it to set"
+                self.files.problems += [setting.problem("RG109", text) for setting in sets]
+            problem = self.files.missing(node_type) if node_type is not None and node_type.data is not None else None
+            if problem:
+                self.files.problems.append(problem)
+            self._add(NodeSpec(node_id, "" if problem else word(node, "type") or "", scope, inputs, params, node))
+            if node_type is None or node_type.data is None:
+                self._without_type(name, node)
+            return node
+        return self._composite(name, node, node_type, sub, scope, params, inputs, sets)
+
+    def _composite(
+        self, name: str, node: Value, node_type: Value, sub: Value, scope: str, params: Mapping[str, Value],
+        inputs: dict[str, Value], sets: Sequence[Setting],
+    ) -> Value:  # fmt: skip
+        inside = f"{scope}{name}/"
+        path = self.files.path_of(node_type)
+        if path in self._open or len(self._open) >= MOST_NESTED:
+            text = f"the sub-pipeline '{display(node_type.data)}' contains itself"
+            self.files.problems.append(node_type.problem("RG123", text))
+            return node
+        sub = self._set_inside(sub, sets)
+        declared_inputs, parameters = entries(sub, "inputs"), entries(sub, "parameters")
+        for key, value in params.items():
+            if key not in parameters:
+                text = f"sub-pipeline '{display(node_type.data)}' has no param '{key}'{suggestion(key, parameters)}"
+                self.files.problems.append(value.problem("RG103", text, key=True))
+        for key, link in inputs.items():
+            if key not in declared_inputs:
+                text = (
+                    f"sub-pipeline '{display(node_type.data)}' has no input '{key}'{suggestion(key, declared_inputs)}"
+                )
+                self.files.problems.append(link.problem("RG111", text, key=True))
+        for key, declared in declared_inputs.items():
+            optional = declared.get("optional")
+            if (key not in inputs or inputs[key].data is None) and not (optional and optional.data):
+                text = f"input '{key}' of node '{scope}{name}' is not connected; link it to a node's port"
+                self.files.problems.append(node.problem("RG114", text, key=True))
+        self.scopes[inside] = Scope(scope, declared_inputs, inputs, entries(sub, "outputs"), node)
+        self._open.append(path or Path())
+        if path is None:
+            self._open[-1] = Path(f"/{len(self._open)}")  # written in place: it has no file to contain
+        deeper = [
+            Setting(setting.scope[1:], setting.node, setting.name, setting.value, setting.text)
+            for setting in sets
+            if len(setting.scope) > 1
+        ]
+        whole = self.flatten(sub, inside, params, deeper)
+        self._open.pop()
+        parts = dict(node.data) if isinstance(node.data, dict) else {}
+        return node.with_data({**parts, "type": node_type.with_data(whole.data)})
+
+    def _set_inside(self, sub: Value, sets: Sequence[Setting]) -> Value:
+        here = [setting for setting in sets if len(setting.scope) == 1]
+        patch, problems = patch_of(sub, here, self.files.names_of)
+        self.files.problems += problems
+        return self.files.patched(sub, patch) if patch is not None else sub
+
+    def _add(self, node: NodeSpec) -> None:
+        if len(self.nodes) >= MOST_NODES:
+            text = f"the pipeline has more than {MOST_NODES:,} nodes, sub-pipelines unfolded"
+            raise InputError([*self.files.problems, node.value.problem("RG018", text, key=True)])
+        self.nodes[node.id] = node
+
+    def _without_type(self, name: str, node: Value) -> None:
+        others = [other.id for other in self.nodes.values() if other.type]
+        hint = suggestion(name, others, most=0) or "; add `type:`"
+        self.files.problems.append(node.problem("RG108", f"node '{name}' has no type{hint}", key=True))
+
+    # Parameters -----------------------------------------------------------------------------------------------------
+
+    def _parameter(self, name: str, declared: Value, given: Value | None) -> Value | None:
+        """A parameter's value, checked; None where it is wrong."""
+        value = given if given is not None else declared.get("default")
+        if value is None or value.data is None:
+            text = f"the parameter '{name}' has no default; write {name}: {{default: VALUE}}"
+            self.files.problems.append(declared.problem("RG121", text, key=True))
+            return None
+        low, high = _number(declared, "min"), _number(declared, "max")
+        if low is not None and high is not None and low > high:
+            text = f"the parameter '{name}' has a min of {low:g} above its max of {high:g}"
+            self.files.problems.append(declared.problem("RG121", text, key=True))
+            return None
+        for part in value.data if isinstance(value.data, list) else [value]:
+            number = part.data
+            if low is None and high is None:
+                continue
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                text = f"the parameter '{name}' takes a number, this is {part.kind}"
+            elif not (low is None or number >= low) or not (high is None or number <= high):
+                text = f"the parameter '{name}' takes {_range(low, high)}, this is {shown(number)}"
+            else:
+                continue
+            self.files.problems.append(value.problem("RG122", text))
+            return None
+        return value
+
+    def _replaced(self, value: Value, values: Mapping[str, Value | None], used: set[str]) -> Value | None:
+        """A value with `$name` replaced; None where a name is unknown or its parameter is wrong."""
+        data = value.data
+        if isinstance(data, str) and data.startswith("$"):
+            match = _REFERENCE.match(data)
+            if data.startswith("$$"):
+                return value.with_data(data[1:])
+            if match is None:
+                return value
+            used.add(match[1])
+            if match[1] not in values:
+                text = f"the pipeline has no parameter '{match[1]}'{suggestion(match[1], values)}; '$$' writes a dollar"
+                self.files.problems.append(value.problem("RG119", text))
+                return None
+            found = values[match[1]]
+            return None if found is None else value.with_data(found.data)
+        if isinstance(data, list):
+            parts = [self._replaced(part, values, used) for part in data]
+            return None if None in parts else value.with_data([part for part in parts if part is not None])
+        if isinstance(data, dict):
+            table = {key: self._replaced(part, values, used) for key, part in data.items()}
+            kept = {key: part for key, part in table.items() if part is not None}
+            return None if len(kept) < len(table) else value.with_data(kept)
+        return value
+
+
+def parameters(tree: Value) -> dict[str, Parameter]:
+    """The declared parameters with their values as they are now."""
+    found = {}
+    for name, declared in entries(tree, "parameters").items():
+        value = declared.get("default")
+        if value is not None:
+            low, high = _number(declared, "min"), _number(declared, "max")
+            doc = word(declared, "doc") or ""
+            found[name] = Parameter(name, value.plain(), declared.key_place, low, high, doc)
+    return found
+
+
+def _number(declared: Value, key: str) -> float | None:
+    value = declared.get(key)
+    data = value.data if value is not None else None
+    return data if isinstance(data, int | float) else None
+
+
+def _range(low: float | None, high: float | None) -> str:
+    if low is None:
+        return f"at most {high:g}"
+    return f"at least {low:g}" if high is None else f"{low:g} to {high:g}"

@@ -1,0 +1,140 @@
+"""What a pipeline is after resolving: plain nodes with every value's origin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rendergraph.document import Value
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.settings import Roots
+
+DEFAULT_SIZE = (1280, 720)
+"""Width and height where nothing says otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeSpec:
+    """One node, sub-pipelines unfolded.
+
+    Attributes:
+        id: key in the file; inside a sub-pipeline `glow/blur`.
+        type: name of its type, empty where the file gives none.
+        scope: id of the sub-pipeline it stands in with a slash behind, empty outside of any.
+        inputs: links by input or group name; a null says that nothing is connected.
+        params: values by parameter name, `$name` replaced, nulls left out.
+        value: the node in the file.
+    """
+
+    id: str
+    type: str
+    scope: str
+    inputs: Mapping[str, Value]
+    params: Mapping[str, Value]
+    value: Value
+
+    @property
+    def place(self) -> Place:
+        """Where the node's id stands."""
+        return self.value.key_place
+
+
+@dataclass(frozen=True, eq=False)
+class Scope:
+    """A sub-pipeline in its place.
+
+    Attributes:
+        parent: the scope its node stands in.
+        inputs: its declared inputs.
+        links: what the node connects to them; refers to the parent scope.
+        outputs: its outputs; refers to nodes inside.
+        value: the node whose type it is.
+    """
+
+    parent: str
+    inputs: Mapping[str, Value]
+    links: Mapping[str, Value]
+    outputs: Mapping[str, Value]
+    value: Value
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A knob of the whole pipeline."""
+
+    name: str
+    value: Any
+    place: Place
+    min: float | None = None
+    max: float | None = None
+    doc: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PipelineSpec:
+    """A pipeline with `extends`, patches, settings, parameters and sub-pipelines applied.
+
+    Attributes:
+        name: the file's stem.
+        path: the file, None for text.
+        description: from the file.
+        size: width and height.
+        scene: the scene's file, None where none is named.
+        roots: where the scene may read from; `roots.check(path, place)`.
+        nodes: by id, in the file's order.
+        outputs: links by output name.
+        parameters: by name.
+        scopes: sub-pipelines by scope (`glow/`).
+        tree: the resolved file, sub-pipelines in place of their names; prints as `to_yaml`.
+        notes: warnings: what was dropped, what is unused.
+        problems: mistakes found so far. `link` raises them together with its own, so that a user sees all at once.
+    """
+
+    name: str
+    path: Path | None
+    description: str
+    size: tuple[int, int]
+    scene: Path | None
+    roots: Roots
+    nodes: Mapping[str, NodeSpec]
+    outputs: Mapping[str, Value]
+    parameters: Mapping[str, Parameter]
+    scopes: Mapping[str, Scope]
+    tree: Value = field(repr=False)
+    notes: tuple[Problem, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+    def check(self) -> None:
+        """Stop here if anything is wrong so far; for callers that do not go on to `link`.
+
+        Raises:
+            InputError: with all mistakes found while resolving.
+        """
+        if self.problems:
+            raise InputError(self.problems)
+
+    def plain(self) -> dict[str, Any]:
+        """The resolved file as plain data.
+
+        Raises:
+            InputError: something is wrong with it.
+        """
+        self.check()
+        data: dict[str, Any] = self.tree.plain()
+        return data
+
+    def to_yaml(self, origins: bool = False) -> str:
+        """The resolved file, which reads back to the same spec.
+
+        Args:
+            origins: say behind every value where it comes from.
+
+        Raises:
+            InputError: something is wrong with it.
+        """
+        from rendergraph.resolve.write import to_yaml
+
+        self.check()
+        return to_yaml(self.tree, origins)
