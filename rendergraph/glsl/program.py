@@ -128,6 +128,8 @@ def _stage(
     for signature in wanted.values():
         if calls(called, signature.name):
             functions += _functions(stage, signature, step, types, resources, views, includes)
+        if mentions(called, f"{signature.name.upper()}_LIGHT_COUNT"):
+            functions += generated(_light_table(signature, step, types[step.node], resources))
     source = includes.expand(file, root=root)
     extensions, source = _hoisted(source)
     body = functions.text + source.text
@@ -188,29 +190,31 @@ def _functions(
     """The providers' texts with prefixed names, and the one function that joins them."""
     text = SourceText()
     factors: list[str] = []
-    known: dict[int, None] = {}
     arguments = ", ".join(signature.arguments)
     for binding in step.functions:
         if binding.signature != signature.name:
             continue
         text += provider_text(binding, types[binding.node], resources, views, includes)
         factors.append(f"result = result {signature.combine} {prefix(binding.node)}{signature.name}({arguments});")
-        known |= dict.fromkeys(light for read in binding.reads for light in _lights(read, resources))
-    screen = _screen_reads(signature, step, types[step.node])
-    known |= dict.fromkeys(light for read in screen for light in _lights(read, resources))
     lines: list[str] = []
     if stage == "fragment":
-        lines += [f"uniform sampler2DArray {read.name};" for read in screen]
-        for read in screen:
+        for read in _screen_reads(signature, step, types[step.node]):
+            lines.append(f"uniform sampler2DArray {read.name};")
             factors += _screen_factors(read, _lights(read, resources), signature)
     kind = signature.declaration.split()[0]
-    lines += [f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"] if signature.texture else []
-    if known and signature.texture:
-        table = ", ".join(str(light) for light in known)
-        lines.append(f"const int {signature.name}_lights[{len(known)}] = int[]({table});")
     lines += [f"{signature.declaration} {{", f"    {kind} result = {signature.neutral};"]
     lines += [f"    {factor}" for factor in factors]
     return text + generated([*lines, "    return result;", "}"])
+
+
+def _light_table(signature: Signature, step: Step, node: NodeType, resources: Mapping[str, Resource]) -> Iterator[str]:
+    """The lights that some provider or texture of the function knows, for shaders that treat those apart."""
+    reads = [read for binding in step.functions if binding.signature == signature.name for read in binding.reads]
+    reads += _screen_reads(signature, step, node)
+    known = list(dict.fromkeys(light for read in reads for light in _lights(read, resources)))
+    yield f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"
+    if known:
+        yield f"const int {signature.name}_lights[{len(known)}] = int[]({', '.join(str(light) for light in known)});"
 
 
 def _lights(read: Read, resources: Mapping[str, Resource]) -> tuple[int, ...]:

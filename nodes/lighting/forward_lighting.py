@@ -1,0 +1,87 @@
+"""Lighting while the geometry is drawn."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from rendergraph.api import (
+    PREMULTIPLIED,
+    Depth,
+    Input,
+    Node,
+    Occlusion,
+    Output,
+    Radiance,
+    SceneRef,
+    ShadowLookup,
+    State,
+    Steps,
+    View,
+    Visibility,
+    define,
+    param,
+    structural,
+)  # fmt: skip
+
+Color = float | tuple[float, float, float]
+
+
+class ForwardLighting(Node):
+    """Radiance of the scene under all its lights, in one pass over the geometry.
+
+    Opaque surfaces first, front to back, then those with alpha blending, back to front. Shadows come as functions
+    looked up in place (`lookup`) or as pictures (`visibility`); all that are connected are multiplied. With `depth` of a
+    pre-pass no hidden fragment is shaded.
+
+    `evaluate` says how often light is computed: at every fragment (Phong 1975), at every vertex with colours
+    interpolated (Gouraud 1971), or once a face with the face's normal (flat). Textures and shadows stay per fragment.
+    """
+
+    view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
+    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
+    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
+    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
+    visibility = Input(
+        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
+    )
+    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
+    radiance = Output(
+        Radiance, format="rgba16f", clear=lambda node: (*node.background_rgb, 0.0),
+        doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",
+    )  # fmt: skip
+    surface_depth = Output(
+        Depth, format="depth32f", clear=1.0, doc="Depth of the nearest opaque surface, where no pre-pass is connected."
+    )
+
+    shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] = define(
+        default="pbr", doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model."
+    )
+    evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often light is computed.")
+    smith: Literal["exact", "fast"] = define(default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots.")
+    terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
+        default="all", doc="One term alone, to look at; the four sum to the whole."
+    )
+    ambient: Color = param(default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB.")
+    background: Color = structural(default=0.0, min=0, doc="Radiance where nothing is, a number or RGB.")
+
+    @property
+    def background_rgb(self) -> tuple[float, float, float]:
+        """The background as RGB."""
+        return self.background if isinstance(self.background, tuple) else (self.background,) * 3
+
+    def record(self, steps: Steps) -> None:
+        """One pass over what is opaque, one over what is blended."""
+        stages = {
+            "fragment": {"fragment": "forward_lighting.frag"},
+            "vertex": {"fragment": "forward_interpolated.frag", "vertex": "forward_lighting.vert"},
+            "face": {
+                "fragment": "forward_interpolated.frag", "vertex": "forward_face.vert", "geometry": "forward_lighting.geom",
+            },
+        }[self.evaluate]  # fmt: skip
+        prepass = steps.connected(self.depth)
+        out = {"radiance": self.radiance} | ({} if prepass else {"surface_depth": self.surface_depth})
+        steps.geometry(out=out, objects="opaque", **stages)
+        steps.geometry(
+            out=out, objects="transparent", order="back_to_front",
+            state=State(blend=PREMULTIPLIED, depth_write=False), **stages,
+        )  # fmt: skip

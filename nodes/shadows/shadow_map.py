@@ -1,0 +1,57 @@
+"""Depth as lights see it."""
+
+from __future__ import annotations
+
+from rendergraph.api import Facts, Frame, Input, Node, Output, SceneRef, ShadowMap, State, Steps, Views, structural
+
+from ._light_views import layer_lights, light_views
+
+
+def _lights(node: ShadowMapNode, facts: Facts) -> tuple[int, ...]:
+    return layer_lights(node.light, facts.lights)
+
+
+def _layers(node: ShadowMapNode, facts: Facts) -> int:
+    return len(_lights(node, facts))
+
+
+class ShadowMapNode(Node):
+    """Depth seen from lights: what every shadow-map technique starts from.
+
+    A directional light's layer is fitted to what the camera can see of the scene, and reaches back to everything that
+    may cast into it; a spot light's is its cone; a point light has six layers, the faces of a cube. The layers stand in
+    the scene's order of lights.
+    """
+
+    scene = Input(SceneRef, kind="scene", optional=True, doc="What casts; the pipeline's scene by default.")
+    views = Views(count=_layers, lights=_lights, doc="The lights' views, one a layer.")
+    shadow_map = Output(
+        ShadowMap, kind="texture2d_array", format="depth32f", layers=_layers, lights=_lights, view="views", clear=1.0,
+        size=lambda node, facts: (node.resolution, node.resolution), doc="Window depth from each light, 1 where nothing is.",
+    )  # fmt: skip
+
+    light: str | tuple[str, ...] = structural(
+        default="auto", doc="Lights that cast: names, or `auto` for the first directional, else the first spot light."
+    )
+    resolution: int = structural(default=2048, unit="texels", min=1, max=16384, doc="Side of each layer.")
+    slope_bias: float = structural(
+        default=0.0,
+        min=0,
+        max=64,
+        doc="Polygon offset by slope while drawing, in texels; readers have their own offset.",
+    )
+
+    def record(self, steps: Steps) -> None:
+        """One pass a layer over what casts; back faces of single-sided materials are left out."""
+        offset = (self.slope_bias, 0.0) if self.slope_bias else None
+        for layer in range(_layers(self, steps.facts)):
+            steps.geometry(
+                "<depth.frag>", vertex="<depth.vert>", out=self.shadow_map.layer(layer), objects="casters", materials="alpha",
+                view=self.views, view_index=layer, state=State(polygon_offset=offset),
+            )  # fmt: skip
+
+    def update(self, frame: Frame) -> None:
+        """Fit the views to where the lights and the camera are now."""
+        lights = frame.scene.lights
+        table = layer_lights(self.light, lights)
+        frame.set_views(self.views, light_views(table, lights, frame.camera, frame.scene.bounds, self.resolution))

@@ -1,0 +1,21 @@
+// Base colour and alpha of a fragment: factor, texture, vertex colour.
+#include <materials.glsl>
+#include <texture_coordinates.glsl>
+
+#ifdef HAS_VERTEX_COLOR
+in vec4 v_color;
+#endif
+#ifdef HAS_BASE_COLOR_TEXTURE
+uniform sampler2D base_color_texture;
+#endif
+
+vec4 base_color_at(int material) {
+    vec4 color = materials[MATERIAL_INDEX(material)].base_color;
+#ifdef HAS_BASE_COLOR_TEXTURE
+    color *= texture(base_color_texture, slot_uv(material, BASE_COLOR_SLOT, UV_SET(BASE_COLOR_UV)));
+#endif
+#ifdef HAS_VERTEX_COLOR
+    color *= v_color;
+#endif
+    return color;
+}

@@ -1,0 +1,40 @@
+// Microfacet terms. GGX: Walter et al. 2007; height-correlated Smith visibility: Heitz 2014; Fresnel: Schlick 1994.
+const float PI = 3.14159265358979;
+
+float distribution_ggx(float n_h, float alpha) {
+    float a2 = alpha * alpha;
+    float d = (n_h * a2 - n_h) * n_h + 1.0;
+    return a2 / (PI * d * d);
+}
+
+// Masking and shadowing over 4 N.L N.V.
+float visibility_smith(float n_l, float n_v, float alpha) {
+    float a2 = alpha * alpha;
+    float from_viewer = n_l * sqrt(n_v * n_v * (1.0 - a2) + a2);
+    float from_light = n_v * sqrt(n_l * n_l * (1.0 - a2) + a2);
+    return 0.5 / (from_viewer + from_light);
+}
+
+// The same with the roots replaced by a straight line (Hammon 2017): up to 15 % off at grazing angles.
+float visibility_smith_fast(float n_l, float n_v, float alpha) {
+    return 0.5 / mix(2.0 * n_l * n_v, n_l + n_v, alpha);
+}
+
+vec3 fresnel_schlick(vec3 f0, float f90, float v_h) {
+    float x = 1.0 - v_h;
+    float x2 = x * x;
+    return f0 + (f90 - f0) * (x2 * x2 * x);
+}
+
+// Anisotropic GGX as KHR_materials_anisotropy has it (Burley 2012, Heitz 2014).
+float distribution_ggx_anisotropic(float n_h, float t_h, float b_h, float alpha_t, float alpha_b) {
+    float a2 = alpha_t * alpha_b;
+    vec3 f = vec3(alpha_b * t_h, alpha_t * b_h, a2 * n_h);
+    float w2 = a2 / dot(f, f);
+    return a2 * w2 * w2 / PI;
+}
+
+float visibility_smith_anisotropic(vec3 light, vec3 viewer, float alpha_t, float alpha_b) {
+    vec3 alpha = vec3(alpha_t, alpha_b, 1.0);  // directions are (along the tangent, along the bitangent, along the normal)
+    return 0.5 / (light.z * length(alpha * viewer) + viewer.z * length(alpha * light));
+}

@@ -1,0 +1,6 @@
+// The scene's vertices in world and clip space, with what materials need.
+#include <geometry_vertex.glsl>
+
+void main() {
+    pass_vertex_on();
+}

@@ -1,0 +1,60 @@
+// Materials as the scene packs them, with their textures; texture coordinates are the vertex shader's varyings.
+struct MaterialData {
+    vec4 base_color;
+    vec4 emissive;        // rgb; w = alpha cutoff
+    vec4 surface;         // metallic, roughness, occlusion strength, normal scale
+    vec4 specular;        // rgb = specular colour; w = specular factor
+    vec4 extra;           // dielectric f0, anisotropy strength, anisotropy rotation, 0
+    vec4 phong_diffuse;   // rgb = kd; w = the exponent n of `phong`
+    vec4 phong_specular;  // rgb = ks
+    vec4 phong_ambient;   // rgb = ka
+};
+
+#ifdef MATERIAL_STORAGE
+layout(std430) readonly buffer material_block {
+    MaterialData materials[];
+};
+#else
+layout(std140) uniform material_block {
+    MaterialData materials[MATERIAL_COUNT];
+};
+#endif
+
+#ifdef HAS_UV_TRANSFORM  // 8 slots a material, two rows each: u' = a u + b v + c
+#ifdef MATERIAL_UV_STORAGE
+layout(std430) readonly buffer material_uv_block {
+    vec4 material_uvs[];
+};
+#else
+layout(std140) uniform material_uv_block {
+    vec4 material_uvs[MATERIAL_COUNT * 16];
+};
+#endif
+#endif
+
+const int BASE_COLOR_SLOT = 0;
+const int METALLIC_ROUGHNESS_SLOT = 1;
+const int NORMAL_SLOT = 2;
+const int OCCLUSION_SLOT = 3;
+const int EMISSIVE_SLOT = 4;
+const int ANISOTROPY_SLOT = 5;
+const int SPECULAR_SLOT = 6;
+const int SPECULAR_COLOR_SLOT = 7;
+
+// With one material its index is a constant, and the block is read once a draw.
+#if MATERIAL_COUNT == 1
+#define MATERIAL_INDEX(index) 0
+#else
+#define MATERIAL_INDEX(index) (index)
+#endif
+
+// Texture coordinates of a slot, with its KHR_texture_transform where the batch has any.
+vec2 slot_uv(int material, int slot, vec2 uv) {
+#ifdef HAS_UV_TRANSFORM
+    vec4 u = material_uvs[MATERIAL_INDEX(material) * 16 + slot * 2];
+    vec4 v = material_uvs[MATERIAL_INDEX(material) * 16 + slot * 2 + 1];
+    return vec2(dot(u.xy, uv) + u.z, dot(v.xy, uv) + v.z);
+#else
+    return uv;
+#endif
+}

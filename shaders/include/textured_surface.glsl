@@ -1,0 +1,142 @@
+// The surface under a fragment of the scene's geometry: varyings, material factors, textures.
+#include <base_color.glsl>
+#include <surface.glsl>
+
+in vec3 v_position;
+in vec3 v_normal;
+flat in int v_material;
+
+#if defined(HAS_NORMAL_TEXTURE) || SHADING == SHADING_ANISOTROPIC
+#define NEEDS_TANGENT
+#ifdef HAS_TANGENT
+in vec4 v_tangent;
+#endif
+#endif
+#ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
+uniform sampler2D metallic_roughness_texture;
+#endif
+#ifdef HAS_NORMAL_TEXTURE
+uniform sampler2D normal_texture;
+#endif
+#ifdef HAS_OCCLUSION_TEXTURE
+uniform sampler2D occlusion_texture;
+#endif
+#ifdef HAS_EMISSIVE_TEXTURE
+uniform sampler2D emissive_texture;
+#endif
+#ifdef HAS_SPECULAR_TEXTURE
+uniform sampler2D specular_texture;
+#endif
+#ifdef HAS_SPECULAR_COLOR_TEXTURE
+uniform sampler2D specular_color_texture;
+#endif
+#if defined(HAS_ANISOTROPY_TEXTURE) && SHADING == SHADING_ANISOTROPIC
+uniform sampler2D anisotropy_texture;
+#endif
+
+#ifdef NEEDS_TANGENT
+#ifndef NORMAL_UV
+#define NORMAL_UV 0
+#endif
+
+// Tangent along the image's rows and bitangent up its columns, as glTF's normal maps have them.
+void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
+#ifdef HAS_TANGENT
+    tangent = normalize(v_tangent.xyz);
+    bitangent = cross(normal, tangent) * v_tangent.w;
+#else
+    // From the derivatives of position and texture coordinates (Schueler 2013).
+    vec2 uv = UV_SET(NORMAL_UV);
+    vec3 across = dFdx(v_position), up = dFdy(v_position);
+    vec2 uv_across = dFdx(uv), uv_up = dFdy(uv);
+    vec3 u_plane = cross(up, normal), v_plane = cross(normal, across);
+    tangent = u_plane * uv_across.x + v_plane * uv_up.x;
+    bitangent = -(u_plane * uv_across.y + v_plane * uv_up.y);
+    float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
+    if (longest < 1e-30) {  // no texture coordinates: any frame will do
+        tangent = normalize(cross(normal, abs(normal.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
+        bitangent = cross(normal, tangent);
+    } else {
+        tangent *= inversesqrt(longest);
+        bitangent *= inversesqrt(longest);
+    }
+#endif
+}
+#endif
+
+// Everything but lighting. Fragments cut away by an alpha mask end here.
+Surface surface_here(View view) {
+    MaterialData m = materials[MATERIAL_INDEX(v_material)];
+    Surface s;
+    s.position = v_position;
+    s.to_viewer = to_viewer(view, v_position);
+    // Derivatives of the window's axes, right then up, so that it looks at the viewer.
+    vec3 crossed = cross(dFdx(v_position), dFdy(v_position));
+    s.geometric_normal = crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
+
+    vec4 base = base_color_at(v_material);
+    s.base_color = base.rgb;
+    s.alpha = base.a;
+
+    s.metallic = m.surface.x;
+    s.roughness = m.surface.y;
+#ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
+    vec2 blue_green =
+        texture(metallic_roughness_texture, slot_uv(v_material, METALLIC_ROUGHNESS_SLOT, UV_SET(METALLIC_ROUGHNESS_UV))).bg;
+    s.metallic *= blue_green.x;
+    s.roughness *= blue_green.y;
+#endif
+
+    vec4 specular = m.specular;
+#ifdef HAS_SPECULAR_TEXTURE
+    specular.a *= texture(specular_texture, slot_uv(v_material, SPECULAR_SLOT, UV_SET(SPECULAR_UV))).a;
+#endif
+#ifdef HAS_SPECULAR_COLOR_TEXTURE
+    specular.rgb *=
+        texture(specular_color_texture, slot_uv(v_material, SPECULAR_COLOR_SLOT, UV_SET(SPECULAR_COLOR_UV))).rgb;
+#endif
+
+    s.normal = normalize(v_normal);
+#ifdef NEEDS_TANGENT
+    tangent_frame(s.normal, s.tangent, s.bitangent);
+#endif
+#ifdef HAS_NORMAL_TEXTURE
+    vec3 mapped = texture(normal_texture, slot_uv(v_material, NORMAL_SLOT, UV_SET(NORMAL_UV))).xyz * 2.0 - 1.0;
+    mapped.xy *= m.surface.w;
+    s.normal = normalize(mat3(s.tangent, s.bitangent, s.normal) * mapped);
+#endif
+#if SHADING == SHADING_ANISOTROPIC
+    s.anisotropy = m.extra.y;
+    vec2 grain = vec2(cos(m.extra.z), sin(m.extra.z));
+#ifdef HAS_ANISOTROPY_TEXTURE
+    vec3 texel = texture(anisotropy_texture, slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV))).rgb;
+    vec2 turned = texel.rg * 2.0 - 1.0;
+    grain = mat2(grain.x, grain.y, -grain.y, grain.x) * turned;
+    s.anisotropy *= texel.b;
+#endif
+    s.tangent = normalize(s.tangent) * grain.x + normalize(s.bitangent) * grain.y;
+    s.tangent = normalize(s.tangent - s.normal * dot(s.normal, s.tangent));
+    s.bitangent = cross(s.normal, s.tangent);
+#endif
+#ifdef DOUBLE_SIDED
+    if (!gl_FrontFacing) s.normal = -s.normal;
+#endif
+
+    s.occlusion = 1.0;
+#ifdef HAS_OCCLUSION_TEXTURE
+    float open = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
+    s.occlusion += m.surface.z * (open - 1.0);
+#endif
+    s.emissive = m.emissive.rgb;
+#ifdef HAS_EMISSIVE_TEXTURE
+    s.emissive *= texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
+#endif
+    derive_reflectance(s, m, specular);
+#ifdef ALPHA_MASK
+    if (s.alpha < m.emissive.a) discard;
+#endif
+#ifndef ALPHA_BLEND
+    s.alpha = 1.0;
+#endif
+    return s;
+}

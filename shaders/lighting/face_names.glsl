@@ -1,0 +1,9 @@
+// Varyings between the vertex and the geometry shader, which hands them on under their own names.
+#define v_position g_position
+#define v_normal g_normal
+#define v_material g_material
+#define v_object g_object
+#define v_uv0 g_uv0
+#define v_uv1 g_uv1
+#define v_tangent g_tangent
+#define v_color g_color

@@ -1,0 +1,7 @@
+// Vertices on their way to the geometry shader.
+#include "face_names.glsl"
+#include <geometry_vertex.glsl>
+
+void main() {
+    pass_vertex_on();
+}

@@ -1,0 +1,18 @@
+// Light at every vertex.
+#include <geometry_vertex.glsl>
+#include "vertex_light.glsl"
+#define DIRECTION out
+#include "vertex_light_varyings.glsl"
+
+void main() {
+    pass_vertex_on();
+    VertexLight light = vertex_light(v_material, v_position, normalize(v_normal));
+    v_diffuse = light.rest.diffuse;
+    v_specular = light.rest.specular;
+#if SHADOW_LIGHT_COUNT > 0
+    for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
+        v_shadowed_diffuse[k] = light.shadowed[k].diffuse;
+        v_shadowed_specular[k] = light.shadowed[k].specular;
+    }
+#endif
+}

@@ -1,0 +1,62 @@
+// Light computed once for a vertex or a face, from the material's factors alone. The diffuse part is light on white, for
+// the fragment to multiply with its texture; lights that cast shadows are kept apart, for it to look those up.
+#include <pass_view.glsl>
+#include <lights.glsl>
+#include <shading.glsl>
+
+struct VertexLight {
+    Reflected rest;  // of lights without shadows
+#if SHADOW_LIGHT_COUNT > 0
+    Reflected shadowed[SHADOW_LIGHT_COUNT];
+#endif
+};
+
+VertexLight vertex_light(int material, vec3 position, vec3 normal) {
+    MaterialData m = materials[MATERIAL_INDEX(material)];
+    Surface s;
+    s.position = position;
+    s.normal = normal;
+    s.geometric_normal = normal;
+    s.to_viewer = to_viewer(pass_views[view_index], position);
+#ifdef DOUBLE_SIDED
+    if (dot(s.normal, s.to_viewer) < 0.0) s.normal = -s.normal;
+#endif
+    s.base_color = m.base_color.rgb;
+    s.metallic = m.surface.x;
+    s.roughness = m.surface.y;
+    s.emissive = vec3(0.0);
+    s.anisotropy = 0.0;
+    s.tangent = normalize(cross(s.normal, abs(s.normal.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
+    s.bitangent = cross(s.normal, s.tangent);
+    derive_reflectance(s, m, m.specular);
+    s.diffuse = vec3(1.0);
+
+    VertexLight sum;
+    sum.rest = Reflected(vec3(0.0), vec3(0.0));
+#if LIGHT_COUNT > 0
+#if SHADOW_LIGHT_COUNT > 0
+    for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) sum.shadowed[k] = sum.rest;
+#endif
+    for (int i = 0; i < LIGHT_COUNT; ++i) {
+        vec3 to_light;
+        vec3 irradiance = irradiance_from(lights[i], position, to_light);
+        Reflected one = reflected(s, to_light);
+        one.diffuse *= irradiance;
+        one.specular *= irradiance;
+        bool apart = false;
+#if SHADOW_LIGHT_COUNT > 0
+        for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
+            if (shadow_lights[k] == i) {
+                sum.shadowed[k] = one;
+                apart = true;
+            }
+        }
+#endif
+        if (!apart) {
+            sum.rest.diffuse += one.diffuse;
+            sum.rest.specular += one.specular;
+        }
+    }
+#endif
+    return sum;
+}

@@ -1,0 +1,42 @@
+// The piece every shadow-map technique shares: which layer belongs to a light, where a point lies in it, and how far it
+// is moved so that a surface does not shadow itself. The technique's own include comes first and defines
+//
+//     float map_visibility(int layer, vec3 place)    // texture coordinates and depth in that layer, 0 to 1
+//     MAP_HALF_WIDTH                                 // half the width in texels of what it looks at
+//
+// The offset: a receiver at the angle a to the light's plane is deeper by w tan(a) at the distance w in the map. Moving
+// the point by w sin(a) along its normal lifts it by just that much, so the offset vanishes where light falls straight on.
+#ifndef MAP_VIEWS
+#define MAP_VIEWS shadow_map_views
+#define MAP_LIGHTS shadow_map_lights
+#define MAP_LAYERS SHADOW_MAP_LAYERS
+#endif
+
+uniform float bias;           // texels towards the light
+uniform float normal_offset;  // factor on what the slope asks for
+
+// The place of a moved point in one layer; false where the layer does not see it.
+bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out vec3 place) {
+    View view = MAP_VIEWS[layer];
+    float w = (view.view_projection * vec4(position, 1.0)).w;
+    float texel = 2.0 * w * view.viewport.z / view.projection[0][0];  // metres across at this distance
+    float cosine = dot(normal, to_light);
+    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    vec3 moved = position + texel * (normal * (normal_offset * MAP_HALF_WIDTH * sine) + to_light * bias);
+    vec4 clip = view.view_projection * vec4(moved, 1.0);
+    place = clip.xyz / clip.w * 0.5 + 0.5;
+    place.z = min(place.z, 1.0);
+    return clip.w > 0.0 && all(greaterThanEqual(place, vec3(0.0))) && all(lessThanEqual(place.xy, vec2(1.0)));
+}
+
+// 1 where the light reaches the point; the first layer of the light that sees the point decides.
+float shadow(int light, vec3 position, vec3 normal) {
+    for (int layer = 0; layer < MAP_LAYERS; ++layer) {
+        if (MAP_LIGHTS[layer] != light) continue;
+        vec3 to_light = to_viewer(MAP_VIEWS[layer], position);
+        if (dot(normal, to_light) <= 0.0) return 0.0;  // the surface itself is in the way
+        vec3 place;
+        if (place_in_layer(layer, position, normal, to_light, place)) return map_visibility(layer, place);
+    }
+    return 1.0;
+}
