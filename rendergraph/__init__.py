@@ -1,3 +1,30 @@
-"""Declarative real-time rendering: one YAML file is a renderer."""
+"""Declarative real-time rendering: one YAML file is a renderer.
 
+    import rendergraph as rg
+    frame = rg.load("deferred.yaml").set("ao.radius", 0.8).render(size=(640, 360))
+    frame["image"]
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rendergraph.errors import RendergraphError
+    from rendergraph.session import Frame, Pipeline, Session, load
+
+__all__ = ["Frame", "Pipeline", "RendergraphError", "Session", "load"]
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    # Looked up on first use: `rendergraph --help` needs none of it.
+    if name == "RendergraphError":
+        from rendergraph.errors import RendergraphError
+
+        return RendergraphError
+    if name in __all__:
+        import rendergraph.session
+
+        return getattr(rendergraph.session, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

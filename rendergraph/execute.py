@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
@@ -52,12 +52,15 @@ class FrameContext:
     scene: Any
 
     def connected(self, port: Port) -> bool:
+        """Whether anything is linked to an input."""
         return bool(self.node.inputs.get(port.name))
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
+        """Set the views of a declared table."""
         self.executable.views.set(f"{self.node.id}.{port.name}", views)
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
+        """Upload into a declared buffer."""
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline
@@ -140,7 +143,7 @@ class Runner:
         for number, step in enumerate(executable.steps[parity]):
             query = executable.queries[number]
             before = perf_counter()
-            scope: AbstractContextManager[object] = query if step.draws else nullcontext()
+            scope: Any = query if step.draws else nullcontext()
             with scope:
                 for call in step.calls:
                     call()

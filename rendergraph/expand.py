@@ -11,12 +11,25 @@ from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 from rendergraph.declare import (
-    Facts, Function, History, InOut, Input, Internal, Made, Node, Output, Part, Port, TextureInfo, Views,
+    Facts,
+    Function,
+    History,
+    InOut,
+    Input,
+    Internal,
+    Made,
+    Node,
+    Part,
+    Port,
+    TextureInfo,
+    Views,
 )  # fmt: skip
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Problem
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.steps import FunctionBinding, Read, Request, Resource, Step, Steps, UniformValue, Write, define_text
-from rendergraph.textures import TEXTURE_KINDS, BufferDesc, Sampler, TextureDesc
+from rendergraph.steps import (
+    FunctionBinding, Read, Request, Resource, Role, Step, Steps, UniformValue, Write, define_text,
+)  # fmt: skip
+from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 CAMERA = "camera"
 """Id of the view table every pipeline has."""
@@ -73,9 +86,9 @@ def is_empty(info: TextureInfo | None) -> bool:
 def _topological(graph: Graph) -> list[str]:
     import networkx as nx
 
-    dag = nx.DiGraph()
+    dag: nx.DiGraph[str] = nx.DiGraph()
     dag.add_nodes_from(graph.dag.nodes)
-    dag.add_edges_from((a, b) for a, b, previous in graph.dag.edges(data="previous") if not previous)
+    dag.add_edges_from((a, b) for a, b, data in graph.dag.edges(data=True) if not data["previous"])
     place = {name: number for number, name in enumerate(dag)}
     return list(nx.lexicographical_topological_sort(dag, key=place.__getitem__))
 
@@ -141,9 +154,9 @@ class _Recorder:
             if "view" in self.links:
                 names.add("view")
         for name in self.used_ports:
-            port = ports.get(name)
-            if isinstance(port, Function):
-                names.update(port.reads)
+            used = ports.get(name)
+            if isinstance(used, Function):
+                names.update(used.reads)
         for name in names:
             yield from self.links.get(name, ())
 
@@ -196,9 +209,9 @@ def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
         return f"{node.id}.{min(used)} has no layers: there is nothing to draw"
     for name, port in node.node.inputs().items():
         ends = node.inputs.get(name, ())
-        if isinstance(port, Input) and not port.optional and ends:
-            if all(is_empty(graph.textures.get(_now(end))) for end in ends):
-                return f"{ends[0]} has no layers: there is nothing to read"
+        required = isinstance(port, Input) and not port.optional
+        if required and ends and all(is_empty(graph.textures.get(_now(end))) for end in ends):
+            return f"{ends[0]} has no layers: there is nothing to read"
     return None
 
 
@@ -265,7 +278,9 @@ class _Numbering:
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
-            role = "internal" if isinstance(port, Internal) else "history" if isinstance(port, History) else "transient"
+            role: Role = "transient"
+            if isinstance(port, Internal | History):
+                role = "internal" if isinstance(port, Internal) else "history"
             resource = Resource(str(end), desc, role, port.first, info.view, info.lights)
             self.resources[resource.id] = resource
             self.version[resource.id] = 0
@@ -372,13 +387,14 @@ class _Numbering:
     ) -> tuple[list[Read], Write]:
         port = part.port
         if not isinstance(port, Made):
-            text = f"node '{recorder.node.id}' writes its {type(port).__name__.lower()} '{port.name}'"
-            raise InputError(Problem("RG421", text + "; only outputs, internals and history can be", recorder.node.place))
+            text = (f"node '{recorder.node.id}' writes its {type(port).__name__.lower()} '{port.name}'; "
+                    "only outputs, internals and history can be")  # fmt: skip
+            raise InputError(Problem("RG421", text, recorder.node.place))
         end = Endpoint(recorder.node.id, port.name)
         if end not in self.at_end:
             text = f"node '{recorder.node.id}' writes '{port.name}', which has no layers"
             raise InputError(Problem("RG421", text, recorder.node.place))
-        resource, at_end = self.at_end[end]
+        resource, _ = self.at_end[end]
         desc = self.resources[resource].desc
         old = self.version[resource]
         self.version[resource] = old + 1
@@ -407,13 +423,12 @@ class _Numbering:
         if request.kind == "mipmaps":
             read = [Read(name, resource, old, "attach")]
             load = "load"
-        write = Write(name, resource, old + 1, use, load, 0.0 if clear is None else clear, part.mip, part.layer)  # type: ignore[arg-type]
+        value = 0.0 if clear is None else clear
+        write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
 
     @staticmethod
     def is_depth(desc: TextureDesc | BufferDesc) -> bool:
-        from rendergraph.textures import FORMATS
-
         return isinstance(desc, TextureDesc) and FORMATS[desc.format].is_depth
 
     def _view(self, recorder: _Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
@@ -434,7 +449,8 @@ class _Numbering:
                 self.resources[write.resource] = replace(resource, view=view)
 
     def _target_size(self, writes: Iterable[Write], reads: Iterable[Read]) -> tuple[tuple[int, int], int]:
-        for touched in (*writes, *(read for read in reads if read.use == "depth_test")):
+        targets: list[Read | Write] = [*writes, *(read for read in reads if read.use == "depth_test")]
+        for touched in targets:
             desc = self.resources[touched.resource].desc
             if isinstance(desc, TextureDesc):
                 return desc.mip_size(touched.mip or 0), desc.samples
@@ -447,9 +463,8 @@ class _Numbering:
         read_names = {read.name for read in reads}
         for name, port in node.inputs().items():
             many = isinstance(port, Input) and port.many
-            if name in read_names or (many and f"{name}_0" in read_names):
-                yield f"HAS_{name.upper()}", "1"
-            elif isinstance(port, Input) and port.kind == "function" and functions and recorder.links.get(name):
+            called = isinstance(port, Input) and port.kind == "function" and functions and recorder.links.get(name)
+            if name in read_names or (many and f"{name}_0" in read_names) or called:
                 yield f"HAS_{name.upper()}", "1"
         yield from define_parameters(node)
 
@@ -502,7 +517,7 @@ class _Numbering:
         previous = {read.resource for step in self.steps for read in step.all_reads if read.previous}
         for name in set(wanted.values()) | previous:
             resource = self.resources[name]
-            role = "history" if name in previous or resource.role == "history" else "output"
+            role: Role = "history" if name in previous or resource.role == "history" else "output"
             self.resources[name] = replace(resource, role=role)
 
 
@@ -537,13 +552,6 @@ def param_uniforms(node: Node) -> Iterator[tuple[str, UniformValue]]:
         yield name, value
 
 
-def made_ports(node: Node) -> Iterator[Made]:
-    """The textures and buffers a node makes."""
-    for port in node.ports().values():
-        if isinstance(port, Output | InOut | Internal | History):
-            yield port
-
-
 __all__ = [
-    "CAMERA", "TEXTURE_KINDS", "Expansion", "Place", "ViewTable", "define_parameters", "expand", "is_empty", "param_uniforms",
+    "CAMERA", "Expansion", "ViewTable", "define_parameters", "expand", "is_empty", "param_uniforms",
 ]  # fmt: skip

@@ -250,6 +250,9 @@ class Step:
         return self.reads + tuple(read for function in self.functions for read in function.reads)
 
 
+Role = Literal["transient", "internal", "output", "history"]
+
+
 @dataclass(frozen=True)
 class Resource:
     """A texture or buffer of the pipeline before it has memory.
@@ -265,7 +268,7 @@ class Resource:
 
     id: str
     desc: TextureDesc | BufferDesc
-    role: Literal["transient", "internal", "output", "history"] = "transient"
+    role: Role = "transient"
     first: float = 0.0
     view: str | None = None
     lights: tuple[int, ...] = ()
@@ -460,6 +463,7 @@ class Steps:
         defines: Mapping[str, Any] | None,
         **options: Any,
     ) -> None:
+        targets: dict[str, Target]
         if out is None:
             targets = {
                 name: port

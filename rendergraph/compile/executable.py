@@ -34,7 +34,8 @@ class Draw:
         uniforms: name to value, all that the program may look at.
         state: calls that set the fixed function, None for compute.
         call: the draw itself.
-        binds: texture binds of its own, empty unless the driver's units ran out.
+        binds: texture and buffer binds of its own; textures only where the driver's units ran out.
+        vertex_array: what `call` draws with, for geometry.
     """
 
     program: Program
@@ -42,6 +43,30 @@ class Draw:
     state: Pieces | None
     call: Call
     binds: list[Call] = field(default_factory=list)
+    vertex_array: Any = None
+
+
+@dataclass(eq=False)
+class SortedDraws:
+    """Draws whose order is the eye's: each part is compiled once, and runs of neighbours are found anew as it moves.
+
+    Attributes:
+        parts: what can be drawn together, in any order.
+        runs: part number, first command and number of commands, far to near.
+        render: draws a run of commands with a part's vertex array.
+    """
+
+    parts: list[Draw]
+    render: Callable[[int, int, int], object]
+    runs: list[tuple[int, int, int]] = field(default_factory=list)
+    prepared: list[tuple[Call, ...]] = field(default_factory=list)
+
+    def __call__(self) -> None:
+        """Draw all runs."""
+        for part, first, count in self.runs:
+            for call in self.prepared[part]:
+                call()
+            self.render(part, first, count)
 
 
 @dataclass(eq=False)
@@ -52,16 +77,22 @@ class CompiledStep:
         step: what it came from.
         before: framebuffer, clears.
         draws: in order.
+        sorted: draws whose order is the eye's, instead of `draws`.
         after: barriers, poison.
-        refresh: calls that must run once a frame before the step where the order of its objects depends on the eye.
         calls: all of it, flat; filled by `Executable.assemble`.
     """
 
     step: Step
     before: list[Call] = field(default_factory=list)
     draws: list[Draw] = field(default_factory=list)
+    sorted: SortedDraws | None = None
     after: list[Call] = field(default_factory=list)
     calls: tuple[Call, ...] = ()
+
+    @property
+    def all_draws(self) -> list[Draw]:
+        """All draws, however they are ordered."""
+        return self.draws + (self.sorted.parts if self.sorted is not None else [])
 
 
 @dataclass(eq=False)
@@ -77,6 +108,8 @@ class Executable:
         statics: uniform writes that hold for the whole frame.
         sorters: called with the view tables when a view has changed: objects front to back.
         queries: one time query a step.
+        buffers: draw commands.
+        fresh: `statics` have to be written before the next frame.
     """
 
     device: Device
@@ -88,13 +121,27 @@ class Executable:
     statics: list[Call] = field(default_factory=list)
     sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
     queries: list[moderngl.Query] = field(default_factory=list)
+    buffers: list[moderngl.Buffer] = field(default_factory=list)
     fresh: bool = True
 
     def assemble(self) -> None:
         """Fill every step's flat list from its draws, leaving out what changes nothing."""
-        shared = _differing(draw for steps in self.steps[:1] for step in steps for draw in step.draws)
+        shared = _differing(draw for step in self.steps[0] for draw in step.all_draws)
         self.statics = []
         written: set[tuple[int, str]] = set()
+
+        def writes(draw: Draw) -> list[Call]:
+            own: list[Call] = []
+            for name, value in draw.uniforms.items():
+                key = (draw.program.glo, name)
+                if key not in shared and key in written:
+                    continue
+                write = draw.program.writer(name, value)
+                if write is not None:
+                    written.add(key)
+                    (own if key in shared else self.statics).append(write)
+            return own
+
         for steps in self.steps:
             state: Pieces | None = None
             for compiled in steps:
@@ -104,19 +151,13 @@ class Executable:
                     if draw.state is not None:
                         calls += changes(state, draw.state)
                         state = draw.state
-                    for name, value in draw.uniforms.items():
-                        key = (draw.program.glo, name)
-                        if key not in shared and key in written:
-                            continue
-                        write = draw.program.writer(name, value)
-                        if write is None:
-                            continue
-                        written.add(key)
-                        if key in shared:
-                            calls.append(write)
-                        else:
-                            self.statics.append(write)
-                    calls.append(draw.call)
+                    calls += [*writes(draw), draw.call]
+                if compiled.sorted is not None:
+                    compiled.sorted.prepared = [
+                        (*part.binds, *changes(None, part.state or {}), *writes(part)) for part in compiled.sorted.parts
+                    ]
+                    calls.append(compiled.sorted)
+                    state = None
                 compiled.calls = (*calls, *compiled.after)
         self.fresh = True
 
@@ -126,7 +167,7 @@ class Executable:
         for compiled in (c for steps_of in self.steps for c in steps_of):
             step = values[compiled.step.key]
             compiled.step = step
-            for draw in compiled.draws:
+            for draw in compiled.all_draws:
                 draw.uniforms.update(step_uniforms(step))
         self.assemble()
 
@@ -134,6 +175,9 @@ class Executable:
         """Free what it owns; programs and scenes are the session's."""
         self.memory.release()
         self.views.release()
+        for buffer in self.buffers:
+            buffer.release()
+        self.queries.clear()
 
 
 def step_uniforms(step: Step) -> dict[str, Any]:

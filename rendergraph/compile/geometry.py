@@ -9,19 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.compile.executable import Call, Draw
+from rendergraph.compile.executable import Call, Draw, SortedDraws
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
 from rendergraph.errors import Problem, RenderError
 from rendergraph.expand import CAMERA
 from rendergraph.scene.model import Material, Mesh, Object, Texture
-from rendergraph.steps import Step
+from rendergraph.steps import Step, ViewMatrices
 
 COMMAND = np.dtype(
     [("count", np.uint32), ("instances", np.uint32), ("first_index", np.uint32), ("base_vertex", np.int32),
@@ -74,12 +75,28 @@ class GeometryCompiler:
     _batches: dict[tuple[Any, ...], list[Batch]] = field(default_factory=dict)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
 
-    def draws(self, step: Step, make: Callable[[Batch], Draw]) -> list[Draw]:
-        """The draws of a step."""
+    def draws(self, step: Step, make: Callable[[Batch], Draw]) -> list[Draw] | SortedDraws:
+        """The draws of a step.
+
+        Args:
+            step: a geometry step.
+            make: compiles a batch's program.
+        """
         objects = select(self.scene.scene.objects, self.scene.scene.materials, step)
+        if not objects:
+            return []
         if step.order == "front_to_back":
             return [make(batch) for batch in self._grouped(step, objects)]
-        return self._in_order(step, objects, make)
+        if step.order == "back_to_front":
+            return self._sorted(step, objects, make)
+        runs: list[tuple[BatchKey, list[int]]] = []
+        for index in objects:
+            key = self._key(step, index)
+            if runs and runs[-1][0] == key:
+                runs[-1][1].append(index)
+            else:
+                runs.append((key, [index]))
+        return [make(self._batch(key, members)) for key, members in runs]
 
     def _grouped(self, step: Step, objects: list[int]) -> list[Batch]:
         view = (step.view or CAMERA, step.view_index or 0)
@@ -94,30 +111,46 @@ class GeometryCompiler:
                     self.sorters.append(partial(self._sort, batch, *view))
         return self._batches[key]
 
-    def _in_order(self, step: Step, objects: list[int], make: Callable[[Batch], Draw]) -> list[Draw]:
-        """A draw for each run of neighbours that can be drawn together, in the order the step asks for.
+    def _sorted(self, step: Step, objects: list[int], make: Callable[[Batch], Draw]) -> SortedDraws:
+        """A part for each kind of object over one list of commands, which is sorted far to near as the view moves."""
+        keys = [self._key(step, index) for index in objects]
+        parts = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+        members = np.array(objects, np.int64)
+        part_of = np.array([parts[key] for key in keys], np.int64)
+        everything = Batch({}, {}, "none", False, members, self._command_buffer(members))
+        draws = [make(self._batch(key, objects[:1])) for key in parts]
 
-        The order of `back_to_front` is the eye's of the moment, so each object is a batch whose place may change: the
-        runs are found anew when the view changes, over draws compiled once.
-        """
-        keys = {index: self._key(step, index) for index in objects}
-        if step.order == "scene":
-            runs: list[tuple[BatchKey, list[int]]] = []
-            for index in objects:
-                if runs and runs[-1][0] == keys[index]:
-                    runs[-1][1].append(index)
-                else:
-                    runs.append((keys[index], [index]))
-            return [make(self._batch(key, members)) for key, members in runs]
-        return []
+        def render(part: int, first: int, count: int) -> None:
+            draws[part].vertex_array.render_indirect(everything.commands, moderngl.TRIANGLES, count, first)
+
+        made = SortedDraws(draws, render)
+
+        def sort(views: ViewBuffers) -> None:
+            view = views.current[step.view or CAMERA][step.view_index or 0]
+            order = np.argsort(-self._depths(members, view), kind="stable")
+            everything.commands.write(self._commands(members[order]).tobytes())
+            kinds = part_of[order]
+            starts = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(kinds)]
+            made.runs = [(int(kinds[a]), a, b - a) for a, b in pairwise(starts)]
+
+        self.sorters.append(sort)
+        return made
 
     def _batch(self, key: BatchKey, members: list[int]) -> Batch:
         self.scene.load_images([texture for _, texture in key.textures])
         objects = np.array(members, np.int64)
-        commands = self.scene.device.ctx.buffer(self._commands(objects).tobytes())
-        self.buffers.append(commands)
         found = {name: self.scene.texture(texture) for name, texture in key.textures}
-        return Batch(dict(key.defines), found, key.cull, key.clockwise, objects, commands)
+        return Batch(dict(key.defines), found, key.cull, key.clockwise, objects, self._command_buffer(objects))
+
+    def _command_buffer(self, objects: npt.NDArray[np.int64]) -> moderngl.Buffer:
+        buffer = self.scene.device.ctx.buffer(self._commands(objects).tobytes() or bytes(COMMAND.itemsize))
+        self.buffers.append(buffer)
+        return buffer
+
+    def _depths(self, objects: npt.NDArray[np.int64], view: ViewMatrices) -> npt.NDArray[np.float64]:
+        """Distance along the view axis of objects' centres."""
+        depths: npt.NDArray[np.float64] = -(self.scene.packed.centers[objects] @ view.view[2, :3] + view.view[2, 3])
+        return depths
 
     def _commands(self, objects: npt.NDArray[np.int64]) -> npt.NDArray[np.void]:
         packed = self.scene.packed
@@ -131,10 +164,8 @@ class GeometryCompiler:
         return commands
 
     def _sort(self, batch: Batch, table: str, index: int, views: ViewBuffers) -> None:
-        view = views.current[table][index]
-        centers = self.scene.packed.centers[batch.objects]
-        depth = -(centers @ view.view[2, :3] + view.view[2, 3])
-        batch.objects = batch.objects[np.argsort(depth, kind="stable")]
+        depths = self._depths(batch.objects, views.current[table][index])
+        batch.objects = batch.objects[np.argsort(depths, kind="stable")]
         batch.commands.write(self._commands(batch.objects).tobytes())
 
     def _key(self, step: Step, index: int) -> BatchKey:

@@ -62,14 +62,13 @@ class GpuScene:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
         self._indices = ctx.buffer(packed.indices.tobytes() or bytes(4))
         self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
-        for block, array in (
-            ("light_block", packed.lights),
-            ("material_block", packed.materials),
-            ("material_uv_block", packed.material_uvs if packed.material_moved.any() else None),
-        ):
-            if array is not None and array.size:
-                storage = array.nbytes > self.device.limits["uniform_block"]
-                self._blocks[block] = (ctx.buffer(array.tobytes()), storage)
+        blocks: dict[str, npt.NDArray[Any]] = {"light_block": packed.lights, "material_block": packed.materials}
+        if packed.material_moved.any():
+            blocks["material_uv_block"] = packed.material_uvs
+        for block, records in blocks.items():
+            if records.size:
+                storage = records.nbytes > self.device.limits["uniform_block"]
+                self._blocks[block] = (ctx.buffer(records.tobytes()), storage)
 
     @property
     def light_defines(self) -> dict[str, str]:
@@ -106,12 +105,12 @@ class GpuScene:
     def update(self, scene: Scene) -> None:
         """Take over an animated scene's lights and transforms; the meshes stay."""
         packed = pack.update(self.packed, scene)
-        for block, array, before in (
+        for block, now, before in (
             ("light_block", packed.lights, self.packed.lights),
             ("material_block", packed.materials, self.packed.materials),
         ):
-            if block in self._blocks and array.tobytes() != before.tobytes():
-                self._blocks[block][0].write(array.tobytes())
+            if block in self._blocks and now.tobytes() != before.tobytes():
+                self._blocks[block][0].write(now.tobytes())
         if packed.instances.tobytes() != self.packed.instances.tobytes():
             self._instances.write(packed.instances.tobytes())
         self.scene, self.packed = scene, packed
@@ -133,7 +132,8 @@ class GpuScene:
     def texture(self, texture: Texture) -> tuple[int, int]:
         """GL names of a material texture and its sampler."""
         image = self._images[texture.image, texture.srgb].glo
-        key = (_MIN.get(texture.min_filter, 0x2703), _MAG[texture.mag_filter], _WRAP[texture.wrap_s], _WRAP[texture.wrap_t])
+        wraps = (_WRAP[texture.wrap_s], _WRAP[texture.wrap_t])
+        key = (_MIN.get(texture.min_filter, 0x2703), _MAG[texture.mag_filter], *wraps)
         if key not in self._samplers:
             self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=1)
         return image, self._samplers[key]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -137,9 +138,10 @@ class Memory:
         assert status == 0x8CD5, f"framebuffer incomplete: {status:#x} for {colors} {depth}"
         made.viewport = (0, 0, *size)
         if colors:
-            made.color_mask = color_mask if len(colors) == 1 else (color_mask,) * len(colors)
+            masks: Any = color_mask if len(colors) == 1 else (color_mask,) * len(colors)
+            made.color_mask = masks
         made.depth_mask = depth_mask
-        made.scissor = scissor
+        made.scissor = scissor  # type: ignore[assignment]  # None takes the scissor away
         self._framebuffers[key] = made
         return made
 
@@ -196,6 +198,7 @@ class ClearTarget:
         value: float | tuple[float, ...],
     ) -> None:  # fmt: skip
         raw, glo, family = device.raw, framebuffer.glo, FORMATS[format].family
+        self._args: tuple[int | float, ...]
         values = np.zeros(4)
         given = np.atleast_1d(np.asarray(value, np.float64))
         values[: len(given)] = given
@@ -214,4 +217,5 @@ class ClearTarget:
             self._call, self._args = getattr(raw, name), (glo, 0x1800, index or 0, address)
 
     def __call__(self) -> None:
+        """Clear."""
         self._call(*self._args)

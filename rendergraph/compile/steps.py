@@ -11,7 +11,7 @@ import moderngl
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
-from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, step_uniforms
+from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, SortedDraws, step_uniforms
 from rendergraph.compile.geometry import Batch, GeometryCompiler
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import ClearTarget, Memory
@@ -87,7 +87,7 @@ class _Compiler:
     def __post_init__(self) -> None:
         self.units = Units(self.device, self.memory.parities)
         self.geometry = GeometryCompiler(self.scene)
-        self._cleared: dict[tuple[str, int], Any] = {}
+        self._geometry_draws: dict[tuple[str, int], list[Draw] | SortedDraws] = {}
 
     def executable(self) -> Executable:
         steps = [
@@ -99,6 +99,7 @@ class _Compiler:
         ]
         made = Executable(self.device, self.plan, self.memory, self.views, binds, steps)
         made.sorters = list(self.geometry.sorters)
+        made.buffers = list(self.geometry.buffers)
         made.queries = [self.device.ctx.query(time=True) for _ in self.plan.schedule.steps]
         made.assemble()
         return made
@@ -125,12 +126,15 @@ class _Compiler:
     def _draw(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, {"PASS_VIEW_COUNT": str(self._view_count(step))})
         self._target(step, compiled, parity)
-        content = []
+        content: list[tuple[Any, ...]] = []
+        names: list[int] = []
         for layout, resource in step.attributes:
             words = layout.split()
             half = len(words) // 2
-            content.append((self.memory.buffer(resource), " ".join(words[:half]), *words[half:]))
-        key = ("draw", *(c[0].glo for c in content), *(layout for layout, _ in step.attributes))
+            buffer = self.memory.buffer(resource)
+            content.append((buffer, " ".join(words[:half]), *words[half:]))
+            names.append(buffer.glo)
+        key = ("draw", *names, *(layout for layout, _ in step.attributes))
         vertex_array = self.programs.vertex_array(program, key, content)
         mode = _TOPOLOGY[step.topology]
         if isinstance(step.vertices, str):
@@ -149,14 +153,22 @@ class _Compiler:
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program)
             state = self._state(step, depth_default=True, cull=batch.cull, clockwise=batch.clockwise)
-            return Draw(program, uniforms, state, batch.call(vertex_array), binds)
+            return Draw(program, uniforms, state, batch.call(vertex_array), binds, vertex_array)
 
-        compiled.draws += self.geometry.draws(step, make)
+        key = step.key
+        if key not in self._geometry_draws:  # one set of command buffers for both parities
+            self._geometry_draws[key] = self.geometry.draws(step, make)
+        made = self._geometry_draws[key]
+        if isinstance(made, SortedDraws):
+            compiled.sorted = made
+        else:
+            compiled.draws += made
 
     def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, {})
-        image = 0
-        for touched in (*(r for r in step.reads if r.use == "image"), *(w for w in step.writes if w.use == "image")):
+        images: list[Read | Write] = [read for read in step.reads if read.use == "image"]
+        images += [write for write in step.writes if write.use == "image"]
+        for image, touched in enumerate(images):
             uniform = program.uniforms.get(touched.name)
             texture = self.memory.texture(
                 touched.resource, parity, previous=isinstance(touched, Read) and touched.previous
@@ -171,7 +183,6 @@ class _Compiler:
             )  # fmt: skip
             if uniform is not None:
                 uniforms[touched.name] = image
-            image += 1
         for write in step.writes:
             if write.load == "clear" and write.use == "image":
                 texture = self.memory.texture(write.resource, parity)
@@ -208,19 +219,19 @@ class _Compiler:
         blocks = dict(FIXED_BLOCKS)
         if step.view is not None:
             blocks["pass_view_block"] = self.views.binding(step.view)
-        named = [("", read) for read in step.reads]
+        named: list[tuple[str, Read]] = [("", read) for read in step.reads]
         named += [(prefix(function.node), read) for function in step.functions for read in function.reads]
-        storage = 0
+        storage = len(FIXED_BLOCKS)  # lights and materials may be storage blocks too
         buffers: list[Call] = []
-        for before, read in (*named, *(("", write) for write in step.writes)):
-            resource = self.plan.resources[read.resource]
-            if read.use == "buffer":
-                if before + read.name not in blocks:
-                    blocks[before + read.name] = storage
-                    buffers.append(partial(self.memory.buffer(read.resource).bind_to_storage_buffer, storage))
-                    storage += 1
-            elif resource.view is not None and isinstance(read, Read):
-                blocks[f"{before}{read.name}_view_block"] = self.views.binding(resource.view)
+        touched: list[tuple[str, Read | Write]] = [*named, *(("", write) for write in step.writes)]
+        for before, use in touched:
+            view = self.plan.resources[use.resource].view
+            if use.use == "buffer" and before + use.name not in blocks:
+                blocks[before + use.name] = storage
+                buffers.append(partial(self.memory.buffer(use.resource).bind_to_storage_buffer, storage))
+                storage += 1
+            elif view is not None and isinstance(use, Read):
+                blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
         program = self.programs.get(
             step, self.types, self.plan.resources, self.view_tables, {**self.scene.light_defines, **defines}, blocks,
             outputs,
@@ -242,7 +253,8 @@ class _Compiler:
         self, step: Step, program: Program, uniforms: Mapping[str, Any], sampled: set[str], geometry: bool
     ) -> None:
         """A sampler that nothing is bound to would silently read another pass's texture."""
-        images = {touched.name for touched in (*step.reads, *step.writes) if touched.use == "image"}
+        uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+        images = {use.name for use in uses if use.use == "image"}
         for name, uniform in program.uniforms.items():
             known = name in sampled or name in images or name in uniforms or (geometry and name.endswith("_texture"))
             if uniform.opaque and not known:

@@ -23,7 +23,7 @@ class Units:
     parities: int
     _pairs: dict[tuple[tuple[int, ...], int], int] = field(default_factory=dict)
 
-    def unit(self, textures: tuple[int, ...], sampler: int, taken: list[Callable[[], None]]) -> int:
+    def unit(self, textures: tuple[int, ...], sampler: int, taken: list[Callable[[], object]]) -> int:
         """The unit of a texture (one name a parity) with a sampler.
 
         `taken` collects the binds that the asking draw has to make itself, empty unless units ran out.

@@ -64,7 +64,7 @@ def open_device(index: int | None = None) -> Device:
     Raises:
         DeviceError: no driver, no such device, or OpenGL older than 4.5.
     """
-    import glcontext
+    import glcontext  # type: ignore[import-untyped]  # ships no types
 
     chosen = index if index is not None else int(os.environ.get("RENDERGRAPH_DEVICE", "0"))
     try:
@@ -72,7 +72,7 @@ def open_device(index: int | None = None) -> Device:
         context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen)
         ctx = moderngl.create_context(context=context)
     except Exception as error:  # glcontext raises bare Exception, with a different text a cause
-        text = f"no usable OpenGL {REQUIRED_VERSION / 100:.1f} device: {error}; `rendergraph doctor` says what to install"
+        text = f"no usable OpenGL 4.5 device: {error}; `rendergraph doctor` says what to install"
         raise DeviceError(Problem("RG601", text)) from error
     return wrap(ctx, context.load, owned=True)
 

@@ -87,9 +87,9 @@ class Program:
         function, dtype, numbers = _WRITERS[uniform.type]
         data = np.ascontiguousarray(value, dtype).ravel()
         count = max(1, data.size // numbers)
-        arguments = (self.glo, uniform.location, min(count, uniform.size))
+        arguments: tuple[int, ...] = (self.glo, uniform.location, min(count, uniform.size))
         if "Matrix" in function:
-            arguments += (0,)
+            arguments = (*arguments, 0)  # not transposed
         # The array travels with the call, so that its address stays good.
         return partial(_call_with, getattr(self.device.raw, function), arguments, data)
 

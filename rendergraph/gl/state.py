@@ -39,7 +39,13 @@ def pieces(
         clockwise: front faces are clockwise (mirrored instances).
         targets: number of colour targets.
     """
-    on, off = (lambda cap: partial(raw.glEnable, cap)), (lambda cap: partial(raw.glDisable, cap))
+
+    def on(capability: int) -> Call:
+        return partial(raw.glEnable, capability)
+
+    def off(capability: int) -> Call:
+        return partial(raw.glDisable, capability)
+
     calls: Pieces = {}
     calls["depth"] = (on(_DEPTH_TEST), partial(raw.glDepthFunc, _COMPARE[state.depth_func])) if depth_test else (
         off(_DEPTH_TEST),

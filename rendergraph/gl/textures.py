@@ -195,6 +195,7 @@ class Clear:
             )
 
     def __call__(self) -> None:
+        """Clear."""
         for call in self._calls:
             self._clear(*call)
 

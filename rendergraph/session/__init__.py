@@ -2,8 +2,25 @@
 
 from __future__ import annotations
 
-from rendergraph.session.frame import Frame, OutputInfo
+from typing import TYPE_CHECKING, Any
+
 from rendergraph.session.pipeline import Pipeline, load
-from rendergraph.session.session import Session
+
+if TYPE_CHECKING:
+    from rendergraph.session.frame import Frame, OutputInfo
+    from rendergraph.session.session import Session
 
 __all__ = ["Frame", "OutputInfo", "Pipeline", "Session", "load"]
+
+
+def __getattr__(name: str) -> Any:
+    # `check` and `plan` work without GL: the modules that need it are imported when something is drawn.
+    if name == "Session":
+        from rendergraph.session.session import Session
+
+        return Session
+    if name in ("Frame", "OutputInfo"):
+        from rendergraph.session import frame
+
+        return getattr(frame, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -127,9 +127,10 @@ class Pipeline:
     def scene(self) -> Scene:
         """The scene, completed by a camera and a light where it has none."""
         from rendergraph.scene import complete, load
-        from rendergraph.scene.model import Environment, ImageSource
+        from rendergraph.scene.model import Environment, ImageSource, Scene
 
-        scene = load(self.spec.scene, check_path=self.spec.roots.check)
+        file = self.spec.scene
+        scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check)
         if self.environment is not None:
             scene = replace(scene, environment=Environment(ImageSource(self.environment, label=str(self.environment))))
         return complete(scene, self.camera)
@@ -174,7 +175,8 @@ class Pipeline:
                 problems.append(Problem("RG206", f"--tap {tap}: there is no node '{node or tap}'{hint}"))
             elif Endpoint(node, port) not in graph.textures or graph.textures[Endpoint(node, port)].desc is None:
                 ports = [end.port for end, info in graph.textures.items() if end.node == node and info.desc is not None]
-                problems.append(Problem("RG206", f"--tap {tap}: '{node}' has no texture '{port}'{suggestion(port, ports)}"))
+                text = f"--tap {tap}: '{node}' has no texture '{port}'{suggestion(port, ports)}"
+                problems.append(Problem("RG206", text))
             else:
                 wanted[tap] = Endpoint(node, port)
         if problems:
