@@ -124,15 +124,15 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> R
     ]
     by_desc = _colour(schedule, lifetimes, shareable, _description)
     by_class = _colour(schedule, lifetimes, shareable, storage_class)
-    better: list[tuple[Tier, Groups]] = []  # tiers above the one asked for
+    better: Sequence[tuple[Tier, Groups]] = ()  # tiers above the one asked for
     if not alias:
         groups = [[id] for id in shareable]
-        better += [("descriptor", by_desc), ("view", by_class)]
+        better = (("descriptor", by_desc), ("view", by_class))
     elif views:
         groups = _fewest_views(schedule, shareable, by_desc, by_class)
     else:
         groups = by_desc
-        better.append(("view", by_class))
+        better = (("view", by_class),)
     physicals, placement = _physicals(schedule, groups)
     released: dict[int, list[str]] = defaultdict(list)
     for id in shareable:

@@ -43,8 +43,8 @@ def search(model: Model, *, below: int, bound: int, budget: int) -> Found:
         model: the steps.
         below: peak of the best order known; states that reach it are dropped.
         bound: a peak that no order is below; up to there everything is free.
-        budget: steps to try before giving up. A count and not a time, so that the result does not depend on the
-            machine.
+        budget: steps to try before giving up, where a state costs more the more of it is symmetric. A count and not
+            a time, so that the result does not depend on the machine.
     """
     count = len(model)
     full = (1 << count) - 1
@@ -57,6 +57,7 @@ def search(model: Model, *, below: int, bound: int, budget: int) -> Found:
     ends = [[(touch_masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
     born, after = model.born, model.after
     twins = twin_branches(model)
+    price = sum(len(branch) for group in twins for branch in group) // 12
     ready = tuple(step for step in range(count) if not needs[step])
     parents: list[tuple[int, int]] = [(-1, -1)]
     # peak, minus the number of steps run, live bytes, place in `parents`, set, its canonical form, ready steps
@@ -90,6 +91,7 @@ def search(model: Model, *, below: int, bound: int, budget: int) -> Found:
                 children = children[-1:]
                 break
         for top, rest, step, now in children:
+            moves += price
             key = canonical(now, twins) if twins else now
             if reached.get(key, below) <= top:
                 continue

@@ -1,0 +1,167 @@
+"""Who shares memory with whom, and what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from rendergraph.allocate import Physical, ResourcePlan, allocate
+from rendergraph.allocate.heap import heap_bytes
+from rendergraph.schedule import Schedule
+from rendergraph.steps import Read, Resource, Step, Write
+from rendergraph.textures import BufferDesc, TextureDesc
+
+RGBA8 = TextureDesc("texture2d", "rgba8", 256, 256)
+R32F = TextureDesc("texture2d", "r32f", 256, 256)
+DEPTH = TextureDesc("texture2d", "depth32f", 256, 256)
+HALF = TextureDesc("texture2d", "rgba16f", 256, 256)
+UNIT = RGBA8.bytes
+
+
+def chain(*descs: TextureDesc | BufferDesc, roles: dict[int, str] | None = None) -> Schedule:
+    """Step n reads what step n-1 wrote; the last resource is the picture."""
+    resources = {
+        f"n{n}.x": Resource(f"n{n}.x", desc, (roles or {}).get(n, "transient"))  # type: ignore[arg-type]
+        for n, desc in enumerate(descs)
+    }
+    steps = tuple(
+        Step(
+            f"n{n}", 0, "fullscreen",
+            reads=(Read("source", f"n{n - 1}.x", 1),) if n else (),
+            writes=(Write("x", f"n{n}.x", 1),),
+        )
+        for n in range(len(descs))
+    )  # fmt: skip
+    last = f"n{len(descs) - 1}.x"
+    whole = {last, *(id for id, resource in resources.items() if resource.role == "history")}
+    return Schedule(steps, resources, {"image": last}, {}, 0, "n1", 0, True, whole_frame=frozenset(whole))
+
+
+def members(plan: ResourcePlan) -> list[tuple[str, ...]]:
+    return [physical.members for physical in plan.physicals]
+
+
+def test_equal_descriptions_take_turns() -> None:
+    plan = allocate(chain(RGBA8, RGBA8, RGBA8, RGBA8, RGBA8))
+    assert members(plan) == [("n0.x", "n2.x"), ("n1.x", "n3.x"), ("n4.x",)]
+    assert plan.memory.no_reuse_bytes == 5 * UNIT
+    assert plan.memory.allocated_bytes == 3 * UNIT
+    assert plan.memory.tier == "descriptor"
+    assert plan.released == {1: ("n0.x",), 2: ("n1.x",), 3: ("n2.x",), 4: ("n3.x",)}
+
+
+def test_a_reader_s_own_target_is_never_what_it_reads() -> None:
+    plan = allocate(chain(RGBA8, RGBA8, RGBA8, RGBA8))
+    for one, next in pairwise(["n0.x", "n1.x", "n2.x", "n3.x"]):
+        assert plan.placement[one] != plan.placement[next]
+
+
+def test_equal_texel_classes_share_through_a_view() -> None:
+    plan = allocate(chain(RGBA8, HALF, R32F, HALF))
+    assert members(plan) == [("n0.x", "n2.x"), ("n1.x",), ("n3.x",)]
+    assert plan.physicals[0].desc == RGBA8
+    assert plan.memory.tier == "view"
+    assert plan.reasons["n2.x"] == "shares texture 0 with n0.x through a r32f view, dead after n1"
+    without = allocate(chain(RGBA8, HALF, R32F, HALF), views=False)
+    assert without.memory.tier == "descriptor"
+    assert (without.memory.next_tier, without.memory.next_tier_bytes) == ("view", plan.memory.allocated_bytes)
+
+
+def test_views_are_not_used_where_they_save_nothing() -> None:
+    # Both formats need a texture of their own at n1, so the later ones take one of their own format.
+    plan = allocate(chain(RGBA8, R32F, RGBA8, R32F, HALF))
+    assert members(plan)[:2] == [("n0.x", "n2.x"), ("n1.x", "n3.x")]
+    assert plan.memory.tier == "descriptor"
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        DEPTH,
+        replace(RGBA8, samples=4),
+        replace(RGBA8, mips=2),
+        replace(RGBA8, width=128),
+        replace(RGBA8, kind="texture2d_array"),
+        replace(RGBA8, kind="texture_cube", layers=6),
+        BufferDesc(UNIT),
+    ],
+)
+def test_what_cannot_share(other: TextureDesc | BufferDesc) -> None:
+    plan = allocate(chain(RGBA8, HALF, other, HALF))
+    assert len(plan.physicals) == 4
+
+
+def test_depth_shares_with_its_own_format_only() -> None:
+    plan = allocate(chain(DEPTH, HALF, DEPTH, replace(DEPTH, format="depth24_stencil8"), HALF))
+    assert members(plan)[0] == ("n0.x", "n2.x")
+    assert len(plan.physicals) == 4
+
+
+def test_buffers_share_where_they_are_of_one_size() -> None:
+    plan = allocate(chain(BufferDesc(64), HALF, BufferDesc(64), BufferDesc(128), HALF))
+    assert members(plan)[0] == ("n0.x", "n2.x")
+    assert plan.reasons["n0.x"] == "shares buffer 0 with n2.x, which takes it over at n2"
+
+
+def test_outputs_and_history_keep_to_themselves() -> None:
+    plan = allocate(chain(RGBA8, RGBA8, RGBA8, RGBA8, roles={0: "history"}))
+    assert len(plan.placement["n0.x"]) == 2
+    assert [physical.members for physical in plan.physicals].count(("n0.x",)) == 2
+    assert plan.lifetimes["n0.x"].last == plan.lifetimes["n3.x"].last == 3
+    assert "the next frame reads it" in plan.reasons["n0.x"]
+    assert plan.reasons["n3.x"] == "output 'image' is kept: its texture is its own for the whole frame"
+    assert all("n0.x" not in ids and "n3.x" not in ids for ids in plan.released.values())
+    assert plan.memory.no_reuse_bytes == 5 * UNIT
+
+
+def test_no_aliasing_gives_each_its_own() -> None:
+    plan = allocate(chain(RGBA8, RGBA8, RGBA8, RGBA8), alias=False)
+    assert plan.memory.allocated_bytes == plan.memory.no_reuse_bytes == 4 * UNIT
+    assert (plan.memory.next_tier, plan.memory.next_tier_bytes) == ("descriptor", 3 * UNIT)
+    assert plan.reasons["n0.x"] == "aliasing is off"
+
+
+def test_a_heap_is_the_tier_after_views() -> None:
+    plan = allocate(replace(chain(HALF, RGBA8, RGBA8, replace(HALF, width=128), RGBA8), peak_bytes=4 * UNIT))
+    assert plan.memory.next_tier == "heap"
+    assert plan.memory.next_tier_bytes == 4 * UNIT  # the picture; n0 beside n1, then n3 where n0 was
+
+
+def test_reasons_of_the_lonely() -> None:
+    plan = allocate(chain(RGBA8, RGBA8, HALF))
+    assert plan.reasons["n0.x"] == "whenever it is alive, all textures it could share are in use"
+    assert allocate(chain(RGBA8, HALF)).reasons["n0.x"] == "no other texture is of its texel class and size"
+
+
+def test_figures_are_the_schedule_s() -> None:
+    plan = allocate(replace(chain(RGBA8, RGBA8), lower_bound_bytes=7, proven=False))
+    assert plan.memory.as_json() == {
+        "no_reuse_bytes": 2 * UNIT, "allocated_bytes": 2 * UNIT, "lower_bound_bytes": 7, "peak_node": "n1",
+        "proven": False, "tier": "descriptor", "next_tier": None, "next_tier_bytes": None,
+    }  # fmt: skip
+
+
+def test_an_empty_frame_needs_nothing() -> None:
+    plan = allocate(Schedule((), {}, {}, {}, 0, None, 0, True))
+    assert plan.physicals == ()
+    assert plan.memory.allocated_bytes == 0
+
+
+def test_physicals_are_numbered_by_place() -> None:
+    plan = allocate(chain(RGBA8, HALF, R32F, DEPTH, RGBA8))
+    assert [physical.index for physical in plan.physicals] == list(range(len(plan.physicals)))
+    assert all(isinstance(physical, Physical) and physical.bytes == physical.desc.bytes for physical in plan.physicals)
+
+
+def test_a_heap_fills_gaps_by_best_fit() -> None:
+    #        4 at first and a 2 beside it later; the 3 fits where the 4 was
+    assert heap_bytes([(4, 0, 1), (2, 0, 3), (3, 2, 3)], bound=6) == 6
+    assert heap_bytes([], bound=0) == 0
+
+
+def test_a_heap_can_need_more_than_the_peak() -> None:
+    # Two of size 1 that are never alive together are kept apart by what lies between them.
+    items = [(1, 0, 0), (2, 0, 1), (1, 1, 2), (2, 2, 3), (1, 3, 3)]
+    assert 3 <= heap_bytes(items, bound=3) <= 4

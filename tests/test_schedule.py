@@ -1,0 +1,295 @@
+"""What runs and in which order: culling, versions, messages, the least peak, reasons."""
+
+from __future__ import annotations
+
+import random
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from rendergraph.errors import InputError
+from rendergraph.expand import Expansion
+from rendergraph.resources import folder
+from rendergraph.schedule import Schedule, schedule
+from rendergraph.steps import FunctionBinding, Read, Resource, Step, Write
+from rendergraph.textures import BufferDesc, TextureDesc
+
+MIB = 1 << 20
+
+
+def reads(*ids: str) -> tuple[Read, ...]:
+    """`a.x` reads version 1, `a.x:2` version 2, `a.x@` last frame's."""
+    found = []
+    for number, text in enumerate(ids):
+        id, _, version = text.rstrip("@").partition(":")
+        found.append(Read(f"input{number}", id, int(version or 1), previous=text.endswith("@")))
+    return tuple(found)
+
+
+def writes(*ids: str, **extra: Any) -> tuple[Write, ...]:
+    """`a.x` makes version 1, `a.x:2` continues version 1."""
+    found = []
+    for text in ids:
+        id, _, version = text.partition(":")
+        load = "load" if int(version or 1) > 1 else "discard"
+        found.append(replace(Write(id.split(".")[1], id, int(version or 1), load=load), **extra))
+    return tuple(found)
+
+
+def step(name: str, takes: tuple[str, ...] = (), makes: tuple[str, ...] = ()) -> Step:
+    """`node` or `node[2]`."""
+    node, _, index = name.rstrip("]").partition("[")
+    return Step(node, int(index or 0), "fullscreen", reads=reads(*takes), writes=writes(*makes))
+
+
+def expansion(*steps: Step, image: str | None = None, sizes: dict[str, int] | None = None, **roles: str) -> Expansion:
+    """Every resource is 1 MiB unless `sizes` says otherwise; what the last step writes is the picture."""
+    ids = {touch.resource: None for one in steps for touch in (*one.all_reads, *one.writes)}
+    shown = image or steps[-1].writes[-1].resource
+    resources = {
+        id: Resource(id, mebibytes((sizes or {}).get(id, 1)), roles.get(id.replace(".", "_"), "transient"))  # type: ignore[arg-type]
+        for id in ids
+    }
+    return Expansion(steps, resources, {"image": shown})
+
+
+def mebibytes(count: int) -> TextureDesc:
+    return TextureDesc("texture2d", "rgba8", 512, 512 * count)
+
+
+def order(found: Schedule) -> list[str]:
+    return [f"{one.node}[{one.index}]" if one.index else one.node for one in found.steps]
+
+
+def test_a_chain_keeps_its_order() -> None:
+    found = schedule(
+        expansion(step("c", ("b.x",), ("c.x",)), step("b", ("a.x",), ("b.x",)), step("a", (), ("a.x",)), image="c.x")
+    )
+    assert order(found) == ["a", "b", "c"]
+    assert found.proven
+    assert found.peak_bytes == found.lower_bound_bytes == 3 * MIB  # the picture all along, a and b while b runs
+    assert found.peak_node == "b"
+
+
+def test_readers_of_a_version_run_before_it_is_continued() -> None:
+    steps = (
+        step("light", (), ("light.x",)),
+        step("glass", (), ("light.x:2",)),
+        step("meter", ("light.x",), ("meter.x",)),
+        step("show", ("light.x:2", "meter.x"), ("show.x",)),
+    )
+    assert order(schedule(expansion(*steps))) == ["light", "meter", "glass", "show"]
+
+
+def test_a_function_s_reads_order_its_caller() -> None:
+    binding = FunctionBinding("shadow", "shadows", "shadow.glsl", reads("sun.map"))
+    light = replace(step("light", (), ("light.x",)), functions=(binding,))
+    found = schedule(expansion(light, step("sun", (), ("sun.map",)), image="light.x"))
+    assert order(found) == ["sun", "light"]
+
+
+def test_last_frame_s_value_orders_nothing_and_keeps_its_writer() -> None:
+    steps = (
+        step("blend", ("draw.x", "blend.old@"), ("blend.x",)),
+        step("draw", (), ("draw.x",)),
+        step("keep", ("draw.x",), ("blend.old",)),
+    )
+    found = schedule(expansion(*steps, image="blend.x", blend_old="history"))
+    assert sorted(order(found)) == ["blend", "draw", "keep"]
+    assert found.whole_frame == {"blend.x", "blend.old"}
+    assert found.peak_bytes == (1 + 2 + 1) * MIB  # picture, two copies of the history, draw.x
+
+
+def test_nothing_unwanted_runs() -> None:
+    steps = (
+        step("a", (), ("a.x",)),
+        step("lost", ("a.x",), ("lost.x", "lost.y")),
+        step("after", ("lost.x",), ("after.x",)),
+        step("show", ("a.x",), ("show.x",)),
+    )
+    found = schedule(replace(expansion(*steps), idle={"empty": "it recorded no step"}))
+    assert order(found) == ["a", "show"]
+    assert set(found.resources) == {"a.x", "show.x"}
+    assert found.culled == {
+        "lost": "only after would read lost.x and lost.y, and that does not run",
+        "after": "nothing reads after.x",
+        "empty": "it recorded no step",
+    }
+
+
+def test_a_node_loses_only_the_steps_nobody_needs() -> None:
+    steps = (step("a", (), ("a.x",)), step("a[1]", (), ("a.y",)), step("show", ("a.x",), ("show.x",)))
+    found = schedule(expansion(*steps))
+    assert order(found) == ["a", "show"]
+    assert found.culled == {}
+
+
+def test_a_whole_clear_needs_nothing_of_before_but_a_part_does() -> None:
+    first, second = step("first", (), ("t.x",)), step("second")
+    show = step("show", ("t.x:2",), ("show.x",))
+    cleared = replace(second, writes=writes("t.x:2", load="clear"))
+    part = replace(second, writes=writes("t.x:2", load="clear", layer=1))
+    assert order(schedule(expansion(first, cleared, show))) == ["second", "show"]
+    assert order(schedule(expansion(first, part, show))) == ["first", "second", "show"]
+
+
+def test_order_holds_across_a_culled_version() -> None:
+    steps = (
+        step("one", (), ("t.x",)),
+        step("meter", ("t.x",), ("meter.x",)),
+        step("two", (), ("t.x:2",)),
+        replace(step("three"), writes=writes("t.x:3", load="clear")),
+        step("show", ("t.x:3", "meter.x"), ("show.x",)),
+    )
+    assert order(schedule(expansion(*steps))) == ["one", "meter", "three", "show"]
+
+
+def test_mips_follow_the_writer_of_the_base_level() -> None:
+    base = replace(step("down"), writes=writes("down.x", mip=0))
+    chain = replace(step("down[1]", ("down.x",)), kind="mipmaps", writes=writes("down.x:2"))
+    assert order(schedule(expansion(base, chain, step("show", ("down.x:2",), ("show.x",))))) == [
+        "down",
+        "down[1]",
+        "show",
+    ]
+
+
+def test_a_buffer_filled_by_the_cpu_lives_the_whole_frame() -> None:
+    silhouette = Step(
+        "volume", 0, "draw", reads=(Read("edges", "volume.edges", 0, "buffer"),), writes=writes("volume.x")
+    )
+    base = expansion(step("a", (), ("a.x",)), silhouette, step("show", ("a.x", "volume.x"), ("show.x",)))
+    found = schedule(
+        replace(base, resources={**base.resources, "volume.edges": Resource("volume.edges", BufferDesc(64))})
+    )
+    assert found.whole_frame == {"show.x", "volume.edges"}
+
+
+def test_results_do_not_depend_on_the_order_of_nodes_or_keys() -> None:
+    base = fan_out(4)
+    first = schedule(base)
+    for seed in range(5):
+        chooser = random.Random(seed)
+        steps, resources = list(base.steps), list(base.resources.items())
+        chooser.shuffle(steps)
+        chooser.shuffle(resources)
+        assert schedule(replace(base, steps=tuple(steps), resources=dict(resources))) == first
+
+
+def test_keep_order_is_the_program_s() -> None:
+    base = fan_out(3)
+    kept = schedule(base, keep_order=True)
+    assert kept.steps == base.steps
+    assert kept.peak_bytes > schedule(base).peak_bytes == kept.lower_bound_bytes
+    assert "in the program's order" in kept.reasons["draw1", 0]
+
+
+def test_shuffle_draws_by_seed() -> None:
+    orders = {tuple(order(schedule(fan_out(3), shuffle=seed))) for seed in range(20)}
+    assert len(orders) > 5
+    assert schedule(fan_out(3), shuffle=3) == schedule(fan_out(3), shuffle=3)
+
+
+def fan_out(branches: int) -> Expansion:
+    """Independent branches of three passes, listed breadth first, merged by one."""
+    numbers = range(branches)
+    steps = [step(f"draw{n}", (), (f"draw{n}.x",)) for n in numbers]
+    steps += [step(f"light{n}", (f"draw{n}.x",), (f"light{n}.x",)) for n in numbers]
+    steps += [step(f"show{n}", (f"light{n}.x",), (f"show{n}.x",)) for n in numbers]
+    steps.append(step("merge", tuple(f"show{n}.x" for n in numbers), ("merge.x",)))
+    sizes = (
+        {f"draw{n}.x": 12 for n in numbers} | {f"light{n}.x": 8 for n in numbers} | {f"show{n}.x": 2 for n in numbers}
+    )
+    return expansion(*steps, sizes=sizes | {"merge.x": 4})
+
+
+@pytest.mark.parametrize("branches", [1, 2, 6, 12])
+def test_a_fan_out_runs_branch_by_branch_and_is_proven(branches: int) -> None:
+    found = schedule(fan_out(branches))
+    assert found.proven
+    assert found.peak_bytes == (4 + 20 + 2 * (branches - 1)) * MIB  # the last branch beside what the others left
+    assert [one.node.rstrip("0123456789") for one in found.steps] == ["draw", "light", "show"] * branches + ["merge"]
+
+
+def test_a_budget_of_nothing_still_gives_a_good_order_and_claims_no_proof() -> None:
+    found = schedule(fan_out(12), budget_s=0)
+    assert not found.proven
+    assert found.peak_bytes == schedule(fan_out(12)).peak_bytes
+
+
+def test_reasons_say_why() -> None:
+    found = schedule(fan_out(2))
+    assert found.reasons == {
+        ("draw0", 0): "first of 2 that could run, reading from the outputs",
+        ("light0", 0): "first of 2 that could run, reading from the outputs; releases draw0.x (12.0 MiB)",
+        ("show0", 0): "first of 2 that could run, reading from the outputs; releases light0.x (8.0 MiB)",
+        ("draw1", 0): "nothing else can run yet",
+        ("light1", 0): "nothing else can run yet; releases draw1.x (12.0 MiB)",
+        ("show1", 0): "nothing else can run yet; releases light1.x (8.0 MiB)",
+        ("merge", 0): "everything else has run; releases show0.x and 1 more (4.0 MiB)",
+    }
+
+
+def test_dependencies_are_a_networkx_graph_with_reasons() -> None:
+    dag = schedule(fan_out(1)).dependencies
+    assert dag is not None
+    assert dag.edges[("draw0", 0), ("light0", 0)] == {"resource": "draw0.x", "why": "reads"}
+
+
+def test_ten_thousand_steps_take_seconds() -> None:
+    chooser = random.Random(1)
+    steps = [step("n0", (), ("n0.x",))]
+    for n in range(1, 10_000):
+        steps.append(step(f"n{n}", tuple({f"n{n - 1}.x", f"n{max(0, n - chooser.randrange(1, 9))}.x"}), (f"n{n}.x",)))
+    start = time.process_time()
+    found = schedule(expansion(*steps))
+    assert len(found.steps) == 10_000
+    assert time.process_time() - start < 30  # quadratic would be hours; the bound is loose for slow machines
+
+
+# --- messages --------------------------------------------------------------------------------------------------------
+
+WRONG = {
+    "RG601": expansion(step("ao", ("ao.raw:0",), ("ao.occlusion",))),
+    "RG602": expansion(
+        step("light", (), ("light.radiance",)),
+        step("glow", (), ("light.radiance:2", "glow.mask")),
+        step("compose", ("light.radiance", "glow.mask"), ("compose.color",)),
+    ),
+    "RG603": expansion(
+        Step("bloom", 0, "mipmaps", (), (Read("bright", "bloom.bright", 0, "attach"),), writes("bloom.bright"))
+    ),
+    "RG604": Expansion((), {"show.color": Resource("show.color", mebibytes(1))}, {"image": "show.color"}),
+    "RG605": expansion(
+        step("light", (), ("light.radiance",)),
+        step("sky", (), ("light.radiance:2",)),
+        step("fog", (), ("light.radiance:2",)),
+    ),
+    "RG606": Expansion((step("peel"),) * 20_000, {}, {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", sorted(WRONG))
+def test_the_page_of_a_code_has_its_message(code: str) -> None:
+    (page,) = Path(folder("rendergraph.errors")).glob(f"{code}-*.yaml")
+    expected = yaml.safe_load(page.read_text(encoding="utf-8"))["message"]
+    with pytest.raises(InputError, match=code) as caught:
+        schedule(WRONG[code])
+    assert str(caught.value) == expected
+
+
+def test_a_first_write_that_loads_is_refused() -> None:
+    one = replace(step("a"), writes=writes("a.x", load="load"))
+    with pytest.raises(InputError, match=r"RG603 .*'a\.x', in node 'a'"):
+        schedule(expansion(one))
+
+
+def test_all_problems_come_at_once() -> None:
+    steps = (step("a", ("a.raw:0",), ("a.x",)), step("b", ("b.raw:0", "a.x"), ("b.x",)))
+    with pytest.raises(InputError, match="RG601") as caught:
+        schedule(expansion(*steps))
+    assert len(caught.value.problems) == 2
