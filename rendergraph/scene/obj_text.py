@@ -1,0 +1,380 @@
+"""The statements of an OBJ file as arrays, read a whole block of lines at a time.
+
+Vertices and faces are turned into numbers by one vectorised parse of a block; a block that this cannot take is read
+again line by line, to find the mistake or the oddity.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.scene.files import Reading, shown
+
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bytes = npt.NDArray[np.uint8]
+
+BLOCK_BYTES = 16 << 20
+ABSENT = 9_999_999_999
+"""Stands for a texture coordinate or normal that a corner does not have."""
+_ARRAYS = (b"v", b"vt", b"vn", b"f")
+_STATES = (b"o", b"g", b"s", b"usemtl")
+_SILENT = (b"vp", b"mg", b"lod", b"bevel", b"c_interp", b"d_interp", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
+_BLANKS = np.zeros(256, bool)
+_BLANKS[[9, 11, 12, 13, 32]] = True
+
+
+@dataclass
+class Statements:
+    """Everything an OBJ file says.
+
+    Attributes:
+        positions: (v, 3); `colors` (v, 3), NaN where a vertex has none.
+        uvs: (t, 2) as written, v upwards.
+        normals: (n, 3).
+        corners: (c, 3) position, texture coordinate and normal of each corner, from 0, `ABSENT` where there is none.
+        sizes: corners of each face; `lines` its line.
+        states: for each face, columns object, group, smoothing group and material as numbers into `names`.
+        names: the words behind the numbers; smoothing groups are kept as they are, 0 for off.
+        libraries: `mtllib` arguments with their lines.
+        smoothed: whether there is an `s` statement at all.
+    """
+
+    positions: Doubles
+    colors: Doubles
+    uvs: Doubles
+    normals: Doubles
+    corners: Ints
+    sizes: Ints
+    lines: Ints
+    states: Ints
+    names: tuple[list[str], list[str], list[str], list[str]]
+    libraries: list[tuple[str, int]]
+    smoothed: bool
+
+
+@dataclass
+class _Growing:
+    """What has been read so far; state words are numbered as they come."""
+
+    positions: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
+    colors: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
+    uvs: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 2))])
+    normals: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
+    corners: list[Ints] = field(default_factory=lambda: [np.zeros((0, 3), np.int64)])
+    sizes: list[Ints] = field(default_factory=lambda: [np.zeros(0, np.int64)])
+    lines: list[Ints] = field(default_factory=lambda: [np.zeros(0, np.int64)])
+    states: list[Ints] = field(default_factory=lambda: [np.zeros((0, 4), np.int64)])
+    counts: list[int] = field(default_factory=lambda: [0, 0, 0])
+    numbers: tuple[dict[str, int], ...] = field(default_factory=lambda: ({"": 0}, {"": 0}, {"": 0}, {"": 0}))
+    current: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
+    libraries: list[tuple[str, int]] = field(default_factory=list)
+    smoothed: bool = False
+
+
+def text_of(raw: bytes) -> str:
+    """A name's bytes as text: UTF-8, or Latin-1 where it is none."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def statements(data: bytes, reading: Reading) -> Statements:
+    """Parse a whole file.
+
+    Raises:
+        InputError: a statement is malformed, a number not finite, or a limit passed.
+    """
+    if data.startswith(b"\xef\xbb\xbf"):
+        data = data[3:]
+    if b"\0" in data[:4096]:
+        raise reading.error("RG303", "is no OBJ text: it holds zero bytes")
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
+    grown = _Growing()
+    for block, first_line in _blocks(data):
+        _Block(block, first_line, grown, reading).read()
+    names = tuple(list(table) for table in grown.numbers)
+    return Statements(
+        np.concatenate(grown.positions), np.concatenate(grown.colors), np.concatenate(grown.uvs),
+        np.concatenate(grown.normals), np.concatenate(grown.corners), np.concatenate(grown.sizes),
+        np.concatenate(grown.lines), np.concatenate(grown.states), (names[0], names[1], names[2], names[3]),
+        grown.libraries, grown.smoothed,
+    )  # fmt: skip
+
+
+def _blocks(data: bytes) -> Iterator[tuple[bytes, int]]:
+    """Blocks that end at a line's end, with their first line's number."""
+    at, line = 0, 1
+    while at < len(data):
+        end = data.find(b"\n", min(len(data), at + BLOCK_BYTES))
+        while end > 0 and data[at:end].rstrip(b"\r").endswith(b"\\"):
+            end = data.find(b"\n", end + 1)
+        end = len(data) if end < 0 else end + 1
+        block = data[at:end]
+        yield block, line
+        line += block.count(b"\n")
+        at = end
+
+
+class _Block:
+    """One block of lines: finds words, sorts lines by statement, and parses each kind at once."""
+
+    def __init__(self, block: bytes, first_line: int, grown: _Growing, reading: Reading) -> None:
+        self.grown, self.reading, self.first_line = grown, reading, first_line
+        self.original = block
+        if b"\\" in block:  # a continued line becomes one; byte offsets, and so line numbers, stay
+            block = block.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
+        if not block.endswith(b"\n"):
+            block += b"\n"
+        if b"#" in block:
+            block = _without_comments(block)
+        self.block = block
+        self.bytes: Bytes = np.frombuffer(block, np.uint8)
+        self._line_starts: Ints | None = None
+        ends = np.flatnonzero(self.bytes == 10)
+        self.starts = np.concatenate([[0], ends[:-1] + 1])
+        self.lengths = ends + 1 - self.starts
+        ink = ~_BLANKS[self.bytes]
+        ink[ends] = False
+        before = np.empty_like(ink)
+        before[0] = False
+        before[1:] = ink[:-1]
+        self.words = np.flatnonzero(ink & ~before)
+        self.word_ends = np.flatnonzero(~ink & before)
+        self.line_of_word = np.searchsorted(ends, self.words)
+        self.word_counts = np.bincount(self.line_of_word, minlength=len(ends))
+        self.first_word = np.cumsum(self.word_counts) - self.word_counts
+
+    def line(self, row: int) -> int:
+        """The number in the file of one of the block's (joined) lines."""
+        return self.first_line + self.original.count(b"\n", 0, int(self.starts[row]))
+
+    def read(self) -> None:
+        """Add everything in the block to what is grown."""
+        kinds = self._kinds()
+        rows = [np.flatnonzero(kinds == kind) for kind in range(4)]
+        limit = self.reading.limits.vertices
+        for kind, what in enumerate(("positions", "texture coordinates", "normals")):
+            if self.grown.counts[kind] + len(rows[kind]) > limit:
+                raise self.reading.over(f"more than {limit:,} {what}", "vertices")
+        self._faces(rows, kinds)
+        self._vertices(rows[0])
+        for kind, least, target in ((1, 1, self.grown.uvs), (2, 3, self.grown.normals)):
+            if len(rows[kind]):
+                values, counts, at = self._numbers(rows[kind], least, 3)
+                width = 2 if kind == 1 else 3
+                table = np.zeros((len(rows[kind]), width))
+                for column in range(width):
+                    has = counts > column
+                    table[has, column] = values[at[has] + column]
+                target.append(table)
+        for kind in range(3):
+            self.grown.counts[kind] += len(rows[kind])
+
+    def _kinds(self) -> npt.NDArray[np.int8]:
+        """For each line its place in `_ARRAYS`, 4 for a change of state or library, -1 for nothing to read."""
+        kinds = np.full(len(self.starts), -1, np.int8)
+        used = np.flatnonzero(self.word_counts)
+        first = self.first_word[used]
+        start, length = self.words[first], self.word_ends[first] - self.words[first]
+        one, two = self.bytes[start], self.bytes[np.minimum(start + 1, len(self.bytes) - 1)]
+        short, pair = length == 1, length == 2
+        found = np.full(len(used), 9, np.int8)
+        found[short & (one == ord("v"))] = 0
+        found[pair & (one == ord("v")) & (two == ord("t"))] = 1
+        found[pair & (one == ord("v")) & (two == ord("n"))] = 2
+        found[short & (one == ord("f"))] = 3
+        for place in np.flatnonzero(found == 9):
+            found[place] = self._other(int(used[place]))
+        kinds[used] = found
+        return kinds
+
+    def _other(self, row: int) -> int:
+        """A line that is neither vertex nor face: 4 where it changes the state, else -1 with a warning where needed."""
+        start = self.words[self.first_word[row]]
+        end = self.word_ends[self.first_word[row]]
+        word = self.block[start:end]
+        if word in _STATES:
+            return 4
+        if word == b"mtllib":
+            self.grown.libraries.append((text_of(self._rest(row)), self.line(row)))
+        elif word in (b"l", b"p"):
+            what = "lines" if word == b"l" else "points"
+            self.reading.warn("RG333", what, f"{what} are left out; only faces are drawn", line=self.line(row))
+        elif word not in _SILENT:
+            name = shown(text_of(word), 30)
+            self.reading.warn("RG331", name, f"unknown statement '{name}' is left out", line=self.line(row))
+        return -1
+
+    def _rest(self, row: int) -> bytes:
+        end = self.starts[row] + self.lengths[row]
+        return self.block[self.word_ends[self.first_word[row]] : end].strip()
+
+    # Numbers ----------------------------------------------------------------------------------------------------------
+
+    def _text(self, rows: Ints, slashes: bool = False) -> bytes:
+        """The arguments of some lines as one text, the first words blanked."""
+        keep = np.zeros(len(self.starts), bool)
+        keep[rows] = True
+        chosen = self.bytes.copy()
+        first = self.first_word[rows]
+        chosen[self.words[first]] = 32
+        chosen[self.word_ends[first] - 1] = 32  # vt and vn have a second letter
+        text = chosen[np.repeat(keep, self.lengths)].tobytes()
+        if slashes:
+            text = text.replace(b"//", b"/%d/" % ABSENT).replace(b"/", b" ")
+        return text
+
+    def _parse(self, text: bytes, kind: type[np.float64] | type[np.int64], count: int) -> npt.NDArray[np.generic] | None:
+        """The numbers in a text, or None where it holds something else or another number of them."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)
+            try:
+                values: npt.NDArray[np.generic] = np.fromstring(text, kind, sep=" ")
+            except (DeprecationWarning, ValueError):
+                return None
+        return values if len(values) == count else None
+
+    def _numbers(self, rows: Ints, least: int, most: int) -> tuple[Doubles, Ints, Ints]:
+        """Arguments of lines as finite numbers, how many each line has, and where each line's first is."""
+        counts = self.word_counts[rows] - 1
+        for row in rows[(counts < least) | (counts > most)][:1]:
+            word = text_of(self.block[self.words[self.first_word[row]] : self.word_ends[self.first_word[row]]])
+            raise self._wrong(int(row), f"'{word}' takes {least} to {most} numbers, here are {self.word_counts[row] - 1}")
+        values = self._parse(self._text(rows), np.float64, int(counts.sum()))
+        if values is None:
+            for row in rows:
+                for word in self._rest(int(row)).split():
+                    if self._parse(word, np.float64, 1) is None:
+                        raise self._wrong(int(row), f"'{shown(text_of(word), 30)}' is no number")
+            raise self._wrong(int(rows[0]), "its numbers cannot be told apart")
+        at = np.cumsum(counts) - counts
+        bad = ~np.isfinite(values.astype(np.float32))
+        if bad.any():
+            row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
+            raise self.reading.error("RG306", f"'{shown(text_of(self._rest(row)), 60)}' is not finite", line=self.line(row))
+        return values.astype(np.float64), counts, at
+
+    def _wrong(self, row: int, text: str) -> Exception:
+        return self.reading.error("RG304", text, line=self.line(row))
+
+    def _vertices(self, rows: Ints) -> None:
+        if not len(rows):
+            return
+        values, counts, at = self._numbers(rows, 3, 7)
+        for row in rows[counts == 5][:1]:
+            raise self._wrong(int(row), "'v' takes 3, 4, 6 or 7 numbers, here are 5")
+        self.grown.positions.append(values[at[:, None] + np.arange(3)])
+        colors = np.full((len(rows), 3), np.nan)
+        colored = counts >= 6
+        if colored.any():
+            colors[colored] = values[(at + counts - 3)[colored, None] + np.arange(3)]
+        self.grown.colors.append(colors)
+
+    # Faces ------------------------------------------------------------------------------------------------------------
+
+    def _faces(self, rows: list[Ints], kinds: npt.NDArray[np.int8]) -> None:
+        faces = rows[3]
+        states = self._states(faces, np.flatnonzero(kinds == 4))
+        if not len(faces):
+            return
+        sizes = self.word_counts[faces] - 1
+        for row in faces[sizes < 3][:1]:
+            raise self._wrong(int(row), f"a face takes at least 3 corners, here are {self.word_counts[row] - 1}")
+        corners = self._corners(faces, sizes)
+        seen = np.stack([np.cumsum(kinds == kind)[faces] + self.grown.counts[kind] for kind in range(3)], axis=1)
+        seen = np.repeat(seen, sizes, axis=0)
+        zero = corners == 0
+        if zero.any():
+            face = int(np.searchsorted(np.cumsum(sizes), int(np.flatnonzero(zero.any(axis=1))[0]), side="right"))
+            line = self.line(int(faces[face]))
+            raise self.reading.error("RG305", "index 0 is out of range; indices start at 1", line=line)
+        corners = np.where(corners < 0, corners + seen, np.where(corners == ABSENT, ABSENT, corners - 1))
+        newlines = np.cumsum(np.frombuffer(self.original, np.uint8) == 10) if b"\\" in self.original else None
+        where = faces if newlines is None else np.where(self.starts[faces] > 0, newlines[self.starts[faces] - 1], 0)
+        self.grown.corners.append(corners)
+        self.grown.sizes.append(sizes.astype(np.int64))
+        self.grown.lines.append(where.astype(np.int64) + self.first_line)
+        self.grown.states.append(states)
+
+    def _corners(self, faces: Ints, sizes: Ints) -> Ints:
+        """Indices of every corner as written, `ABSENT` for missing ones."""
+        marks = np.concatenate([[0], np.cumsum(self.bytes == ord("/"))])
+        words = np.repeat(self.first_word[faces] + 1, sizes) + _within(sizes)
+        slashes = marks[self.word_ends[words]] - marks[self.words[words]]
+        if int(slashes.max()) <= 2:
+            values = self._parse(self._text(faces, slashes=True), np.int64, int((slashes + 1).sum()))
+            if values is not None:
+                table = np.full((len(slashes), 3), ABSENT, np.int64)
+                at = np.cumsum(slashes + 1) - (slashes + 1)
+                whole = values.astype(np.int64)
+                table[:, 0] = whole[at]
+                for column in (1, 2):
+                    has = slashes >= column
+                    table[has, column] = whole[at[has] + column]
+                table[:, 0] = np.where(table[:, 0] == ABSENT, 0, table[:, 0])
+                return table
+        return np.array([self._corner(int(row), word) for row in faces for word in self._rest(int(row)).split()], np.int64)
+
+    def _corner(self, row: int, word: bytes) -> tuple[int, int, int]:
+        """One corner by itself; a trailing slash stands for nothing."""
+        fields = word.split(b"/")
+        numbers = [ABSENT, ABSENT, ABSENT]
+        for column, digits in enumerate(fields):
+            if column > 2 or (not digits and column == 0) or not (digits == b"" or digits.lstrip(b"+-").isdigit()):
+                raise self._wrong(row, f"'{shown(text_of(word), 40)}' is no corner; write v, v/vt, v//vn or v/vt/vn")
+            if digits:
+                try:
+                    numbers[column] = max(-(2**53), min(2**53, int(digits[:20])))
+                except ValueError:
+                    raise self._wrong(row, f"'{shown(text_of(word), 40)}' is no corner") from None
+        return numbers[0], numbers[1], numbers[2]
+
+    def _states(self, faces: Ints, changes: Ints) -> Ints:
+        """Numbers of object, group, smoothing group and material in force at each face."""
+        grown = self.grown
+        table = [list(grown.current)]
+        for row in changes:
+            start, end = self.words[self.first_word[row]], self.word_ends[self.first_word[row]]
+            column = _STATES.index(self.block[start:end])
+            name = text_of(self._rest(int(row)))
+            if column == 2:
+                grown.smoothed = True
+                name = "" if name.lower() in ("off", "0") else name
+            numbers = grown.numbers[column]
+            grown.current[column] = numbers.setdefault(name, len(numbers))
+            if column == 0:  # a new object starts without a group
+                grown.current[1] = 0
+            table.append(list(grown.current))
+        return np.array(table, np.int64)[np.searchsorted(changes, faces)]
+
+
+def _within(sizes: Ints) -> Ints:
+    """0, 1, … within each run."""
+    total = int(sizes.sum())
+    return np.arange(total) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+
+
+def _without_comments(block: bytes) -> bytes:
+    """Blank every `#` that starts a word, up to the line's end."""
+    pieces, at = [], 0
+    while True:
+        found = block.find(b"#", at)
+        if found < 0:
+            break
+        if found and block[found - 1] not in b" \t\r\n\v\f":  # part of a name
+            pieces.append(block[at : found + 1])
+            at = found + 1
+            continue
+        end = block.find(b"\n", found)
+        end = len(block) if end < 0 else end
+        pieces += [block[at:found], b" " * (end - found)]
+        at = end
+    return b"".join([*pieces, block[at:]])

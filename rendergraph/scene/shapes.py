@@ -1,0 +1,296 @@
+"""Generated shapes, with exact normals, texture coordinates and tangents.
+
+All stand on their own centre with +Y up, sizes in metres. Seen from outside, u runs to the right and v downwards. Closed
+shapes are closed 2-manifolds once vertices are welded by position: seams and poles repeat their positions bit by bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.scene.geometry import translation, unit
+from rendergraph.scene.keys import Key, positive, whole
+from rendergraph.scene.model import Matrix, Mesh
+from rendergraph.scene.polygons import clip_ears
+
+Doubles = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of a shape.
+
+    Attributes:
+        mesh: its geometry.
+        local: where it stands within the shape, (4, 4).
+        suffix: added to the object's name, empty for the only part.
+        changes: material values this part has instead of the given material's.
+    """
+
+    mesh: Mesh
+    local: Matrix
+    suffix: str = ""
+    changes: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A kind of shape: what makes it and its parameters; `vertices` estimates their number beforehand."""
+
+    doc: str
+    keys: tuple[Key, ...]
+    make: Callable[..., Mesh | list[Part]]
+    vertices: Callable[[Mapping[str, Any]], int] = lambda values: 100
+
+
+def build(shape: str, **values: Any) -> list[Part]:
+    """The parts of a shape; parameters that are not given have their defaults.
+
+    Raises:
+        KeyError: there is no such shape.
+    """
+    kind = SHAPES[shape]
+    made = kind.make(**{key.name: key.default for key in kind.keys} | values)
+    return made if isinstance(made, list) else [Part(made, np.eye(4))]
+
+
+def mesh(shape: str, **values: Any) -> Mesh:
+    """The mesh of a shape of one part."""
+    return build(shape, **values)[0].mesh
+
+
+def _mesh(name: str, positions: npt.ArrayLike, triangles: npt.ArrayLike, normals: npt.ArrayLike, uv: npt.ArrayLike,
+          along: npt.ArrayLike) -> Mesh:  # fmt: skip
+    """A mesh from plain arrays; `along` is the direction of growing u, w is +1 for all shapes here."""
+    tangents = np.concatenate([unit(along), np.ones((len(np.asarray(along)), 1))], axis=1)
+    return Mesh(name, np.asarray(positions, np.float32) + np.float32(0), np.asarray(triangles, np.uint32).reshape(-1, 3),
+                np.asarray(normals, np.float32), tangents.astype(np.float32), np.asarray(uv, np.float32))  # fmt: skip
+
+
+def _joined(name: str, meshes: Sequence[Mesh]) -> Mesh:
+    starts = np.cumsum([0, *(len(part.positions) for part in meshes)])
+    columns = [np.concatenate([getattr(part, field) for part in meshes])
+               for field in ("positions", "normals", "tangents", "uv0")]  # fmt: skip
+    indices = np.concatenate([part.indices + np.uint32(start) for part, start in zip(meshes, starts, strict=False)])
+    return Mesh(name, columns[0], indices, columns[1], columns[2], columns[3])
+
+
+def _grid(columns: int, rows: int, degenerate: tuple[bool, bool] = (False, False)) -> npt.NDArray[np.int64]:
+    """Triangles of a grid of (rows+1)×(columns+1) vertices; a degenerate first or last row is a pole."""
+    i, j = np.meshgrid(np.arange(columns), np.arange(rows))
+    a = j * (columns + 1) + i
+    b, c, d = a + columns + 1, a + columns + 2, a + 1
+    lower, upper = np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)
+    if degenerate[1]:
+        lower = lower[:-1]
+        upper[-1, :, 1] = b[-1]
+    if degenerate[0]:
+        upper = upper[1:]
+    return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
+
+
+def _lathe(name: str, profile: Sequence[tuple[float, float, float, float]], segments: int, v: Sequence[float] | None = None) -> Mesh:
+    """A profile of (radius, height, normal's radial part, normal's height) from top to bottom, turned about Y."""
+    r, y, nr, ny = np.array(profile, np.float64).T
+    rows = len(r) - 1
+    i = np.arange(segments + 1)
+    phi = 2 * np.pi * (i % segments) / segments  # the seam repeats the first column's bits
+    sin, cos = np.sin(phi), np.cos(phi)
+    positions = np.stack([np.outer(r, sin), np.repeat(y[:, None], segments + 1, 1), np.outer(r, cos)], axis=-1)
+    normals = np.stack([np.outer(nr, sin), np.repeat(ny[:, None], segments + 1, 1), np.outer(nr, cos)], axis=-1)
+    u = np.repeat((i / segments)[None], rows + 1, 0)
+    turn = np.repeat(phi[None], rows + 1, 0)
+    poles = r == 0
+    u[poles] += 0.5 / segments  # a pole's vertex belongs to one triangle: it takes the middle of its side
+    turn[poles] += np.pi / segments
+    down = np.linspace(0, 1, rows + 1) if v is None else np.asarray(v)
+    uv = np.stack([u, np.repeat(down[:, None], segments + 1, 1)], axis=-1)
+    along = np.stack([np.cos(turn), np.zeros_like(turn), -np.sin(turn)], axis=-1)
+    return _mesh(name, positions.reshape(-1, 3), _grid(segments, rows, (bool(poles[0]), bool(poles[-1]))),
+                 unit(normals).reshape(-1, 3), uv.reshape(-1, 2), along.reshape(-1, 3))  # fmt: skip
+
+
+def _cap(radius: float, height: float, up: bool, segments: int) -> Mesh:
+    """A disc of one fan, its texture as seen from outside."""
+    phi = 2 * np.pi * np.arange(segments) / segments
+    x, z = radius * np.sin(phi), radius * np.cos(phi)
+    positions = np.concatenate([[[0, height, 0]], np.stack([x, np.full(segments, height), z], axis=1)])
+    sign = 1.0 if up else -1.0
+    uv = 0.5 + 0.5 * positions[:, [0, 2]] / radius * (1, sign)
+    ring = np.arange(segments) + 1
+    ahead = np.roll(ring, -1)
+    center = np.zeros(segments, np.int64)
+    triangles = np.stack([center, ring, ahead] if up else [center, ahead, ring], axis=1)
+    count = segments + 1
+    return _mesh("cap", positions, triangles, np.tile((0, sign, 0), (count, 1)), uv, np.tile((1, 0, 0), (count, 1)))
+
+
+def plane(size: Sequence[float], segments: int) -> Mesh:
+    """A horizontal rectangle facing +Y, `size` along X and Z."""
+    t = np.linspace(0, 1, segments + 1)
+    u, v = np.meshgrid(t, t)
+    positions = np.stack([(u - 0.5) * size[0], np.zeros_like(u), (v - 0.5) * size[1]], axis=-1).reshape(-1, 3)
+    count = len(positions)
+    return _mesh("plane", positions, _grid(segments, segments), np.tile((0, 1, 0), (count, 1)),
+                 np.stack([u, v], axis=-1).reshape(-1, 2), np.tile((1, 0, 0), (count, 1)))  # fmt: skip
+
+
+def box(size: Sequence[float]) -> Mesh:
+    """A box with flat faces, each with the whole texture."""
+    half = np.asarray(size, np.float64) / 2
+    parts = []
+    for right, up, out in ((0, 0, -1), (0, 1, 0), (1, 0, 0)), ((0, 0, 1), (0, 1, 0), (-1, 0, 0)), (
+        (1, 0, 0), (0, 0, -1), (0, 1, 0)), ((1, 0, 0), (0, 0, 1), (0, -1, 0)), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), (
+        (-1, 0, 0), (0, 1, 0), (0, 0, -1)):  # fmt: skip
+        u, v = np.array([[0, 0], [0, 1], [1, 1], [1, 0]]).T[:, :, None]
+        positions = (np.asarray(out) + (2 * u - 1) * np.asarray(right) + (1 - 2 * v) * np.asarray(up)) * half
+        parts.append(_mesh("side", positions, [[0, 1, 2], [0, 2, 3]], np.tile(out, (4, 1)),
+                           np.concatenate([u, v], axis=1), np.tile(right, (4, 1))))  # fmt: skip
+    return _joined("box", parts)
+
+
+def sphere(radius: float, segments: int, rings: int) -> Mesh:
+    """A UV sphere with exact normals."""
+    theta = np.pi * np.arange(rings + 1) / rings
+    sin, cos = np.sin(theta), np.cos(theta)
+    sin[0] = sin[-1] = 0.0  # poles are one point
+    return _lathe("sphere", [(radius * s, radius * c, s, c) for s, c in zip(sin, cos, strict=True)], segments)
+
+
+def cylinder(radius: float, height: float, segments: int) -> Mesh:
+    """An upright cylinder with flat caps."""
+    half = height / 2
+    side = _lathe("side", [(radius, half, 1, 0), (radius, -half, 1, 0)], segments)
+    return _joined("cylinder", [side, _cap(radius, half, True, segments), _cap(radius, -half, False, segments)])
+
+
+def cone(radius: float, height: float, segments: int) -> Mesh:
+    """An upright cone, its tip at the top, with a flat base."""
+    half = height / 2
+    tip = _lathe("side", [(0, half, height, radius), (radius, -half, height, radius)], segments)
+    phi = 2 * np.pi * (np.arange(segments + 1) + 0.5) / segments  # the tip has no normal: each side's own stands there
+    slope = unit([height, radius])
+    normals = tip.normals.copy()
+    normals[: segments + 1] = np.stack([slope[0] * np.sin(phi), np.full(segments + 1, slope[1]), slope[0] * np.cos(phi)], axis=1)
+    side = Mesh("side", tip.positions, tip.indices, normals, tip.tangents, tip.uv0)
+    return _joined("cone", [side, _cap(radius, -half, False, segments)])
+
+
+def torus(radius: float, tube: float, segments: int, sides: int) -> Mesh:
+    """A ring in the XZ plane: `radius` to the middle of a tube of radius `tube`."""
+    theta = np.pi - 2 * np.pi * (np.arange(sides + 1) % sides) / sides
+    profile = [(radius + tube * c, tube * s, c, s) for c, s in zip(np.cos(theta), np.sin(theta), strict=True)]
+    return _lathe("torus", profile, segments)
+
+
+def torus_knot(radius: float, tube: float, p: int, q: int, segments: int, sides: int) -> Mesh:
+    """A tube along a (p, q) torus knot: p turns about the axis, q through the hole.
+
+    The knot lies on a torus of radii `radius` and 0.4·`radius`, whose own normal is at right angles to the knot
+    everywhere: with the knot's direction it makes a frame that closes without twist.
+    """
+    i = np.arange(segments + 1) % segments
+    s = 2 * np.pi * i / segments
+    minor = 0.4 * radius
+    out = np.stack([np.cos(q * s) * np.cos(p * s), np.sin(q * s), -np.cos(q * s) * np.sin(p * s)], axis=1)
+    ring = np.stack([np.cos(p * s), np.zeros_like(s), -np.sin(p * s)], axis=1)
+    center = radius * ring + minor * out
+    ahead = np.stack([-np.sin(p * s), np.zeros_like(s), -np.cos(p * s)], axis=1) * (p * (radius + minor * np.cos(q * s)))[:, None]
+    ahead += q * minor * np.stack([-np.sin(q * s) * np.cos(p * s), np.cos(q * s), np.sin(q * s) * np.sin(p * s)], axis=1)
+    ahead = unit(ahead)
+    side = np.cross(ahead, out)
+    angle = 2 * np.pi * (np.arange(sides + 1) % sides) / sides
+    normals = np.cos(angle)[:, None, None] * out + np.sin(angle)[:, None, None] * side
+    positions = center + tube * normals
+    u, v = np.meshgrid(np.arange(segments + 1) / segments * max(p, q) * 2, np.arange(sides + 1) / sides)
+    return _mesh("torus_knot", positions.reshape(-1, 3), _grid(segments, sides), normals.reshape(-1, 3),
+                 np.stack([u, v], axis=-1).reshape(-1, 2), np.tile(ahead, (sides + 1, 1)))  # fmt: skip
+
+
+def stairs(size: Sequence[float], steps: int) -> Mesh:
+    """A solid flight of stairs that climbs towards -Z, within `size`."""
+    width, height, depth = size
+    profile = [(0.0, 0.0)]
+    for k in range(steps):
+        profile += [(k / steps, (k + 1) / steps), ((k + 1) / steps, (k + 1) / steps)]
+    profile.append((1.0, 0.0))
+    zy = np.array(profile)
+    left = np.stack([np.full(len(zy), -width / 2), (zy[:, 1] - 0.5) * height, (0.5 - zy[:, 0]) * depth], axis=1)
+    right = left * (-1, 1, 1)
+    uv = np.stack([zy[:, 0], 1 - zy[:, 1]], axis=1)
+    ears = clip_ears(left)
+    count = len(left)
+    parts = [
+        _mesh("left", left, ears, np.tile((-1, 0, 0), (count, 1)), uv * (-1, 1) + (1, 0), np.tile((0, 0, 1), (count, 1))),
+        _mesh("right", right, ears[:, ::-1], np.tile((1, 0, 0), (count, 1)), uv, np.tile((0, 0, -1), (count, 1))),
+    ]
+    for k in range(count):
+        a, b = k, (k + 1) % count
+        corners = np.stack([left[b], left[a], right[a], right[b]])
+        normal = unit(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
+        parts.append(_mesh("tread", corners, [[0, 1, 2], [0, 2, 3]], np.tile(normal, (4, 1)),
+                           [[0, 0], [0, 1], [1, 1], [1, 0]], np.tile((1, 0, 0), (4, 1))))  # fmt: skip
+    return _joined("stairs", parts)
+
+
+def sphere_grid(radius: float, columns: int, rows: int, spacing: float, roughness: Sequence[float],
+                metallic: Sequence[float], segments: int, rings: int) -> list[Part]:  # fmt: skip
+    """Spheres in the XY plane: roughness grows from left to right, metallic from bottom to top."""
+    ball = sphere(radius, segments, rings)
+    parts = []
+    for row, metal in enumerate(np.linspace(*metallic, rows)):
+        for column, rough in enumerate(np.linspace(*roughness, columns)):
+            at = ((column - (columns - 1) / 2) * spacing, (row - (rows - 1) / 2) * spacing, 0.0)
+            changes = (("roughness", float(rough)), ("metallic", float(metal)))
+            parts.append(Part(ball, translation(at), f"/{column}_{row}", changes))
+    return parts
+
+
+def _range(name: str, doc: str, default: tuple[float, float]) -> Key:
+    return Key(name, "vector", doc, default, low=0, high=1, size=2)
+
+
+_SEGMENTS = whole("segments", "Sides around the axis.", 48, 3, 2048)
+SHAPES: dict[str, Shape] = {
+    "plane": Shape("A horizontal rectangle facing +Y.", (
+        Key("size", "vector", "Extent along X and Z.", (1.0, 1.0), "m", low=0, above=True, size=2),
+        whole("segments", "Squares along each side.", 1, 1, 1024),
+    ), plane, lambda v: (v["segments"] + 1) ** 2),
+    "box": Shape("A box.", (
+        Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
+    ), box),
+    "sphere": Shape("A sphere of latitude and longitude.", (
+        positive("radius", "Radius.", 0.5), _SEGMENTS, whole("rings", "Rows from pole to pole.", 24, 2, 1024),
+    ), sphere, lambda v: (v["segments"] + 1) * (v["rings"] + 1)),
+    "cylinder": Shape("An upright cylinder with caps.", (
+        positive("radius", "Radius.", 0.5), positive("height", "Extent along Y.", 1.0), _SEGMENTS,
+    ), cylinder, lambda v: 4 * (v["segments"] + 1)),
+    "cone": Shape("An upright cone with a base.", (
+        positive("radius", "Radius of the base.", 0.5), positive("height", "Extent along Y.", 1.0), _SEGMENTS,
+    ), cone, lambda v: 3 * (v["segments"] + 1)),
+    "torus": Shape("A ring around Y.", (
+        positive("radius", "From the centre to the middle of the tube.", 0.5), positive("tube", "Radius of the tube.", 0.2),
+        _SEGMENTS, whole("sides", "Sides around the tube.", 24, 3, 1024),
+    ), torus, lambda v: (v["segments"] + 1) * (v["sides"] + 1)),
+    "torus_knot": Shape("A tube along a torus knot around Y.", (
+        positive("radius", "Radius of the torus the knot lies on.", 0.5), positive("tube", "Radius of the tube.", 0.1),
+        whole("p", "Turns about the axis.", 2, 1, 32), whole("q", "Turns through the hole.", 3, 1, 32),
+        whole("segments", "Segments along the knot.", 192, 3, 8192), whole("sides", "Sides around the tube.", 24, 3, 1024),
+    ), torus_knot, lambda v: (v["segments"] + 1) * (v["sides"] + 1)),
+    "stairs": Shape("A solid flight of stairs that climbs towards -Z.", (
+        Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
+        whole("steps", "Number of steps.", 5, 1, 200),
+    ), stairs, lambda v: 12 * v["steps"]),
+    "sphere_grid": Shape("Spheres in the XY plane, an object each, `name/column_row`: roughness to the right, metallic up.", (
+        positive("radius", "Radius of one sphere.", 0.4), whole("columns", "Values of roughness.", 5, 1, 64),
+        whole("rows", "Values of metallic.", 5, 1, 64), positive("spacing", "Between centres.", 1.0),
+        _range("roughness", "At the left and at the right.", (0.1, 1.0)),
+        _range("metallic", "At the bottom and at the top.", (0.0, 1.0)),
+        _SEGMENTS, whole("rings", "Rows from pole to pole.", 24, 2, 1024),
+    ), sphere_grid, lambda v: (v["segments"] + 1) * (v["rings"] + 1)),
+}  # fmt: skip
