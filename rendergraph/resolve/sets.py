@@ -99,9 +99,13 @@ def from_plain(data: Any, source: Source) -> Value:
         return Value({str(key): from_plain(child, source) for key, child in data.items()}, source)
     if isinstance(data, list | tuple):
         return Value([from_plain(child, source) for child in data], source)
-    if data is None or isinstance(data, str | int | float | bool):
+    if data is None or isinstance(data, str | float) or (isinstance(data, int) and abs(data) < 2**63):
         return Value(data, source)
-    raise InputError(source.problem("RG106", f"a value of type {type(data).__name__} cannot stand in a pipeline"))
+    raise InputError(
+        source.problem(
+            "RG106", f"{shown(repr(data))} cannot stand in a pipeline; it takes text, numbers, lists and mappings"
+        )
+    )
 
 
 def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple[Value | None, list[Problem]]:

@@ -1,4 +1,4 @@
-"""PipelineSpec to Graph: a networkx DAG of typed nodes and edges, all errors at once."""
+"""What linking makes: a networkx DAG of typed nodes and edges."""
 
 from __future__ import annotations
 
@@ -60,15 +60,17 @@ class Graph:
         textures: what every made port (outputs, internals, history, functions, views) has turned out to be, by
             `Endpoint(node, port)`; an `InOut` shares its source's.
         warnings: what was noticed and is no error.
+        aliases: the outputs of sub-pipelines, `glow.radiance`, and the ports inside that they stand for.
     """
 
     name: str
-    dag: nx.MultiDiGraph
+    dag: nx.MultiDiGraph[str]
     outputs: Mapping[str, Endpoint]
     size: tuple[int, int]
     lights: tuple[LightFacts, ...] = ()
     textures: Mapping[Endpoint, TextureInfo] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
+    aliases: Mapping[str, Endpoint] = field(default_factory=dict)
 
     def __getitem__(self, node: str) -> GraphNode:
         found: GraphNode = self.dag.nodes[node]["node"]

@@ -1,0 +1,312 @@
+"""PipelineSpec to Graph: types found, parameters checked, ports connected, textures worked out; all errors at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.declare import InOut, Input, LightFacts, TextureInfo
+from rendergraph.document import Value
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.link.check import Checker, kind_of
+from rendergraph.link.graph import Endpoint, Graph, GraphNode
+from rendergraph.link.infer import Infer, made_ports
+from rendergraph.link.names import Bound, Link, Names, Wrong
+from rendergraph.link.order import cycles, needs, versions
+from rendergraph.link.params import instance
+from rendergraph.resolve import NodeSpec, PipelineSpec
+from rendergraph.textures import TEXTURE_KINDS, Signature
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+def link(spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = ()) -> Graph:
+    """A checked graph.
+
+    Args:
+        spec: the resolved pipeline.
+        catalog: the node types.
+        lights: the scene's lights in its order; sizes and layers may depend on them.
+
+    Raises:
+        InputError: something is wrong, here or already in `spec.problems`; with all mistakes.
+    """
+    return _Linker(spec, catalog, lights).graph()
+
+
+def endpoint(graph: Graph, text: str) -> Endpoint:
+    """The port of a linked graph that `node.port` names, internals included; for taps.
+
+    Raises:
+        InputError: there is no such node or port, or it holds no texture.
+    """
+    if text in graph.aliases:
+        return graph.aliases[text]
+    node, _, port = text.rpartition(".")
+    names = [known.id for known in graph.nodes]
+    if node not in names:
+        hint = suggestion(node or text, names) if node else f"; write NODE.PORT{suggestion(text, names)}"
+        raise InputError(Problem("RG109", f"there is no node '{node or text}'{hint}"))
+    ports = [end.port for end in graph.textures if end.node == node]
+    found = Endpoint(node, port)
+    if found not in graph.textures:
+        raise InputError(Problem("RG112", f"node '{node}' has no output '{port}'{suggestion(port, ports)}"))
+    if graph.textures[found].desc is None:
+        raise InputError(Problem("RG129", f"'{text}' holds no texture, there is nothing to show"))
+    return found
+
+
+class _Linker:
+    def __init__(self, spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts]) -> None:
+        self.spec = spec
+        self.catalog = catalog
+        self.lights = tuple(lights)
+        self.problems: list[Problem] = []
+
+    def graph(self) -> Graph:
+        types = self._types()
+        names = Names(self.spec, types)
+        nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
+        for bound in nodes.values():
+            self._connect(bound, names)
+        outputs = self._outputs(names)
+        knots = cycles(nodes)
+        used = {end.source for bound in nodes.values() for links in bound.links.values() for end in links}
+        infer = Infer(nodes, self.spec.size, self.lights, used | {found.source for found in outputs.values()})
+        if knots:
+            self.problems += knots
+        else:
+            self.problems += needs(nodes, outputs) + versions(nodes, outputs)
+            textures = self._textures(nodes, infer)
+            self.problems += Checker(nodes, infer, self.catalog).check()
+            self._shown(nodes, outputs, infer)
+            self.problems += infer.problems
+        problems = [*self.spec.problems, *self.problems]
+        if problems:
+            raise InputError(_in_order(problems))
+        return Graph(
+            name=self.spec.name,
+            dag=_dag(nodes),
+            outputs={name: found.source for name, found in outputs.items()},
+            size=self.spec.size,
+            lights=self.lights,
+            textures=textures,
+            warnings=self.spec.notes,
+            aliases=self._aliases(names),
+        )
+
+    def _types(self) -> dict[str, NodeType]:
+        found: dict[str, NodeType] = {}
+        failed: set[str] = set()
+        for node in self.spec.nodes.values():
+            value = node.value.get("type")
+            if not node.type or value is None:
+                continue  # said by resolve
+            if node.type not in self.catalog:
+                text = f"there is no node type '{node.type}'{suggestion(node.type, self.catalog.names())}"
+                self.problems.append(value.problem("RG102", text))
+                continue
+            try:
+                found[node.id] = self.catalog.get(node.type)
+            except InputError as error:
+                if node.type not in failed:
+                    self.problems += error.problems
+                failed.add(node.type)
+        return found
+
+    def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
+        node, problems = instance(spec, node_type)
+        self.problems += problems
+        return Bound(spec, node_type, node, {name: [] for name in node_type.cls.inputs()}, set())
+
+    # Links ------------------------------------------------------------------------------------------------------------
+
+    def _connect(self, bound: Bound, names: Names) -> None:
+        cls = bound.type.cls
+        inputs, groups = cls.inputs(), cls.groups()
+        for name, value in bound.spec.inputs.items():
+            if name in inputs:
+                self._input(bound, names, name, inputs[name], value)
+            elif name in groups:
+                self._group(bound, names, name, groups[name], value)
+            else:
+                known = [*inputs, *groups]
+                hint = suggestion(name, known) if known else "; it takes none"
+                if name in cls.parameters():
+                    hint = f"; '{name}' is a param, move it to `params`"
+                text = f"node type '{bound.type.name}' has no input '{name}'{hint}"
+                self.problems.append(value.problem("RG111", text, key=True))
+        for name, port in inputs.items():
+            if not bound.links[name] and not port.optional and name not in bound.failed:
+                text = f"input '{name}' of node '{bound.spec.id}' ({bound.type.name}) is not connected"
+                self.problems.append(bound.spec.value.problem("RG114", text + self._source_for(bound, port), key=True))
+
+    def _input(self, bound: Bound, names: Names, name: str, port: Input | InOut, value: Value) -> None:
+        if isinstance(value.data, list):
+            if not (isinstance(port, Input) and port.many):
+                text = f"'{bound.spec.id}.{name}' takes one link, not a list; write one as in node.port"
+                self.problems.append(value.problem("RG115", text))
+                bound.failed.add(name)
+                return
+            for part in value.data:
+                self._follow(bound, names, name, part, name)
+        elif value.data is not None:
+            self._follow(bound, names, name, value, name)
+
+    def _follow(self, bound: Bound, names: Names, name: str, value: Value, wanted: str) -> None:
+        try:
+            found = names.follow(bound.spec.scope, value, wanted)
+        except Wrong as wrong:
+            bound.failed.add(name)
+            if wrong.problem is not None:
+                self.problems.append(wrong.problem)
+        else:
+            if found is not None:
+                bound.links[name].append(found)
+
+    def _group(self, bound: Bound, names: Names, group: str, members: Sequence[str], value: Value) -> None:
+        """Connect every member that is not connected on its own to the port of its name."""
+        missing = [name for name in members if name not in bound.spec.inputs]
+        if value.data is None:
+            return
+        node, _, previous = str(value.data).partition("@")
+        scope = bound.spec.scope
+        if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
+            text = f"'{bound.spec.id}.{group}' is a group, it takes a node's id and no port"
+            self.problems.append(value.problem("RG113", text))
+        elif not names.is_known(scope, node):
+            text = f"there is no node '{node}'{suggestion(node, names.nodes_of(scope))}"
+            self.problems.append(value.problem("RG109", text))
+        else:
+            offered = names.outputs_of(scope, node)
+            lacking = []
+            for name in missing:
+                if name in offered:
+                    self._follow(bound, names, name, value, name)
+                elif offered:
+                    optional = bound.type.cls.inputs()[name].optional
+                    lacking += [] if optional else [name]
+            if lacking:
+                listed = ", ".join(f"'{name}'" for name in lacking)
+                text = f"'{bound.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
+                self.problems.append(value.problem("RG112", f"{text}; link {listed} beside the group"))
+            if offered and not lacking:
+                return
+        bound.failed.update(missing)
+
+    def _source_for(self, bound: Bound, port: Input | InOut) -> str:
+        """A port that the file already has and that would fit."""
+        wanted = port.semantic
+        for other in self.spec.nodes.values():
+            if other.scope != bound.spec.scope or other.id == bound.spec.id or other.type not in self.catalog:
+                continue
+            try:
+                outputs = self.catalog.get(other.type).cls.outputs()
+            except InputError:
+                continue
+            for name, candidate in outputs.items():
+                meant = getattr(candidate, "signature", None) or getattr(candidate, "semantic", None)
+                if wanted is not None and meant is not None and meant.name == wanted.name:
+                    return f"; '{other.id.removeprefix(other.scope)}.{name}' would fit"
+        what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
+        return f"; it takes {what}"
+
+    def _outputs(self, names: Names) -> dict[str, Link]:
+        found: dict[str, Link] = {}
+        for name, value in self.spec.outputs.items():
+            try:
+                followed = names.follow("", value, name)
+            except Wrong as wrong:
+                if wrong.problem is not None:
+                    self.problems.append(wrong.problem)
+                continue
+            if followed is not None:
+                found[name] = followed
+        return found
+
+    # Textures ---------------------------------------------------------------------------------------------------------
+
+    def _textures(self, nodes: Mapping[str, Bound], infer: Infer) -> dict[Endpoint, TextureInfo]:
+        textures: dict[Endpoint, TextureInfo] = {}
+        for name in _upstream_first(nodes):
+            for end in made_ports(nodes[name]):
+                info = infer.info(end)
+                if info is not None:
+                    textures[end] = info
+        return textures
+
+    def _shown(self, nodes: Mapping[str, Bound], outputs: Mapping[str, Link], infer: Infer) -> None:
+        for name, found in outputs.items():
+            info = infer.info(found.source)
+            if found.source.previous:
+                text = f"output '{name}' shows this frame; leave '@previous' out"
+                self.problems.append(found.value.problem("RG127", text))
+            elif info is not None:
+                kind = kind_of(nodes[found.source.node].ports[found.source.port], info)
+                if kind not in TEXTURE_KINDS:
+                    text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
+                    self.problems.append(found.value.problem("RG129", text))
+
+    def _aliases(self, names: Names) -> dict[str, Endpoint]:
+        found: dict[str, Endpoint] = {}
+        for scope, inner in self.spec.scopes.items():
+            for name, value in inner.outputs.items():
+                followed = names.follow(scope, value, name)
+                if followed is not None:
+                    found[f"{scope[:-1]}.{name}"] = followed.source
+        return found
+
+
+def _upstream_first(nodes: Mapping[str, Bound]) -> list[str]:
+    """Ids so that a node comes after what it reads in the same frame: rules then hardly ever ask further up."""
+    done: dict[str, None] = {}
+    for first in nodes:
+        stack = [first]
+        while stack:
+            name = stack[-1]
+            ahead = [
+                link.source.node
+                for links in nodes[name].links.values()
+                for link in links
+                if not link.source.previous and link.source.node not in done
+            ]
+            if ahead:
+                stack += ahead
+            else:
+                done[stack.pop()] = None
+    return list(done)
+
+
+def _dag(nodes: Mapping[str, Bound]) -> nx.MultiDiGraph[str]:
+    import networkx as nx
+
+    dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
+    for name, bound in nodes.items():
+        links = {key: tuple(found.source for found in ends) for key, ends in bound.links.items() if ends}
+        dag.add_node(name, node=GraphNode(name, bound.type, bound.node, links, bound.spec.place))
+    for name, bound in nodes.items():
+        for key, ends in bound.links.items():
+            for found in ends:
+                dag.add_edge(
+                    found.source.node, name, source_port=found.source.port, target_port=key,
+                    previous=found.source.previous,
+                )  # fmt: skip
+    nx.freeze(dag)
+    return dag
+
+
+def _in_order(problems: Sequence[Problem]) -> list[Problem]:
+    """Each once, by file as first met and by line."""
+    files: dict[str, int] = {}
+    for problem in problems:
+        files.setdefault(problem.place.file if problem.place else "", len(files))
+    unique = dict.fromkeys(problems)
+    return sorted(
+        unique,
+        key=lambda p: (files[p.place.file], p.place.line, p.place.column) if p.place else (files[""], 0, 0),
+    )
+
+
+__all__ = ["Endpoint", "Graph", "GraphNode", "endpoint", "link"]

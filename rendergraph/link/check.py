@@ -1,0 +1,242 @@
+"""Whether the two ends of each link agree, and the textures of a pass among themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from rendergraph.catalog import Catalog
+from rendergraph.declare import Function, InOut, Input, Made, Node, Output, Port, TextureInfo, Views
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.link.graph import Endpoint
+from rendergraph.link.infer import Infer
+from rendergraph.link.names import Bound, Link
+from rendergraph.textures import FORMATS, TEXTURE_KINDS, Semantic, Signature
+
+Accepts = Callable[[type[Node]], bool]
+
+
+class Checker:
+    """Checks links of one graph; collects problems."""
+
+    def __init__(self, nodes: Mapping[str, Bound], infer: Infer, catalog: Catalog) -> None:
+        self.nodes = nodes
+        self.infer = infer
+        self.catalog = catalog
+        self.problems: list[Problem] = []
+
+    def check(self) -> list[Problem]:
+        """Everything that is wrong with the links."""
+        for bound in self.nodes.values():
+            before = len(self.problems)
+            for name, links in bound.links.items():
+                port = bound.type.cls.inputs()[name]
+                for link in links:
+                    self._link(bound, port, link)
+            if len(self.problems) == before:
+                self._sizes(bound)
+        return self.problems
+
+    # One link ---------------------------------------------------------------------------------------------------------
+
+    def _link(self, bound: Bound, port: Input | InOut, link: Link) -> None:
+        info = self.infer.info(link.source)
+        if info is None:
+            return
+        source = self.nodes[link.source.node].ports[link.source.port]
+        given, taken = kind_of(source, info), port.kind
+        if isinstance(port, InOut) and port.like is not None and given in TEXTURE_KINDS:
+            taken = given  # type: ignore[assignment]
+        if link.source.previous and (isinstance(port, InOut) or given in ("function", "view")):
+            what = "continues a texture of this frame" if isinstance(port, InOut) else f"takes a {given}"
+            text = f"'{bound.spec.id}.{port.name}' {what}, which has no last frame's value; leave '@previous' out"
+            self.problems.append(link.value.problem("RG127", text))
+        elif given != taken:
+            self._say(bound, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port))
+        elif isinstance(port.semantic, Signature):
+            self._signature(bound, port, link, source, port.semantic)
+        elif (taken != "view" and not self._semantic(bound, port, link, info)) or info.desc is None:
+            return
+        elif isinstance(port, Input):
+            self._samples(bound, port, link, info)
+            self._format(bound, port, link, info)
+
+    def _signature(self, bound: Bound, port: Input | InOut, link: Link, source: Port, wanted: Signature) -> None:
+        if isinstance(source, Function) and source.signature.name != wanted.name:
+            carried = f"provides {source.signature.name}()"
+            self._say(bound, port, link, "RG210", f"calls {wanted.name}()", carried, None)
+
+    def _semantic(self, bound: Bound, port: Input | InOut, link: Link, info: TextureInfo) -> bool:
+        carried = info.semantic
+        for declared in link.declared:
+            name = declared.get("semantic")
+            if name is not None and "any" not in (name.data, carried.name) and name.data != carried.name:
+                text = f"the sub-pipeline's input takes {name.data}, but '{link.source}'{self._at(link)} carries"
+                self.problems.append(link.value.problem("RG110", f"{text} {carried.name}"))
+                return False
+        wanted = port.semantic
+        if not isinstance(wanted, Semantic) or "any" in (wanted.name, carried.name):
+            return True
+        if wanted.name != carried.name:
+            code, takes, carries = "RG110", wanted.name, carried.name
+        elif wanted.space and carried.space and wanted.space != carried.space:
+            code, takes, carries = "RG202", f"{wanted.name} in {wanted.space} space", f"it in {carried.space} space"
+        elif wanted.encoding and carried.encoding and wanted.encoding != carried.encoding:
+            code, takes, carries = "RG203", f"{wanted.encoding} {wanted.name}", f"it {carried.encoding}"
+        else:
+            return True
+        self._say(bound, port, link, code, f"takes {takes}", f"carries {carries}", self._by_semantic(carried, wanted))
+        return False
+
+    def _samples(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
+        assert info.desc is not None
+        samples = info.desc.samples
+        if port.samples == "single" and samples > 1:
+            carries = f"has {samples} samples a texel"
+            self._say(bound, port, link, "RG204", "takes one sample a texel", carries, self._resolving(info))
+        elif port.samples == "multi" and samples == 1:
+            self._say(bound, port, link, "RG204", "takes several samples a texel", "has one", None)
+
+    def _format(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
+        assert info.desc is not None
+        texel = FORMATS[info.desc.format]
+        smooth = port.filter(bound.node) if callable(port.filter) else port.filter
+        takes = ""
+        if port.use == "depth_test" and not texel.is_depth:
+            takes = "is attached as depth"
+        elif port.compare and not texel.is_depth:
+            takes = "compares with depth"
+        elif port.use == "image" and (texel.is_depth or texel.srgb):
+            takes = "is loaded as an image, so no depth and no sRGB"
+        elif smooth != "nearest" and not port.compare and texel.family in ("uint", "int"):
+            takes = "is filtered, so no whole numbers"
+        if takes:
+            self._say(bound, port, link, "RG205", takes, f"has the format {info.desc.format}", None)
+
+    def _say(
+        self, bound: Bound, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
+    ) -> None:  # fmt: skip
+        text = f"'{bound.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
+        self.problems.append(link.value.problem(code, text + self._converters(hint)))
+
+    def _at(self, link: Link) -> str:
+        """Where the other end stands: its line, with the file where that is another."""
+        return f" ({line_of(self.nodes[link.source.node].spec.place, link.value.place)})"
+
+    # The passes -------------------------------------------------------------------------------------------------------
+
+    def _sizes(self, bound: Bound) -> None:
+        """Inputs of size `same` against what the node draws."""
+        made: dict[tuple[int, int], str] = {}
+        for name, port in bound.ports.items():
+            if isinstance(port, Output | InOut):
+                needs = port.needs if isinstance(port, Output) else ()
+                info = self.infer.info(Endpoint(bound.spec.id, name)) if all(map(bound.links.get, needs)) else None
+                if info is not None and info.desc is not None:
+                    made.setdefault(info.desc.size, name)
+        if not made:
+            return
+        default = bound.type.cls.record is Node.record
+        if default and len(made) > 1:
+            (a, one), (b, other) = list(made.items())[:2]
+            ends = f"'{bound.spec.id}.{one}' is {_size(a)} and '{bound.spec.id}.{other}' {_size(b)}"
+            text = f"{ends}: one pass draws all its targets in one size"
+            self.problems.append(bound.spec.value.problem("RG206", text, key=True))
+            return
+        for name, links in bound.links.items():
+            port = bound.type.cls.inputs()[name]
+            for link in links if isinstance(port, Input) and port.size == "same" else ():
+                info = self.infer.info(link.source)
+                if info is None or info.desc is None or info.desc.size in made:
+                    continue
+                (size, target), *_ = made.items()
+                takes = f"takes the size of '{bound.spec.id}.{target}', {_size(size)}"
+                carries = f"is {_size(info.desc.size)}"
+                self._say(bound, port, link, "RG206", takes, carries, self._resizing(info))
+
+    # Ways out ---------------------------------------------------------------------------------------------------------
+
+    def _converters(self, accepts: Accepts | None) -> str:
+        """Node types that would convert; only now are types imported that the file does not use."""
+        if accepts is None:
+            return ""
+        found = []
+        for name in self.catalog.names():
+            try:
+                if accepts(self.catalog.get(name).cls):
+                    found.append(f"'{name}'")
+            except InputError:
+                continue  # a broken plugin is no way out
+        if not found:
+            return ""
+        return f"; {' or '.join(found[:3])} between them would convert"
+
+    def _by_semantic(self, carried: Semantic, wanted: Semantic) -> Accepts:
+        return lambda cls: (
+            any(_means(port, carried) for port in _inputs(cls)) and any(_means(port, wanted) for port in _outputs(cls))
+        )
+
+    def _by_kind(self, info: TextureInfo, kind: str, port: Input | InOut) -> Accepts:
+        given = info.desc.kind if info.desc is not None else ""
+        meant = port.semantic if isinstance(port.semantic, Semantic) else info.semantic
+        return lambda cls: (
+            any(p.kind == given and _means(p, info.semantic) for p in _inputs(cls))
+            and any(p.kind == kind and _means(p, meant) for p in _outputs(cls))
+        )
+
+    def _resolving(self, info: TextureInfo) -> Accepts:
+        return lambda cls: any(
+            port.samples != "single" and _means(port, info.semantic, any_too=True)
+            and any(_continues(out, port, info) and out.samples == 1 for out in _outputs(cls))
+            for port in _inputs(cls)
+        )  # fmt: skip
+
+    def _resizing(self, info: TextureInfo) -> Accepts:
+        return lambda cls: any(
+            port.size == "any" and _means(port, info.semantic, any_too=True)
+            and any(_continues(out, port, info) and out.like is None for out in _outputs(cls))
+            for port in _inputs(cls)
+        )  # fmt: skip
+
+
+def kind_of(port: Port, info: TextureInfo) -> str:
+    """The kind of an output as it has turned out."""
+    if isinstance(port, Function):
+        return "function"
+    if isinstance(port, Views):
+        return "view"
+    if info.desc is not None:
+        return info.desc.kind
+    return port.kind if isinstance(port, Made) else ""
+
+
+def line_of(place: Place, here: Place) -> str:
+    """A place for a message that already names a file: its line, with the file where that is another one."""
+    if not place.line:
+        return place.file
+    return f"line {place.line}" if place.file == here.file else f"{place.file}:{place.line}"
+
+
+def _inputs(cls: type[Node]) -> Iterator[Input]:
+    return (port for port in cls.inputs().values() if isinstance(port, Input))
+
+
+def _outputs(cls: type[Node]) -> Iterator[Made]:
+    return (port for port in cls.outputs().values() if isinstance(port, Output))
+
+
+def _means(port: Any, semantic: Semantic, *, any_too: bool = False) -> bool:
+    own = port.semantic
+    if not isinstance(own, Semantic):
+        return False
+    if own.name == "any":
+        return any_too
+    return own.name == semantic.name and own.space == semantic.space and own.encoding == semantic.encoding
+
+
+def _continues(out: Made, port: Input, info: TextureInfo) -> bool:
+    return out.like == port.name or (out.semantic is not None and _means(out, info.semantic, any_too=True))
+
+
+def _size(size: Iterable[int]) -> str:
+    return "×".join(map(str, size))

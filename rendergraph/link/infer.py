@@ -1,0 +1,296 @@
+"""What every texture turns out to be: sizes, formats, layers, views, by the rules nodes declare.
+
+Rules are asked on demand and each once, so that a rule may look at what is connected to its node, whichever way round
+the nodes stand in the file, and `@previous` needs no special order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, overload
+
+from rendergraph import textures
+from rendergraph.declare import (
+    Facts,
+    Function,
+    History,
+    InOut,
+    Input,
+    Internal,
+    LightFacts,
+    Made,
+    Port,
+    TextureInfo,
+    Views,
+)  # fmt: skip
+from rendergraph.errors import Problem
+from rendergraph.link.graph import Endpoint
+from rendergraph.link.names import Bound
+from rendergraph.resolve import MOST_SIDE
+from rendergraph.textures import (
+    FORMATS,
+    Albedo,
+    Depth,
+    Emissive,
+    LinearDepth,
+    Material,
+    Normal,
+    Radiance,
+    Semantic,
+    ShadowMap,
+    TextureDesc,
+    View,
+    full_mip_count,
+)  # fmt: skip
+
+CAMERA = "camera"
+_DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
+_SAMPLES = (1, 2, 4, 8, 16)
+
+
+class _Unknown(Exception):
+    """Something this depends on is wrong and has been reported."""
+
+
+class _Infos(Sequence[TextureInfo]):
+    """What the links of one input carry, found out when looked at: asking whether there are any asks no rule."""
+
+    def __init__(self, infer: Infer, ends: Sequence[Endpoint]) -> None:
+        self._infer = infer
+        self._ends = ends
+
+    def __len__(self) -> int:
+        return len(self._ends)
+
+    @overload
+    def __getitem__(self, index: int) -> TextureInfo: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[TextureInfo]: ...
+    def __getitem__(self, index: int | slice) -> TextureInfo | Sequence[TextureInfo]:
+        if isinstance(index, slice):
+            return [self._infer.known(end) for end in self._ends[index]]
+        return self._infer.known(self._ends[index])
+
+
+class _Inputs(Mapping[str, Any]):
+    """`Facts.inputs`, found out when looked at."""
+
+    def __init__(self, infer: Infer, bound: Bound) -> None:
+        self._infer = infer
+        self._bound = bound
+
+    def __getitem__(self, name: str) -> _Infos:
+        links = self._bound.links[name]
+        if not links:
+            raise KeyError(name)
+        return _Infos(self._infer, [link.source for link in links])
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, links in self._bound.links.items() if links)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+class Infer:
+    """Asks the rules of all nodes; keeps the answers and what is wrong with them."""
+
+    def __init__(
+        self, nodes: Mapping[str, Bound], viewport: tuple[int, int], lights: Sequence[LightFacts], used: set[Endpoint]
+    ) -> None:
+        self.nodes = nodes
+        self.viewport = viewport
+        self.used = used
+        self.lights = tuple(lights)
+        self.problems: list[Problem] = []
+        self.infos: dict[Endpoint, TextureInfo | None] = {}
+        self._open: set[Endpoint] = set()
+        self._facts: dict[str, Facts] = {}
+
+    def info(self, end: Endpoint) -> TextureInfo | None:
+        """What a port has turned out to be, None where that cannot be said."""
+        end = replace(end, previous=False) if end.previous else end
+        if end not in self.infos:
+            if end in self._open:
+                self._say(end, "RG213", "its size or format depends on itself through '@previous'")
+                return None
+            self._open.add(end)
+            try:
+                self.infos[end] = self._evaluate(end)
+            except _Unknown:
+                self.infos[end] = None
+            finally:
+                self._open.discard(end)
+        return self.infos[end]
+
+    def known(self, end: Endpoint) -> TextureInfo:
+        """The same for a rule that cannot go on without."""
+        info = self.info(end)
+        if info is None:
+            raise _Unknown
+        return info
+
+    def _say(self, end: Endpoint, code: str, text: str) -> None:
+        bound = self.nodes[end.node]
+        self.problems.append(bound.spec.value.problem(code, f"'{end}' ({bound.type.name}): {text}", key=True))
+
+    def _evaluate(self, end: Endpoint) -> TextureInfo | None:
+        bound = self.nodes[end.node]
+        port = bound.ports[end.port]
+        if isinstance(port, Function):
+            return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
+        if isinstance(port, Views):
+            return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port))
+        if isinstance(port, InOut) and bound.links.get(port.name):
+            return self.info(bound.links[port.name][0].source)
+        return self._made(end, bound, port) if isinstance(port, Made) else None
+
+    def _facts_of(self, bound: Bound) -> Facts:
+        found = self._facts.get(bound.spec.id)
+        if found is None:
+            found = Facts(self.viewport, self.lights, _Inputs(self, bound))
+            self._facts[bound.spec.id] = found
+        return found
+
+    def _ruled(self, end: Endpoint, what: str, rule: Any) -> Any:
+        """A constant, or what the author's function gives."""
+        if not isinstance(rule, Callable):  # type: ignore[arg-type]  # collections.abc's Callable is a class at run time
+            return rule
+        bound = self.nodes[end.node]
+        try:
+            return rule(bound.node, self._facts_of(bound))
+        except _Unknown:
+            raise
+        except Exception as error:  # a stranger's function
+            missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in bound.type.cls.inputs()
+            if missing and end not in self.used:
+                raise _Unknown from None  # nobody uses what lacks an input
+            if missing:
+                self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
+            else:
+                self._say(end, "RG209", f"the rule for its {what} fails: {type(error).__name__}: {error}")
+            raise _Unknown from None
+
+    def _made(self, end: Endpoint, bound: Bound, port: Made) -> TextureInfo | None:
+        like = self._linked(bound, port.like)
+        if port.kind == "buffer":
+            size = self._ruled(end, "bytes", port.bytes)
+            if not isinstance(size, int) or size < 1:
+                self._say(end, "RG208", f"a buffer has at least 1 byte, not {size}")
+                return None
+            return TextureInfo(None, port.semantic or textures.Any, bytes=size)
+        desc = self._desc(end, port, like.desc if like is not None else None)
+        if desc is None:
+            return None
+        semantic = port.semantic or (like.semantic if like is not None else textures.Any)
+        view, lights = self._view(end, bound, port, semantic)
+        if like is not None:
+            view, lights = view or like.view, lights or like.lights
+        return TextureInfo(desc, semantic, view, lights)
+
+    def _linked(self, bound: Bound, name: str | None) -> TextureInfo | None:
+        links = bound.links.get(name, []) if name else []
+        return self.known(links[0].source) if links else None
+
+    def _desc(self, end: Endpoint, port: Made, like: TextureDesc | None) -> TextureDesc | None:
+        size = self._size(end, port, like)
+        if size is None:
+            return None
+        name = self._ruled(end, "format", port.format)
+        if like is not None and name == "rgba16f" and not callable(port.format):
+            name = like.format  # the declaration's default: it says nothing of its own
+        if name not in FORMATS:
+            self._say(end, "RG211", f"there is no format '{name}'")
+            return None
+        kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
+        layers = self._ruled(end, "layers", port.layers)
+        if like is not None and layers == 1:
+            layers = like.layers
+        layers = 6 if kind == "texture_cube" else layers
+        full = full_mip_count(*size)
+        mips = self._ruled(end, "mips", port.mips) or full
+        samples = self._ruled(end, "samples", port.samples)
+        if not isinstance(layers, int) or layers < 0 or (kind == "texture2d" and layers != 1):
+            self._say(end, "RG208", f"a {kind} cannot have {layers} layers")
+        elif not isinstance(mips, int) or not 1 <= mips <= full:
+            self._say(end, "RG208", f"a texture of {size[0]}×{size[1]} has 1 to {full} mips, not {mips}")
+        elif samples not in _SAMPLES or (samples > 1 and (mips > 1 or kind == "texture_cube")):
+            more = " with mips or in a cube" if samples in _SAMPLES else ""
+            self._say(end, "RG208", f"a texture cannot have {samples} samples a texel{more}")
+        else:
+            return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
+        return None
+
+    def _size(self, end: Endpoint, port: Made, like: TextureDesc | None) -> tuple[int, int] | None:
+        rule: Any = port.size
+        bound = self.nodes[end.node]
+        factor, base = 1.0, self.viewport
+        if callable(rule):
+            given = self._ruled(end, "size", rule)
+            try:
+                base = int(given[0]), int(given[1])
+            except (TypeError, ValueError, IndexError):
+                self._say(end, "RG209", f"the rule for its size gives {given!r}, not width and height")
+                return None
+        elif isinstance(rule, str) or (isinstance(rule, tuple) and isinstance(rule[0], str)):
+            name, factor = (rule, 1.0) if isinstance(rule, str) else (rule[0], float(rule[1]))
+            source = self._linked(bound, name)  # not connected: the viewport
+            base = source.desc.size if source is not None and source.desc is not None else base
+        elif isinstance(rule, tuple):
+            base = rule
+        else:
+            factor = float(rule)
+            base = like.size if like is not None and factor == 1.0 else base
+        width, height = (max(1, math.ceil(side * factor - 1e-9)) if factor != 1.0 else side for side in base)
+        if min(width, height) < 1 or max(width, height) > MOST_SIDE:
+            self._say(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
+            return None
+        return width, height
+
+    # Views and lights -------------------------------------------------------------------------------------------------
+
+    def _view_lights(self, end: Endpoint, port: Views) -> tuple[int, ...]:
+        return tuple(self._ruled(end, "lights", port.lights)) if port.lights else ()
+
+    def _view(
+        self, end: Endpoint, bound: Bound, port: Made, semantic: Semantic
+    ) -> tuple[str | None, tuple[int, ...]]:  # fmt: skip
+        """The view table it is drawn with, and the light of each layer."""
+        named: Port | None = bound.ports.get(port.view) if port.view else None
+        view: str | None = None
+        lights: tuple[int, ...] = ()
+        if isinstance(named, Views):
+            view = str(Endpoint(bound.spec.id, named.name))
+            lights = self._view_lights(Endpoint(bound.spec.id, named.name), named)
+        elif isinstance(named, Input | InOut):
+            view, lights = self._carried(bound, named)
+        elif isinstance(drawn := bound.ports.get("view"), Input) and drawn.kind == "view" and semantic.name in _DRAWN:
+            view, lights = self._carried(bound, drawn)
+        if callable(port.lights):
+            lights = tuple(self._ruled(end, "lights", port.lights))
+        elif port.lights:
+            table: Port | None = bound.ports.get(port.lights)
+            if isinstance(table, Views):
+                lights = self._view_lights(Endpoint(bound.spec.id, table.name), table)
+            else:
+                source = self._linked(bound, port.lights)
+                lights = source.lights if source is not None else ()
+        return view, lights
+
+    def _carried(self, bound: Bound, port: Input | InOut) -> tuple[str | None, tuple[int, ...]]:
+        source = self._linked(bound, port.name)
+        if source is not None:
+            return source.view, source.lights
+        return (CAMERA if port.kind == "view" else None), ()
+
+
+def made_ports(bound: Bound) -> Iterator[Endpoint]:
+    """Everything of a node that carries something."""
+    for name, port in bound.ports.items():
+        if isinstance(port, Made | Function | Views):
+            yield Endpoint(bound.spec.id, name)
+
+
+__all__ = ["CAMERA", "History", "Infer", "Internal", "made_ports"]

@@ -1,0 +1,184 @@
+"""References to ports: `node.port`, `node`, `inputs.x`, a sub-pipeline's output, `@previous`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from rendergraph.catalog import NodeType
+from rendergraph.declare import Node, Port
+from rendergraph.document import Value, shown
+from rendergraph.errors import Problem, suggestion
+from rendergraph.link.graph import Endpoint
+from rendergraph.resolve import NodeSpec, PipelineSpec
+
+_ID = "[A-Za-z_][A-Za-z0-9_-]*"
+_LINK = re.compile(rf"({_ID}(?:/{_ID})*)(?:\.({_ID}))?(@previous)?\Z")
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """One link as it was written, with what it leads to.
+
+    Attributes:
+        source: the port it reads.
+        value: where it is written.
+        declared: the sub-pipeline inputs it passes through, whose semantics it has to have.
+    """
+
+    source: Endpoint
+    value: Value
+    declared: tuple[Value, ...] = ()
+
+
+@dataclass(eq=False)
+class Bound:
+    """A node with its type, while it is being linked.
+
+    Attributes:
+        spec: from the file.
+        type: its type.
+        node: the instance; defaults stand in for parameters that are wrong.
+        links: by input, what is connected.
+        failed: inputs whose link is wrong, so that nobody says they lack one.
+    """
+
+    spec: NodeSpec
+    type: NodeType
+    node: Node
+    links: dict[str, list[Link]]
+    failed: set[str]
+
+    @property
+    def ports(self) -> dict[str, Port]:
+        """Every port by name."""
+        return self.type.cls.ports()
+
+
+class Wrong(Exception):
+    """A link that leads nowhere; carries None where that has been said before."""
+
+    def __init__(self, problem: Problem | None) -> None:
+        self.problem = problem
+        super().__init__(problem)
+
+
+class Names:
+    """Follows references through sub-pipelines to ports."""
+
+    def __init__(self, spec: PipelineSpec, types: Mapping[str, NodeType]) -> None:
+        self.spec = spec
+        self.types = types
+
+    def follow(self, scope: str, value: Value, wanted: str) -> Link | None:
+        """The port a reference leads to.
+
+        Args:
+            scope: the sub-pipeline it stands in.
+            value: the reference.
+            wanted: the port that a node's id alone stands for.
+
+        Returns:
+            None where it leads to an optional input of a sub-pipeline that is not connected.
+
+        Raises:
+            Wrong: it leads nowhere.
+        """
+        text = str(value.data)
+        match = _LINK.match(text)
+        if match is None:
+            text = f"'{shown(text)}' is no link; write node.port, or a node's id for its port '{wanted}'"
+            raise Wrong(value.problem("RG113", text))
+        found = self._follow(scope, match[1], match[2], wanted, value, 0)
+        if found is None:
+            return None
+        source = found.source
+        return replace(found, source=replace(source, previous=source.previous or bool(match[3])), value=value)
+
+    def outputs_of(self, scope: str, name: str) -> list[str]:
+        """What a node or sub-pipeline of a scope offers, empty where it is unknown."""
+        inner = self.spec.scopes.get(f"{scope}{name}/")
+        if inner is not None:
+            return list(inner.outputs)
+        node_type = self.types.get(f"{scope}{name}")
+        return list(node_type.cls.outputs()) if node_type is not None else []
+
+    def is_known(self, scope: str, name: str) -> bool:
+        """Whether a scope has a node or sub-pipeline of that name."""
+        return f"{scope}{name}" in self.spec.nodes or f"{scope}{name}/" in self.spec.scopes
+
+    def nodes_of(self, scope: str) -> list[str]:
+        """Names that can be linked to in a scope."""
+        names = [node.id for node in self.spec.nodes.values() if node.scope == scope]
+        names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
+        return [name.removeprefix(scope) for name in names] + (["inputs"] if scope else [])
+
+    def _follow(
+        self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int
+    ) -> Link | None:  # fmt: skip
+        if depth > 100:
+            raise Wrong(value.problem("RG117", f"'{shown(value.data)}' leads back to itself; link it to a node's port"))
+        if name == "inputs" and scope:
+            return self._outside(scope, port or wanted, value, depth)
+        inner = self.spec.scopes.get(f"{scope}{name}/")
+        if inner is not None:
+            return self._inside(f"{scope}{name}/", port, wanted, value, depth)
+        node = self.spec.nodes.get(f"{scope}{name}")
+        if node is None:
+            text = f"there is no node '{name}'{suggestion(name, self.nodes_of(scope))}"
+            raise Wrong(value.problem("RG109", text))
+        node_type = self.types.get(node.id)
+        if node_type is None:
+            raise Wrong(None)
+        outputs = node_type.cls.outputs()
+        if (port or wanted) not in outputs:
+            raise Wrong(value.problem("RG112", self._no_output(node, node_type, port, wanted)))
+        return Link(Endpoint(node.id, port or wanted), value)
+
+    def _outside(self, scope: str, port: str, value: Value, depth: int) -> Link | None:
+        """The link from outside that `inputs.x` stands for."""
+        found = self.spec.scopes[scope]
+        if port not in found.inputs:
+            text = f"the sub-pipeline has no input '{port}'{suggestion(port, found.inputs)}"
+            raise Wrong(value.problem("RG111", text))
+        given = found.links.get(port)
+        if given is None or given.data is None:
+            return None
+        match = _LINK.match(given.data) if isinstance(given.data, str) else None
+        if match is None:
+            kind = "takes one link" if isinstance(given.data, list) else "takes a link as in node.port"
+            raise Wrong(given.problem("RG113", f"input '{port}' of sub-pipeline '{scope[:-1]}' {kind}"))
+        link = self._follow(found.parent, match[1], match[2], port, given, depth + 1)
+        if link is None:
+            return None
+        source = replace(link.source, previous=link.source.previous or bool(match[3]))
+        return replace(link, source=source, declared=(*link.declared, found.inputs[port]))
+
+    def _inside(self, scope: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
+        """The port inside that a sub-pipeline's output stands for."""
+        outputs = self.spec.scopes[scope].outputs
+        inner = outputs.get(port or wanted)
+        if inner is None:
+            name = shown(scope[:-1])
+            text = f"sub-pipeline '{name}' has no output '{port or wanted}'{suggestion(port or wanted, outputs)}"
+            raise Wrong(value.problem("RG112", text))
+        match = _LINK.match(str(inner.data))
+        if match is None:
+            text = f"'{shown(inner.data)}' is no link; write node.port, or a node's id for its port '{port or wanted}'"
+            raise Wrong(inner.problem("RG113", text))
+        link = self._follow(scope, match[1], match[2], port or wanted, inner, depth + 1)
+        if link is None:
+            return None
+        source = replace(link.source, previous=link.source.previous or bool(match[3]))
+        return replace(link, source=source)
+
+    def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str) -> str:
+        outputs = node_type.cls.outputs()
+        name = port or wanted
+        text = f"node '{node.id}' ({node_type.name}) has no output '{name}'"
+        if port is None:
+            return f"{text}; name one as in {node.id}.PORT{suggestion('', outputs)}"
+        if name in node_type.cls.inputs():
+            return f"{text}, only an input of that name{suggestion(name, outputs)}"
+        return text + suggestion(name, outputs)

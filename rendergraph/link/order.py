@@ -1,0 +1,143 @@
+"""Cycles, and who may read and write the versions of a texture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from rendergraph.declare import InOut
+from rendergraph.errors import Problem
+from rendergraph.link.check import line_of
+from rendergraph.link.graph import Endpoint
+from rendergraph.link.names import Bound, Link
+
+
+def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
+    """One problem for each knot of nodes that need each other in the same frame."""
+    import networkx as nx
+
+    links = {
+        (link.source.node, bound.spec.id): (name, link)
+        for bound in nodes.values()
+        for name, ends in bound.links.items()
+        for link in ends
+        if not link.source.previous
+    }
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    graph.add_nodes_from(nodes)
+    graph.add_edges_from(links)
+    if nx.is_directed_acyclic_graph(graph):
+        return []
+    rank = {name: number for number, name in enumerate(nodes)}
+    found = []
+    for knot in nx.strongly_connected_components(graph):
+        first = min(knot, key=rank.__getitem__)
+        if len(knot) == 1 and not graph.has_edge(first, first):
+            continue
+        path = [a for a, _ in nx.find_cycle(graph.subgraph(sorted(knot, key=rank.__getitem__)), first)]
+        steps = [(path[number], path[(number + 1) % len(path)]) for number in range(len(path))]
+        ends = [str(links[step][1].source) for step in steps]
+        value = links[steps[-1]][1].value
+        text = (
+            f"the nodes form a cycle, {' → '.join([*ends, ends[0]])}; '@previous' behind one reads last frame's value"
+        )
+        found.append(value.problem("RG117", text))
+    return found
+
+
+def needs(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Problem]:
+    """Ports that are used although an input they need is not connected."""
+    problems = []
+    users = [link for bound in nodes.values() for links in bound.links.values() for link in links]
+    for link in [*users, *outputs.values()]:
+        source = nodes[link.source.node]
+        wanted: Iterable[str] = getattr(source.ports[link.source.port], "needs", ())
+        for name in wanted:
+            if not source.links.get(name) and name not in source.failed:
+                where = line_of(source.spec.place, link.value.place)
+                text = f"'{link.source}' needs input '{name}' of '{source.spec.id}' ({where}), which is not connected"
+                problems.append(link.value.problem("RG116", text))
+    return problems
+
+
+def versions(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Problem]:
+    """Mistakes about `InOut`s: each version has one writer, and its readers come before that."""
+    writers: dict[Endpoint, tuple[Bound, Link]] = {}
+    problems: list[Problem] = []
+    for bound in nodes.values():
+        for name, port in bound.ports.items():
+            for link in bound.links.get(name, ()) if isinstance(port, InOut) else ():
+                if link.source.previous:
+                    continue
+                if link.source in writers:
+                    other = writers[link.source]
+                    where = line_of(other[1].value.place, link.value.place)
+                    text = (
+                        f"'{bound.spec.id}.{name}' and '{other[0].spec.id}.{_port(*other)}' ({where}) both continue "
+                        f"'{link.source}'; link one to the other"
+                    )
+                    problems.append(link.value.problem("RG126", text))
+                else:
+                    writers[link.source] = bound, link
+    if writers and not problems:
+        problems += _readers(nodes, outputs, writers)
+    return problems
+
+
+def _port(bound: Bound, link: Link) -> str:
+    return next(name for name, links in bound.links.items() if link in links)
+
+
+def _readers(
+    nodes: Mapping[str, Bound], outputs: Mapping[str, Link], writers: Mapping[Endpoint, tuple[Bound, Link]]
+) -> list[Problem]:
+    problems = []
+    before = _Ancestors(nodes)
+    live = {link.source.node for link in outputs.values()}
+    live |= {name for node in live for name in before[node]}
+    for bound in nodes.values():
+        for name, links in bound.links.items():
+            for link in links:
+                now = replace(link.source, previous=False)
+                if now not in writers:
+                    continue
+                writer, written = writers[now]
+                if link is written or writer is bound:
+                    continue
+                newer = f"'{writer.spec.id}.{_port(writer, written)}'"
+                where = line_of(written.value.place, link.value.place)
+                if link.source.previous:
+                    text = f"{newer} ({where}) overwrites '{now}', last frame's value too; read {newer[:-1]}@previous'"
+                    problems.append(link.value.problem("RG127", text))
+                elif writer.spec.id in before[bound.spec.id]:
+                    text = f"'{bound.spec.id}.{name}' reads '{now}', but '{bound.spec.id}' also needs {newer} ({where})"
+                    problems.append(link.value.problem("RG128", f"{text}, which overwrites it; read {newer}"))
+    for output, link in outputs.items():
+        found = writers.get(link.source)
+        if found is not None and found[0].spec.id in live:
+            newer = f"'{found[0].spec.id}.{_port(*found)}'"
+            where = line_of(found[1].value.place, link.value.place)
+            text = f"output '{output}' shows '{link.source}', but {newer} ({where}) overwrites it; show {newer}"
+            problems.append(link.value.problem("RG128", text))
+    return problems
+
+
+class _Ancestors(dict[str, set[str]]):
+    """Every node that a node needs in the same frame, found out when asked."""
+
+    def __init__(self, nodes: Mapping[str, Bound]) -> None:
+        import networkx as nx
+
+        super().__init__()
+        self._graph: nx.DiGraph[str] = nx.DiGraph()
+        self._graph.add_nodes_from(nodes)
+        for bound in nodes.values():
+            for links in bound.links.values():
+                now = (link.source.node for link in links if not link.source.previous)
+                self._graph.add_edges_from((source, bound.spec.id) for source in now)
+
+    def __missing__(self, name: str) -> set[str]:
+        import networkx as nx
+
+        self[name] = set(nx.ancestors(self._graph, name))
+        return self[name]

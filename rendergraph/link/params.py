@@ -1,0 +1,109 @@
+"""Parameter values to a node's instance, and what is wrong with them in words a user knows."""
+
+from __future__ import annotations
+
+import json
+import types
+from collections.abc import Mapping
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import ValidationError
+
+from rendergraph.catalog import NodeType
+from rendergraph.declare import Node
+from rendergraph.document import Value, kind_of, shown
+from rendergraph.errors import Problem, suggestion
+from rendergraph.resolve import NodeSpec
+
+
+def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
+    """The node with its parameter values, defaults for those that are wrong, and what is wrong.
+
+    Values go through pydantic as JSON: as Python values its strict mode refuses a list for a tuple, and its lax mode
+    takes `'1.5'` and `true` for numbers.
+    """
+    values = {name: value.plain() for name, value in spec.params.items()}
+    cls = node_type.cls
+    problems: list[Problem] = []
+    for name in [name for name in values if name not in cls.parameters()]:
+        del values[name]
+        problems.append(_unknown(spec.params[name], name, node_type))
+    try:
+        return cls.model_validate_json(json.dumps(values)), problems
+    except ValidationError as error:
+        for name, details in _by_parameter(error).items():
+            values.pop(name, None)
+            problems.append(_wrong(spec, node_type, name, details))
+    try:
+        return cls.model_validate_json(json.dumps(values)), problems
+    except ValidationError:  # a rule between parameters fails, and has been said
+        return cls(), problems
+
+
+def _by_parameter(error: ValidationError) -> dict[str, list[Any]]:
+    table: dict[str, list[Any]] = {}
+    for detail in error.errors(include_url=False):
+        table.setdefault(str(detail["loc"][0]) if detail["loc"] else "", []).append(detail)
+    return table
+
+
+def _unknown(value: Value, name: str, node_type: NodeType) -> Problem:
+    cls = node_type.cls
+    if name in cls.inputs() or name in cls.groups():
+        hint = f"; '{name}' is an input, move it to `inputs`"
+    else:
+        hint = suggestion(name, cls.parameters()) if cls.parameters() else "; it takes none"
+    return value.problem("RG103", f"node type '{node_type.name}' has no param '{shown(name)}'{hint}", key=True)
+
+
+def _wrong(spec: NodeSpec, node_type: NodeType, name: str, details: list[Any]) -> Problem:
+    value = spec.params.get(name)
+    detail = details[0]
+    message = str(detail["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    if value is None:  # a rule between parameters
+        return spec.value.problem("RG104", f"node '{spec.id}': {message}", key=True)
+    if detail["type"] in ("value_error", "assertion_error"):
+        text = f"'{spec.id}.{name}' is {_short(value)}, it {message}"
+        return value.problem("RG104", text)
+    info = node_type.cls.parameters()[name]
+    extra = info.json_schema_extra
+    words = words_for(info.annotation, extra if isinstance(extra, Mapping) else {})
+    hint = ""
+    if isinstance(value.data, str):
+        hint = suggestion(value.data, _choices(info.annotation), most=0)
+    return value.problem("RG104", f"'{spec.id}.{name}' takes {words}, this is {_short(value)}{hint}")
+
+
+def _short(value: Value) -> str:
+    data = value.data
+    if isinstance(data, str):
+        return f"'{shown(data, 40)}'"
+    if isinstance(data, list) and len(data) <= 8 and not any(isinstance(part.data, list | dict) for part in data):
+        return shown([part.data for part in data])
+    return kind_of(data) if isinstance(data, list | dict | bool) or data is None else shown(data)
+
+
+def _choices(annotation: Any) -> list[str]:
+    if get_origin(annotation) is Literal:
+        return [str(choice) for choice in get_args(annotation)]
+    return [choice for part in get_args(annotation) for choice in _choices(part)]
+
+
+def words_for(annotation: Any, limits: Mapping[str, Any]) -> str:
+    """What a parameter takes, in words: `a whole number from 1 to 64`."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in (Union, types.UnionType):
+        return " or ".join(words_for(part, limits) for part in arguments if part is not types.NoneType)
+    if origin is Literal:
+        return f"one of {', '.join(map(str, arguments))}" if len(arguments) > 1 else f"only {arguments[0]}"
+    if origin in (tuple, list):
+        of = "whole numbers" if arguments and arguments[0] is int else "words" if arguments[0] is str else "numbers"
+        count = "" if origin is list or Ellipsis in arguments else f"{len(arguments)} "
+        return f"a list of {count}{of}"
+    words = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}.get(annotation, "a mapping")
+    low, high = limits.get("minimum"), limits.get("maximum")
+    if annotation not in (int, float) or (low is None and high is None):
+        return words
+    if low is None:
+        return f"{words} up to {high}"
+    return f"{words} from {low}" + (f" to {high}" if high is not None else " up")
