@@ -10,9 +10,9 @@ from rendergraph.api import DisplayColor, Input, Node, Output, Radiance, define,
 class Tonemap(Node):
     """Map scene-linear radiance to display values.
 
-    Exposure first, then the shoulder, then the sRGB curve. `neutral` is the Khronos PBR Neutral tone mapper (2024): base
-    colours under 0.8 come out as they are; `aces` is Narkowicz's fit (2015); `reinhard` is x/(1+x) per channel (2002);
-    `none` clips.
+    Exposure first, then the shoulder, then the sRGB curve. `neutral` is the Khronos PBR Neutral tone mapper (2024):
+    base colours under 0.8 come out as they are; `aces` is Narkowicz's fit (2015); `reinhard` is x/(1+x) per channel
+    (2002); `none` clips.
     """
 
     radiance = Input(Radiance, doc="Scene-linear radiance.")

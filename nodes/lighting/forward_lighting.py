@@ -11,6 +11,7 @@ from rendergraph.api import (
     Node,
     Occlusion,
     Output,
+    Port,
     Radiance,
     SceneRef,
     ShadowLookup,
@@ -30,8 +31,8 @@ class ForwardLighting(Node):
     """Radiance of the scene under all its lights, in one pass over the geometry.
 
     Opaque surfaces first, front to back, then those with alpha blending, back to front. Shadows come as functions
-    looked up in place (`lookup`) or as pictures (`visibility`); all that are connected are multiplied. With `depth` of a
-    pre-pass no hidden fragment is shaded.
+    looked up in place (`lookup`) or as pictures (`visibility`); all that are connected are multiplied. With `depth` of
+    a pre-pass no hidden fragment is shaded.
 
     `evaluate` says how often light is computed: at every fragment (Phong 1975), at every vertex with colours
     interpolated (Gouraud 1971), or once a face with the face's normal (flat). Textures and shadows stay per fragment.
@@ -71,17 +72,17 @@ class ForwardLighting(Node):
 
     def record(self, steps: Steps) -> None:
         """One pass over what is opaque, one over what is blended."""
-        stages = {
-            "fragment": {"fragment": "forward_lighting.frag"},
-            "vertex": {"fragment": "forward_interpolated.frag", "vertex": "forward_lighting.vert"},
-            "face": {
-                "fragment": "forward_interpolated.frag", "vertex": "forward_face.vert", "geometry": "forward_lighting.geom",
-            },
-        }[self.evaluate]  # fmt: skip
-        prepass = steps.connected(self.depth)
-        out = {"radiance": self.radiance} | ({} if prepass else {"surface_depth": self.surface_depth})
-        steps.geometry(out=out, objects="opaque", **stages)
+        vertex, geometry, fragment = {
+            "fragment": ("<geometry.vert>", None, "forward_lighting.frag"),
+            "vertex": ("forward_lighting.vert", None, "forward_interpolated.frag"),
+            "face": ("forward_face.vert", "forward_lighting.geom", "forward_interpolated.frag"),
+        }[self.evaluate]
+        out: dict[str, Port] = {"radiance": self.radiance}
+        if not steps.connected(self.depth):
+            out["surface_depth"] = self.surface_depth
+        blended = State(blend=PREMULTIPLIED, depth_write=False)
+        steps.geometry(fragment, vertex=vertex, geometry=geometry, out=out, objects="opaque")
         steps.geometry(
-            out=out, objects="transparent", order="back_to_front",
-            state=State(blend=PREMULTIPLIED, depth_write=False), **stages,
+            fragment, vertex=vertex, geometry=geometry, out=out, objects="transparent", order="back_to_front",
+            state=blended,
         )  # fmt: skip

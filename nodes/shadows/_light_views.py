@@ -18,6 +18,7 @@ Corners = npt.NDArray[np.float64]
 
 CUBE_FACES = 6
 _WIDEST = math.radians(80)  # half angle of a cone that one perspective view still covers with care
+_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))  # of `box_corners`
 _MARGIN = 8.0  # texels around what is seen, so that filter kernels at its edge read drawn texels
 
 
@@ -201,11 +202,8 @@ def visible_part(camera: ViewMatrices, box: Corners) -> Corners:
     intersection, also for an infinite far plane.
     """
     planes = frustum_planes(camera)
-    c = box_corners(box)
-    faces = [
-        c[list(index)] for index in ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
-    ]
-    found = [polygon for face in faces if len(polygon := clip_polygon(face, planes))]
+    corners = box_corners(box)
+    found = [polygon for face in _FACES if len(polygon := clip_polygon(corners[list(face)], planes))]
     points = [*found, *_frustum_corners_inside(planes, box)]
     return np.concatenate(points) if points else np.empty((0, 3))
 
@@ -238,6 +236,8 @@ def clip_polygon(polygon: Corners, planes: Corners) -> Corners:
 def _frustum_corners_inside(planes: Corners, box: Corners) -> list[Corners]:
     """Where the frustum's edges lie inside the box: their ends, cut to it."""
     points: list[Corners] = []
+    axes = np.eye(3)
+    sides = [np.append(axis, -axis @ box[0]) for axis in axes] + [np.append(-axis, axis @ box[1]) for axis in axes]
     middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9
     for i in range(len(planes)):
         for j in range(i):
@@ -250,12 +250,7 @@ def _frustum_corners_inside(planes: Corners, box: Corners) -> list[Corners]:
             origin = np.linalg.solve(system, [-planes[i, 3], -planes[j, 3], along @ middle])
             low, high = -span, span
             others = [plane for k, plane in enumerate(planes) if k not in (i, j)]
-            others += [
-                np.append(sign * np.eye(3)[axis], -sign * bound[axis])
-                for sign, bound in ((1, box[0]), (-1, box[1]))
-                for axis in range(3)
-            ]
-            for plane in others:
+            for plane in (*others, *sides):
                 rate, start = float(plane[:3] @ along), float(plane[:3] @ origin + plane[3])
                 if abs(rate) < 1e-12:
                     if start < -1e-9:

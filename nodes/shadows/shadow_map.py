@@ -27,7 +27,8 @@ class ShadowMapNode(Node):
     views = Views(count=_layers, lights=_lights, doc="The lights' views, one a layer.")
     shadow_map = Output(
         ShadowMap, kind="texture2d_array", format="depth32f", layers=_layers, lights=_lights, view="views", clear=1.0,
-        size=lambda node, facts: (node.resolution, node.resolution), doc="Window depth from each light, 1 where nothing is.",
+        size=lambda node, facts: (node.resolution, node.resolution),
+        doc="Window depth from each light, 1 where nothing is.",
     )  # fmt: skip
 
     light: str | tuple[str, ...] = structural(
@@ -35,10 +36,7 @@ class ShadowMapNode(Node):
     )
     resolution: int = structural(default=2048, unit="texels", min=1, max=16384, doc="Side of each layer.")
     slope_bias: float = structural(
-        default=0.0,
-        min=0,
-        max=64,
-        doc="Polygon offset by slope while drawing, in texels; readers have their own offset.",
+        default=0.0, unit="texels", min=0, max=64, doc="Polygon offset by slope; readers have an offset of their own."
     )
 
     def record(self, steps: Steps) -> None:
@@ -46,8 +44,8 @@ class ShadowMapNode(Node):
         offset = (self.slope_bias, 0.0) if self.slope_bias else None
         for layer in range(_layers(self, steps.facts)):
             steps.geometry(
-                "<depth.frag>", vertex="<depth.vert>", out=self.shadow_map.layer(layer), objects="casters", materials="alpha",
-                view=self.views, view_index=layer, state=State(polygon_offset=offset),
+                "<depth.frag>", vertex="<depth.vert>", out=self.shadow_map.layer(layer), view=self.views,
+                view_index=layer, objects="casters", materials="alpha", state=State(polygon_offset=offset),
             )  # fmt: skip
 
     def update(self, frame: Frame) -> None:

@@ -14,8 +14,8 @@ Names of a function's text are `prefix(node id) + name`: its textures (`shadows_
 
 A stage's text is, in this order: version, `#extension` lines, macros, `<view.glsl>`, views and light tables of the
 textures read, then for each function the stage calls its providers' texts and the function that joins them, then the
-author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, where it is not 0, the table `shadow_lights`
-of the scene's lights that some provider of `shadow` knows; the same for every other function, by its name.
+author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, where it is not 0, the table
+`shadow_lights` of the scene's lights that some provider of `shadow` knows; the same for other functions, by their name.
 """
 
 from __future__ import annotations

@@ -117,6 +117,7 @@ class Includes:
         root = (root or source.parent).resolve()
         lines: list[str] = []
         origins: list[Origin] = []
+        self._certain.add((source.resolve(), prefix))
         self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
         return SourceText(tuple(lines), tuple(origins))
 
