@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
@@ -317,6 +318,20 @@ def structural(*, default: Any, doc: str, unit: str = "", min: float | None = No
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
+@cache
+def _ports_of(cls: type[Node]) -> dict[str, Port]:
+    # Every stage asks for ports of every node, and pydantic's base classes hold hundreds of attributes.
+    found: dict[str, Port] = {}
+    for base in reversed(cls.__mro__):
+        if issubclass(base, Node):
+            for name, value in vars(base).items():
+                if isinstance(value, Port):
+                    found[name] = value
+                elif name in found:
+                    del found[name]  # a subclass may drop a port by setting it to None
+    return found
+
+
 class Node(BaseModel):
     """Base of every node: ports and parameters as class attributes, nothing more for a plain full-screen pass.
 
@@ -358,14 +373,7 @@ class Node(BaseModel):
     @classmethod
     def ports(cls) -> dict[str, Port]:
         """Every port by name, in the order of declaration, bases first."""
-        found: dict[str, Port] = {}
-        for base in reversed(cls.__mro__):
-            for name, value in vars(base).items():
-                if isinstance(value, Port):
-                    found[name] = value
-                elif name in found:
-                    del found[name]  # a subclass may drop a port by setting it to None
-        return found
+        return dict(_ports_of(cls))
 
     @classmethod
     def inputs(cls) -> dict[str, Input | InOut]:

@@ -119,13 +119,15 @@ class _Linker:
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
         node, problems = instance(spec, node_type)
         self.problems += problems
-        return Bound(spec, node_type, node, {name: [] for name in node_type.cls.inputs()}, set())
+        ports = node_type.cls.ports()
+        inputs = {name: port for name, port in ports.items() if isinstance(port, Input | InOut)}
+        return Bound(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set())
 
     # Links ------------------------------------------------------------------------------------------------------------
 
     def _connect(self, bound: Bound, names: Names) -> None:
         cls = bound.type.cls
-        inputs, groups = cls.inputs(), cls.groups()
+        inputs, groups = bound.inputs, cls.groups()
         for name, value in bound.spec.inputs.items():
             if name in inputs:
                 self._input(bound, names, name, inputs[name], value)
@@ -186,7 +188,7 @@ class _Linker:
                 if name in offered:
                     self._follow(bound, names, name, value, name)
                 elif offered:
-                    optional = bound.type.cls.inputs()[name].optional
+                    optional = bound.inputs[name].optional
                     lacking += [] if optional else [name]
             if lacking:
                 listed = ", ".join(f"'{name}'" for name in lacking)

@@ -30,7 +30,7 @@ class Checker:
         for bound in self.nodes.values():
             before = len(self.problems)
             for name, links in bound.links.items():
-                port = bound.type.cls.inputs()[name]
+                port = bound.inputs[name]
                 for link in links:
                     self._link(bound, port, link)
             if len(self.problems) == before:
@@ -144,7 +144,7 @@ class Checker:
             self.problems.append(bound.spec.value.problem("RG206", text, key=True))
             return
         for name, links in bound.links.items():
-            port = bound.type.cls.inputs()[name]
+            port = bound.inputs[name]
             for link in links if isinstance(port, Input) and port.size == "same" else ():
                 info = self.infer.info(link.source)
                 if info is None or info.desc is None or info.desc.size in made:

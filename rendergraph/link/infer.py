@@ -164,7 +164,7 @@ class Infer:
         except _Unknown:
             raise
         except Exception as error:  # a stranger's function
-            missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in bound.type.cls.inputs()
+            missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in bound.inputs
             if missing and end not in self.used:
                 raise _Unknown from None  # nobody uses what lacks an input
             if missing:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Node, Port
+from rendergraph.declare import InOut, Input, Node, Port
 from rendergraph.document import Value, shown
 from rendergraph.errors import Problem, suggestion
 from rendergraph.link.graph import Endpoint
@@ -40,6 +40,8 @@ class Bound:
         spec: from the file.
         type: its type.
         node: the instance; defaults stand in for parameters that are wrong.
+        ports: every port by name.
+        inputs: the ports that take links.
         links: by input, what is connected.
         failed: inputs whose link is wrong, so that nobody says they lack one.
     """
@@ -47,13 +49,10 @@ class Bound:
     spec: NodeSpec
     type: NodeType
     node: Node
+    ports: Mapping[str, Port]
+    inputs: Mapping[str, Input | InOut]
     links: dict[str, list[Link]]
     failed: set[str]
-
-    @property
-    def ports(self) -> dict[str, Port]:
-        """Every port by name."""
-        return self.type.cls.ports()
 
 
 class Wrong(Exception):
