@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -20,32 +20,42 @@ from rendergraph.textures import FORMATS
 Pixels: TypeAlias = npt.NDArray[Any]
 
 
+class Described(Protocol):
+    """What is known of an array's values; a frame's `info(name)` is one."""
+
+    @property
+    def semantic(self) -> str:
+        """Name of the semantic, `any` where unknown."""
+
+    @property
+    def format(self) -> str:
+        """The texture's format, a name in `textures.FORMATS`, empty where unknown."""
+
+    @property
+    def encoding(self) -> str | None:
+        """`display` for sRGB-encoded colours, `linear` for linear ones, else None."""
+
+
 @dataclass(frozen=True)
 class PictureInfo:
-    """What an array's values are.
-
-    Attributes:
-        semantic: name of the semantic, `any` where unknown.
-        format: the texture's format, a name in `textures.FORMATS`, empty where unknown.
-        encoding: `display` for sRGB-encoded colours, `linear` for linear ones, else None.
-    """
+    """What an array's values are, where no frame says it; see `Described`."""
 
     semantic: str = "any"
     format: str = ""
-    encoding: Literal["linear", "display"] | None = None
+    encoding: str | None = None
 
-    @property
-    def half(self) -> bool:
-        """Whether half floats hold every value of the format."""
-        return self.format in ("r16f", "rg16f", "rgba16f", "r11f_g11f_b10f")
 
-    def channels(self, count: int) -> tuple[str, ...]:
-        """The names of `count` channels in an EXR file."""
-        known = FORMATS.get(self.format)
-        if count == 1:
-            is_depth = (known is not None and known.is_depth) or self.semantic in ("depth", "linear_depth")
-            return ("Z",) if is_depth else ("Y",)
+def channel_names(info: Described, count: int) -> tuple[str, ...]:
+    """The names of `count` channels in an EXR file."""
+    if count > 1:
         return ("R", "G", "B", "A")[:count]
+    known = FORMATS.get(info.format)
+    is_depth = known.is_depth if known else info.semantic in ("depth", "shadow_map")
+    return ("Z",) if is_depth or info.semantic == "linear_depth" else ("Y",)
+
+
+_HALF = frozenset({"r16f", "rg16f", "rgba16f", "r11f_g11f_b10f"})
+"""Formats whose every value is a half float."""
 
 
 class Saved(NamedTuple):
@@ -60,12 +70,12 @@ class Saved(NamedTuple):
 
     path: Path
     pixels: Pixels
-    info: PictureInfo
+    info: Described
     raw: bool = False
 
 
 def save_output(
-    path: Path | str, pixels: Pixels, info: PictureInfo, metadata: Mapping[str, str], *, raw: bool = False
+    path: Path | str, pixels: Pixels, info: Described, metadata: Mapping[str, str], *, raw: bool = False
 ) -> None:
     """One output or tap as a file: see `save_outputs`."""
     save_outputs([Saved(Path(path), pixels, info, raw)], metadata)
@@ -84,13 +94,17 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
     """
     jobs: list[Job] = []
     for path, pixels, info, raw in files:
+        known = FORMATS.get(info.format)
+        if known and known.family in ("uint", "int"):
+            pixels = pixels.astype(np.int64)  # numbers, where 8-bit arrays are otherwise colours
         if EXTENSIONS[extension(path)] in ("png", "jpeg"):
             jobs.append((path, viewable(pixels, info.semantic), None, "data", False))
             continue
         shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
         decoded = not raw and info.encoding == "display"
-        half = decoded or info.half or pixels.dtype == np.float16
-        jobs.append((path, shaped, info.channels(shaped.shape[-1]), "display" if decoded else "data", half))
+        half = decoded or info.format in _HALF or pixels.dtype == np.float16
+        names = channel_names(info, shaped.shape[-1])
+        jobs.append((path, shaped, names, "display" if decoded else "data", half))
     write_all(jobs, metadata)
 
 

@@ -1,0 +1,163 @@
+"""The group of verbs, and the one place where an exception becomes a message and an exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from types import FrameType
+from typing import NoReturn
+
+from rendergraph import __version__
+from rendergraph.cli.output import print_error, say
+from rendergraph.cli.words import click
+from rendergraph.errors import Problem, RendergraphError
+
+VERBS = ("run", "check", "plan", "graph", "config", "bench", "nodes", "explain", "schema", "doctor")
+"""In the order of `--help`; verb `x` is the function `command` in `rendergraph.cli.x`."""
+
+INTERRUPTED, TERMINATED = 130, 143
+
+
+class _Terminated(BaseException):
+    """SIGTERM arrived; a BaseException, so that nothing on the way up takes it for a failure of its own."""
+
+
+class _Verbs(click.Group):
+    """A group whose members are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        found: click.Command = importlib.import_module(f"rendergraph.cli.{cmd_name}").command
+        return found
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="rendergraph")
+def group() -> None:
+    """A laboratory for real-time rendering: a renderer is one YAML file.
+
+    \b
+    Examples:
+      rendergraph run forward
+      rendergraph explain pipeline
+      rendergraph check my.yaml
+    """
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run one command line.
+
+    Args:
+        args: words after the program's name; the process's own by default.
+
+    Returns:
+        The exit code of design.md §7.
+    """
+    words = list(sys.argv[1:] if args is None else args)
+    as_json = "--json" in words
+    try:
+        with _terminable():
+            code = _invoke(words)
+            _flush()
+            return code
+    except RendergraphError as error:
+        return _told(error.problems, error.exit_code, as_json)
+    except click.exceptions.NoArgsIsHelpError as error:
+        say(error.format_message())
+        return error.exit_code
+    except click.UsageError as error:
+        return _told([_usage(error)], error.exit_code, as_json)
+    except click.ClickException as error:
+        return _told([Problem("RG500", error.format_message())], error.exit_code, as_json)
+    except (KeyboardInterrupt, EOFError, click.Abort):
+        say("interrupted")
+        return INTERRUPTED
+    except _Terminated:
+        say("terminated")
+        return TERMINATED
+    except BrokenPipeError:
+        _discard_stdout()  # whoever read us has enough: `rendergraph nodes | head`
+        return 0
+    except MemoryError:
+        return _told([Problem("RG509", "out of memory")], 1, as_json)
+    except OSError as error:
+        if os.environ.get("RENDERGRAPH_TRACEBACK"):
+            raise
+        where = f"{error.filename}: " if error.filename else ""
+        return _told([Problem("RG509", f"{where}{error.strerror or error}")], 1, as_json)
+    except Exception as error:
+        if os.environ.get("RENDERGRAPH_TRACEBACK"):
+            raise
+        return _told([_unexpected(error)], 1, as_json)
+
+
+def _invoke(words: list[str]) -> int:
+    if "_RENDERGRAPH_COMPLETE" in os.environ:  # the shell asks for completions
+        group.main(words, prog_name="rendergraph", complete_var="_RENDERGRAPH_COMPLETE")
+    try:
+        with group.make_context("rendergraph", words) as context:
+            group.invoke(context)
+    except click.exceptions.Exit as done:
+        return int(done.exit_code)
+    return 0
+
+
+def _told(problems: Sequence[Problem], code: int, as_json: bool) -> int:
+    """Say what went wrong; if even that cannot be said, the code still can."""
+    try:
+        print_error(problems, code, as_json=as_json)
+        _flush()
+    except OSError:
+        _discard_stdout()
+    return code
+
+
+def _usage(error: click.UsageError) -> Problem:
+    path = error.ctx.command_path if error.ctx else "rendergraph"
+    text = " ".join(error.format_message().split()).rstrip(".")
+    return Problem("RG500", f"{text[:1].lower()}{text[1:]}; see '{path} --help'")
+
+
+def _unexpected(error: Exception) -> Problem:
+    text = (
+        f"this is a mistake in rendergraph, not yours: {type(error).__name__}: {' '.join(str(error).split())[:300]}; "
+    )
+    text += "RENDERGRAPH_TRACEBACK=1 shows where; please report that with the output of `rendergraph doctor`"
+    return Problem("RG599", text)
+
+
+def _flush() -> None:
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _discard_stdout() -> None:
+    """Let the interpreter's own last flush go nowhere."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextlib.contextmanager
+def _terminable() -> Iterator[None]:
+    """SIGTERM unwinds like Ctrl-C does, so that half-written files are removed."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> NoReturn:
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

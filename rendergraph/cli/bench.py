@@ -1,0 +1,94 @@
+"""`rendergraph bench`: how long each pass takes."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.cli import options
+from rendergraph.cli.output import emit, emit_json, megabytes, say, table
+from rendergraph.cli.words import click
+
+if TYPE_CHECKING:
+    from rendergraph.session import Frame
+
+
+@click.command("bench", no_args_is_help=True)
+@options.pipeline_options
+@click.option("-n", "--frames", type=click.IntRange(1, 100_000), default=30, show_default=True, help="Measured frames.")
+@click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
+@click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@options.json_option
+@options.device_option
+def command(frames: int, fps: float, no_alias: bool, as_json: bool, device: int | None, **selection: Any) -> None:
+    """Time each pass.
+
+    Renders frames and prints the median time of each pass, with its spread. All of the pipeline's outputs are computed; one more frame is rendered beforehand, unmeasured. Times of a software
+    renderer say nothing about GPUs.
+
+    \b
+    Examples:
+      rendergraph bench forward --frames 5 --size 320x180
+      rendergraph bench forward --frames 5 --size 320x180 --json
+    """
+    pipeline = options.load(**selection)
+    frame = pipeline.render(frames=range(1, frames + 1), fps=fps, alias=not no_alias, device=device)
+    report = measured(frame)
+    emit_json(report) if as_json else emit(_text(report))
+    if report["device"]["software"]:
+        say(f"software rendering on {report['device']['renderer']}: these times say nothing about GPUs")
+
+
+def measured(frame: Frame) -> dict[str, Any]:
+    """The frame's report with the spread of every figure over all frames."""
+    passes = []
+    for entry in frame.passes:
+        steps = [[step for step in times.steps if step.node == entry["node"]] for times in frame.times]
+        gpu = [sum(step.gpu_ms for step in own if step.gpu_ms is not None) for own in steps]
+        timed = any(step.gpu_ms is not None for own in steps for step in own)
+        cpu = [sum(step.cpu_ms for step in own) for own in steps]
+        passes.append(
+            {
+                "node": entry["node"],
+                "type": entry["type"],
+                "gpu_ms": spread(gpu) if timed else None,
+                "cpu_ms": spread(cpu),
+            }
+        )
+    whole = spread([times.frame_ms for times in frame.times])
+    return frame.as_json() | {"frames": len(frame.times), "frame_ms": whole, "passes": passes}
+
+
+def spread(values: Sequence[float]) -> dict[str, float]:
+    """Median, least and most, and the tenth and ninetieth percentile."""
+    if len(values) < 2:
+        return dict.fromkeys(("median", "min", "max", "p10", "p90"), values[0])
+    tenths = statistics.quantiles(values, n=10, method="inclusive")
+    ends = {"min": min(values), "max": max(values), "p10": tenths[0], "p90": tenths[-1]}
+    return {"median": statistics.median(values), **ends}
+
+
+def _text(report: dict[str, Any]) -> str:
+    rows = [
+        (entry["node"], entry["type"], *_figures(entry["gpu_ms"]), *_figures(entry["cpu_ms"]))
+        for entry in report["passes"]
+    ]
+    rows.append(("frame", "", "", "", *_figures(report["frame_ms"])))
+    width, height = report["size"]
+    device, memory = report["device"], report["memory"]
+    heads = ("pass", "type", "GPU ms", "10–90 %", "CPU ms", "10–90 %")
+    return "\n".join(
+        [
+            f"{report['pipeline']}, {width}×{height}, {report['frames']} frames on {device['renderer']}"
+            + (" (software)" if device["software"] else ""),
+            table(rows, heads, right=(2, 3, 4, 5)),
+            f"textures: {megabytes(memory['allocated_bytes'])}, {megabytes(memory['no_reuse_bytes'])} without reuse",
+        ]
+    )
+
+
+def _figures(figures: dict[str, float] | None) -> tuple[str, str]:
+    if figures is None:
+        return "–", ""
+    return f"{figures['median']:.3f}", f"{figures['p10']:.3f}–{figures['p90']:.3f}"

@@ -1,0 +1,44 @@
+"""`rendergraph check`: is it right?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rendergraph.cli import options
+from rendergraph.cli.output import emit_json, say, warn
+from rendergraph.cli.words import click
+
+
+@click.command("check", no_args_is_help=True)
+@options.pipeline_options
+@options.json_option
+def command(as_json: bool, **selection: Any) -> None:
+    """Find every mistake, without a GPU.
+
+    Looks at the pipeline, everything it refers to, its scene and the options. Exits 0 where all is well; exits 3 with
+    every mistake, its line and the way out where not.
+
+    \b
+    Examples:
+      rendergraph check forward
+      rendergraph check forward --scene spheres -s light.ambient=0.1 --json
+    """
+    pipeline = options.load(**selection)
+    graph = pipeline.check()
+    said = {str(problem) for problem in pipeline.warnings}
+    later = [problem for problem in graph.warnings if str(problem) not in said]
+    warn(later)
+    width, height = graph.size
+    links = graph.dag.number_of_edges()
+    say(f"{graph.name}: {len(graph.nodes)} nodes, {links} links, {width}×{height}, outputs {', '.join(graph.outputs)}")
+    if as_json:
+        emit_json(
+            {
+                "pipeline": graph.name,
+                "size": [width, height],
+                "nodes": len(graph.nodes),
+                "links": links,
+                "outputs": {name: str(end) for name, end in graph.outputs.items()},
+                "warnings": [problem.as_json() for problem in [*pipeline.warnings, *later]],
+            }
+        )

@@ -1,0 +1,56 @@
+"""`rendergraph config`: what a pipeline is after everything is applied."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rendergraph.cli import options
+from rendergraph.cli.output import emit, emit_json, warn
+from rendergraph.cli.words import click
+from rendergraph.errors import InputError, Place, Problem
+
+_PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr")
+
+
+@click.command("config", no_args_is_help=True)
+@options.pipeline_options
+@options.json_option
+def command(as_json: bool, **selection: Any) -> None:
+    """Print the resolved pipeline, with origins.
+
+    That is the file with `extends`, patches and settings applied, and beside each value the line it comes from. Of a picture that `rendergraph run` wrote (EXR or PNG) it prints the pipeline that the picture was made with.
+
+    \b
+    Examples:
+      rendergraph config forward-prepass
+      rendergraph config forward -s light.ambient=0.1 --json
+      rendergraph config forward.png
+    """
+    if Path(selection["pipeline"]).suffix.lower() in _PICTURES:
+        _of_picture(Path(selection["pipeline"]), as_json)
+        return
+    pipeline = options.make(**selection)
+    spec = pipeline.spec
+    spec.check()
+    warn(spec.notes)
+    if as_json:
+        emit_json({"pipeline": spec.name, "resolved": spec.plain(), "yaml": spec.to_yaml(origins=True)})
+    else:
+        emit(spec.to_yaml(origins=True).rstrip("\n"))
+
+
+def _of_picture(path: Path, as_json: bool) -> None:
+    from rendergraph.images import read_metadata
+
+    found = read_metadata(path)
+    if "pipeline" not in found:
+        text = "the picture does not say how it was made; EXR and PNG files that rendergraph wrote do"
+        raise InputError(Problem("RG510", text, Place(str(path))))
+    if as_json:
+        emit_json({"picture": str(path), "yaml": found["pipeline"], "metadata": found})
+        return
+    for name, text in found.items():
+        if name != "pipeline":
+            emit(f"# {name}: " + " ".join(text.split()))
+    emit(found["pipeline"].rstrip("\n"))

@@ -1,0 +1,155 @@
+"""`rendergraph explain`: the reference, offline."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rendergraph.cli import options
+from rendergraph.cli.describe import describe, example
+from rendergraph.cli.output import emit, emit_json, table
+from rendergraph.cli.words import click
+from rendergraph.errors import InputError, Problem, suggestion
+
+_FILES = ("pipeline", "scene")
+
+
+@click.command("explain", no_args_is_help=True)
+@click.argument("topic")
+@options.plugin_option
+@options.json_option
+def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
+    """Explain a node type, an error code or a file.
+
+    `pipeline` and `scene` list every key of such a file.
+
+    \b
+    Examples:
+      rendergraph explain tonemap
+      rendergraph explain RG103
+      rendergraph explain scene
+    """
+    if re.fullmatch(r"[Rr][Gg]\d+", topic):
+        page = error_page(topic.upper())
+        emit_json(page) if as_json else emit(_error_text(page))
+        return
+    if topic in _FILES:
+        keys = file_keys(topic)
+        emit_json({"file": topic, "keys": keys}) if as_json else emit(_keys_text(topic, keys))
+        return
+    from rendergraph.catalog import Catalog
+
+    catalog = Catalog.discover(plugins)
+    if topic not in catalog:
+        known = [*catalog.names(), *_FILES]
+        text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
+        raise InputError(Problem("RG511", text))
+    described = describe(catalog.get(topic))
+    emit_json(described) if as_json else emit(_node_text(described))
+
+
+# --- error codes -----------------------------------------------------------------------------------------------------
+
+
+def error_page(code: str) -> dict[str, Any]:
+    """The page of a code.
+
+    Raises:
+        InputError: there is no such code.
+    """
+    import yaml
+
+    from rendergraph.resources import folder
+
+    pages = {path.name.partition("-")[0]: path for path in sorted(folder("rendergraph.errors").glob("RG*.yaml"))}
+    if code not in pages:
+        raise InputError(Problem("RG511", f"there is no error code '{code}'{suggestion(code, pages)}"))
+    page: dict[str, Any] = yaml.safe_load(pages[code].read_text(encoding="utf-8"))
+    return page
+
+
+def _error_text(page: dict[str, Any]) -> str:
+    parts = [f"{page['code']}  {page['title']}", _indented(page["about"])]
+    for key, title in (("wrong", "Wrong"), ("message", "Message"), ("right", "Right")):
+        if page.get(key):
+            parts.append(f"{title}\n{_indented(page[key])}")
+    return "\n\n".join(parts)
+
+
+def _indented(text: object) -> str:
+    return "\n".join(f"  {line}".rstrip() for line in str(text).rstrip().splitlines())
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def file_keys(kind: str) -> list[dict[str, str]]:
+    """Every key of a pipeline or scene file: `key` as a dotted path, `type` and `doc`."""
+    raise NotImplementedError(kind)
+
+
+def _keys_text(kind: str, keys: list[dict[str, str]]) -> str:
+    head = f"A {kind} file: a mapping of these keys, all optional unless said."
+    return f"{head}\n\n" + table([(row["key"], row["type"], row["doc"]) for row in keys], ("key", "value", "meaning"))
+
+
+# --- nodes -----------------------------------------------------------------------------------------------------------
+
+
+def _node_text(node: dict[str, Any]) -> str:
+    origin = node["family"] or "single file"
+    parts = [f"{node['name']}  ({origin})", node["doc"]]
+    if node["inputs"]:
+        rows = [(p["name"], _meaning(p), _input_facts(p), p["doc"]) for p in node["inputs"]]
+        parts.append("Inputs\n" + _block(rows))
+    rows = [(p["name"], _meaning(p), _output_facts(p), p["doc"]) for p in node["outputs"]]
+    parts.append("Outputs\n" + _block(rows))
+    if node["parameters"]:
+        knobs = [
+            (p["name"], p["type"], f"{_value(p['default'])} {p['unit']}".strip(), _range(p), p["doc"])
+            for p in node["parameters"]
+        ]
+        parts.append("Parameters\n" + _block(knobs, ("name", "value", "default", "range", "")))
+    parts.append("In a file\n" + _indented(example(node)))
+    return "\n\n".join(parts)
+
+
+def _block(rows: Sequence[tuple[Any, ...]], heads: tuple[str, ...] = ()) -> str:
+    return _indented(table(rows, heads))
+
+
+def _meaning(port: dict[str, Any]) -> str:
+    return str(port["semantic"] or f"like {port['like']}")
+
+
+def _input_facts(port: dict[str, Any]) -> str:
+    words = ["optional"] if port["optional"] else []
+    words += ["list"] if port.get("many") else []
+    words += ["continued"] if port.get("continues") else []
+    words += [f"in {port['group']}"] if port.get("group") else []
+    words += [port["kind"]] if port["kind"] != "texture2d" else []
+    return ", ".join(words)
+
+
+def _output_facts(port: dict[str, Any]) -> str:
+    words = [port["kind"]] if port["kind"] != "texture2d" else []
+    words += [str(port[key]) for key in ("format", "size") if port.get(key)]
+    words += [f"needs {' and '.join(port['needs'])}"] if port.get("needs") else []
+    return ", ".join(words)
+
+
+def _range(parameter: dict[str, Any]) -> str:
+    low, high = parameter.get("min"), parameter.get("max")
+    if low is None and high is None:
+        return ""
+    return f"{_value(low) if low is not None else '-∞'} … {_value(high) if high is not None else '∞'}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,40 @@
+"""`rendergraph graph`: what is connected to what."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rendergraph.cli import options
+from rendergraph.cli.output import emit_json
+from rendergraph.cli.words import click
+
+_FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".svg": "svg"}
+
+
+@click.command("graph", no_args_is_help=True)
+@options.pipeline_options
+@click.option(
+    "-f", "--format", "format_name", type=click.Choice(["text", "dot", "mermaid", "svg"]),
+    help="What to draw it as; by default what the file's extension says, else text.",
+)  # fmt: skip
+@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
+@options.json_option
+def command(format_name: str | None, output: Path | None, as_json: bool, **selection: Any) -> None:
+    """Draw the graph as text, DOT, Mermaid or SVG.
+
+    \b
+    Examples:
+      rendergraph graph forward
+      rendergraph graph forward --format mermaid
+      rendergraph graph forward-prepass -o graph.svg
+    """
+    from rendergraph import views
+
+    graph = options.load(**selection).graph
+    if as_json and not output:
+        emit_json(views.graph_json(graph))
+        return
+    chosen = format_name or (_FORMATS.get(output.suffix.lower(), "text") if output else "text")
+    text: str = getattr(views, chosen)(graph)
+    options.put(text, output, as_json=as_json)

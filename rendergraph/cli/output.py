@@ -1,0 +1,123 @@
+"""What is printed, and where: stdout is data, stderr everything else."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import sys
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+from rendergraph.errors import Problem
+
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+
+
+def emit(text: str) -> None:
+    """Data, to stdout, with one line end."""
+    if sys.stdout is not None:
+        sys.stdout.write(_printable(text, sys.stdout) + "\n")
+
+
+def emit_json(document: Any) -> None:
+    """One JSON document to stdout; infinite and undefined numbers become null."""
+    emit(json.dumps(_plain(document), indent=2, ensure_ascii=False, default=str))
+
+
+def say(text: str) -> None:
+    """A word to the person, on stderr."""
+    if sys.stderr is not None:
+        sys.stderr.write(_printable(text, sys.stderr) + "\n")
+        sys.stderr.flush()
+
+
+def warn(problems: Sequence[Problem]) -> None:
+    """Warnings, each once."""
+    for text in dict.fromkeys(str(problem) for problem in problems):
+        say(text)
+
+
+def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:
+    """What stopped us: in words on stderr, and as the document of `--json` on stdout."""
+    for problem in problems:
+        say(str(problem))
+    if as_json:
+        emit_json({"error": {"exit_code": exit_code, "problems": [problem.as_json() for problem in problems]}})
+
+
+class Progress:
+    """`frame 3 of 10` on a terminal, nothing elsewhere."""
+
+    def __init__(self, total: int) -> None:
+        self._total = total
+        self._on = total > 1 and sys.stderr is not None and sys.stderr.isatty()
+
+    def show(self, done: int) -> None:
+        """Say how many are done."""
+        if self._on:
+            sys.stderr.write(f"\rframe {done} of {self._total}")
+            sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Leave the line as it was."""
+        if self._on:
+            sys.stderr.write("\r" + " " * 40 + "\r")
+            sys.stderr.flush()
+
+
+def table(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = ()) -> str:
+    """Aligned columns, two blanks between; on a terminal the last one is wrapped to its width.
+
+    Args:
+        rows: cells; None is empty.
+        heads: titles above the columns.
+        right: numbers of the columns that are aligned to the right.
+    """
+    cells = [["" if cell is None else str(cell) for cell in row] for row in [heads, *rows] if row]
+    if not cells:
+        return ""
+    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
+    start = sum(widths[:-1]) + 2 * (len(widths) - 1)
+    room = max(24, terminal_width() - start)
+    lines = []
+    for row in cells:
+        *front, last = row
+        shown = [c.rjust(w) if i in right else c.ljust(w) for i, (c, w) in enumerate(zip(front, widths, strict=False))]
+        if len(front) in right:
+            last = last.rjust(widths[-1])
+        wrapped = textwrap.wrap(last, room, break_long_words=False) if len(last) > room else [last]
+        lines.append("  ".join([*shown, wrapped[0]]).rstrip())
+        lines += [" " * start + more for more in wrapped[1:]]
+    return "\n".join(lines)
+
+
+def terminal_width() -> int:
+    """Columns of the terminal that stdout is, without bound elsewhere."""
+    if sys.stdout is not None and sys.stdout.isatty():
+        return shutil.get_terminal_size().columns
+    return 1 << 20
+
+
+def megabytes(count: float) -> str:
+    """Bytes for a person: `12.4 MB` (2^20 bytes)."""
+    return f"{count / (1 << 20):.1f} MB"
+
+
+def _printable(text: str, stream: Any) -> str:
+    """Text that the stream's encoding can hold, and without control characters that would steer a terminal."""
+    text = _CONTROL.sub(lambda found: repr(found[0])[1:-1], text)
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

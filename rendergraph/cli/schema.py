@@ -1,0 +1,29 @@
+"""`rendergraph schema`: for editors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from rendergraph.cli import options
+from rendergraph.cli.words import click
+
+
+@click.command("schema")
+@options.plugin_option
+@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
+@options.json_option
+def command(plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
+    """Print the JSON Schema of pipeline files.
+
+    It knows all installed nodes; editors complete and check pipelines with it.
+
+    \b
+    Examples:
+      rendergraph schema -o rendergraph.schema.json
+    """
+    from rendergraph.catalog import Catalog
+    from rendergraph.schema import schema
+
+    text = json.dumps(schema(Catalog.discover(plugins)), indent=2, ensure_ascii=False)
+    options.put(text, output, as_json=as_json)
