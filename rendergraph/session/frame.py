@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
 from rendergraph.errors import InputError, Problem, suggestion
+
+if TYPE_CHECKING:
+    from rendergraph.execute import FrameTimes
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         memory: the plan's figures.
         culled: node to the reason why it did not run.
         metadata: what goes into a picture file.
+        times: what each frame so far took, step by step.
     """
 
     number: int
@@ -63,6 +67,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
     memory: Mapping[str, object]
     culled: Mapping[str, str]
     metadata: Mapping[str, str] = field(default_factory=dict)
+    times: tuple[FrameTimes, ...] = ()
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if name not in self.arrays:

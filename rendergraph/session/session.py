@@ -198,6 +198,7 @@ class Session:
             memory=plan.memory.as_json(),
             culled=dict(plan.schedule.culled),
             metadata=self._metadata(pipeline),
+            times=tuple(times),
         )
 
     def _metadata(self, pipeline: Pipeline) -> dict[str, str]:
