@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from rendergraph import Session
 
 
 @pytest.fixture(scope="session")
@@ -15,3 +20,12 @@ def shared() -> Path:
     if not (folder / "reference").is_dir():
         pytest.skip("no shared reference data beside the project")
     return folder
+
+
+@pytest.fixture(scope="session")
+def gl() -> Iterator[Session]:
+    """One GL session for all tests."""
+    import rendergraph as rg
+
+    with rg.Session() as session:
+        yield session

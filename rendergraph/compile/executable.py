@@ -109,6 +109,7 @@ class Executable:
         sorters: called with the view tables when a view has changed: objects front to back.
         queries: one time query a step.
         buffers: draw commands.
+        vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written before the next frame.
     """
 
@@ -122,6 +123,7 @@ class Executable:
     sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
     queries: list[moderngl.Query] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
+    vertex_arrays: Call = bool
     fresh: bool = True
 
     def assemble(self) -> None:
@@ -173,6 +175,7 @@ class Executable:
 
     def release(self) -> None:
         """Free what it owns; programs and scenes are the session's."""
+        self.vertex_arrays()
         self.memory.release()
         self.views.release()
         for buffer in self.buffers:

@@ -168,6 +168,7 @@ class Memory:
 
     def release(self) -> None:
         """Free everything."""
+        self.device.unbind()
         for framebuffer in self._framebuffers.values():
             framebuffer.release()
         for renderbuffer in self._dummies.values():

@@ -100,6 +100,7 @@ class _Compiler:
         made = Executable(self.device, self.plan, self.memory, self.views, binds, steps)
         made.sorters = list(self.geometry.sorters)
         made.buffers = list(self.geometry.buffers)
+        made.vertex_arrays = partial(self.programs.forget, id(self.memory))
         made.queries = [self.device.ctx.query(time=True) for _ in self.plan.schedule.steps]
         made.assemble()
         return made
@@ -134,7 +135,7 @@ class _Compiler:
             buffer = self.memory.buffer(resource)
             content.append((buffer, " ".join(words[:half]), *words[half:]))
             names.append(buffer.glo)
-        key = ("draw", *names, *(layout for layout, _ in step.attributes))
+        key = (id(self.memory), "draw", *names, *(layout for layout, _ in step.attributes))
         vertex_array = self.programs.vertex_array(program, key, content)
         mode = _TOPOLOGY[step.topology]
         if isinstance(step.vertices, str):

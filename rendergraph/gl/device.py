@@ -29,6 +29,13 @@ class Device:
     raw: RawGL
     owned: bool = True
     limits: dict[str, int] = field(default_factory=dict)
+    _idle: moderngl.Framebuffer | None = None
+
+    def unbind(self) -> None:
+        """Bind a framebuffer of the device's own: moderngl binds again what was bound last, freed or not."""
+        if self._idle is None:
+            self._idle = self.ctx.framebuffer([self.ctx.renderbuffer((1, 1))])
+        self._idle.use()
 
     @property
     def renderer(self) -> str:
@@ -51,6 +58,11 @@ class Device:
 
     def release(self) -> None:
         """End the context if it is ours."""
+        if self._idle is not None:
+            for attachment in self._idle.color_attachments:
+                attachment.release()
+            self._idle.release()
+            self._idle = None
         if self.owned:
             self.ctx.release()
 

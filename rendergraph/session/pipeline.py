@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import WeakValueDictionary
 
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link import Endpoint, Graph
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from rendergraph.scene.model import Scene
     from rendergraph.session.frame import Frame
     from rendergraph.session.session import Session
+
+
+_SCENES: WeakValueDictionary[tuple[Any, ...], Scene] = WeakValueDictionary()
+"""Scenes in use, so that variants of a pipeline share theirs."""
 
 
 def load(
@@ -125,15 +130,25 @@ class Pipeline:
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene, completed by a camera and a light where it has none."""
-        from rendergraph.scene import complete, load
+        """The scene, completed by a camera and a light where it has none.
+
+        Pipelines that ask for the same unchanged file share one scene, and so its place on the GPU.
+        """
+        from rendergraph.scene import load
+        from rendergraph.scene.animate import complete
         from rendergraph.scene.model import Environment, ImageSource, Scene
 
         file = self.spec.scene
-        scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check)
-        if self.environment is not None:
-            scene = replace(scene, environment=Environment(ImageSource(self.environment, label=str(self.environment))))
-        return complete(scene, self.camera)
+        stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
+        key = (file, stamp, self.environment, self.camera, self.spec.roots.folders)
+        found = _SCENES.get(key)
+        if found is None:
+            scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check)
+            if self.environment is not None:
+                image = ImageSource(self.environment, label=str(self.environment))
+                scene = replace(scene, environment=Environment(image))
+            _SCENES[key] = found = complete(scene, self.camera)
+        return found
 
     @cached_property
     def graph(self) -> Graph:

@@ -1,0 +1,140 @@
+"""Compute, images, buffers, draws over a node's own buffers, and what `update` writes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Frame, Input, Internal, Node, Output, Radiance, Steps, param
+from rendergraph.errors import RenderError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import rendergraph as rg
+
+    Draw = Callable[..., rg.Frame]
+
+
+class Checker(Node):
+    """An image written by a compute shader."""
+
+    board = Output(AnyTexel, format="r32f", doc="0 and 1 by turns.")
+
+    def record(self, steps: Steps) -> None:
+        width, height = steps.desc(self.board).size
+        steps.compute("checker.comp", groups=((width + 7) // 8, (height + 7) // 8, 1))
+
+
+class Count(Node):
+    """How many texels hold 0 and how many 1, counted into a buffer by atomics."""
+
+    source = Input(AnyTexel, doc="What to count.")
+    counts = Output(AnyTexel, kind="buffer", bytes=8, clear=0.0, doc="Two 32-bit counts.")
+
+    def record(self, steps: Steps) -> None:
+        width, height = steps.facts.viewport
+        steps.compute("count.comp", groups=(width, height, 1))
+
+
+class Show(Node):
+    """A buffer's numbers as a texture."""
+
+    counts = Input(AnyTexel, kind="buffer", doc="Two counts.")
+    color = Output(Radiance, format="rg32f", doc="Both.")
+
+
+SHADERS = {
+    "checker.comp": """layout(local_size_x = 8, local_size_y = 8) in;
+        layout(r32f) uniform writeonly image2D board;
+        void main() {
+            ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+            imageStore(board, p, vec4((p.x + p.y) % 2));
+        }""",
+    "count.comp": """layout(local_size_x = 1) in;
+        uniform sampler2D source;
+        layout(std430) buffer counts { uint bins[2]; };
+        void main() {
+            float value = texelFetch(source, ivec2(gl_GlobalInvocationID.xy), 0).r;
+            atomicAdd(bins[value > 0.5 ? 1 : 0], 1u);
+        }""",
+    "show.frag": """layout(std430) readonly buffer counts { uint bins[2]; };
+        out vec2 color; void main() { color = vec2(bins[0], bins[1]); }""",
+}
+
+
+def test_compute_writes_what_later_steps_read_in_every_frame(draw: Draw) -> None:
+    text = """nodes:
+  checker: {type: checker}
+  count: {type: count, inputs: {source: checker.board}}
+  show: {type: show, inputs: {counts: count.counts}}
+outputs: {image: show.color, board: checker.board}"""
+    frame = draw(text, Checker, Count, Show, shaders=SHADERS, frames=range(1, 4), size=(17, 9))
+    np.testing.assert_array_equal(frame["image"][0, 0], [77, 76])
+    assert frame["board"][-1, 0, 0] == 0
+    assert frame["board"][-1, 1, 0] == 1
+
+
+class Quads(Node):
+    """A square whose corners the CPU computes each frame."""
+
+    color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 in the square.")
+    corners = Internal(kind="buffer", bytes=4 * 2 * 4)
+    half: float = param(default=0.5, min=0, max=1, doc="Half the side.")
+
+    def record(self, steps: Steps) -> None:
+        steps.draw(
+            "one.frag", vertex="square.vert", vertices=4, topology="triangle_strip", attributes={"2f in_corner": self.corners}
+        )
+
+    def update(self, frame: Frame) -> None:
+        h = self.half * frame.index
+        frame.write(self.corners, np.array([[-h, -h], [h, -h], [-h, h], [h, h]], np.float32))
+
+
+QUADS = {
+    "square.vert": "in vec2 in_corner; void main() { gl_Position = vec4(in_corner, 0.0, 1.0); }",
+    "one.frag": "out float r; void main() { r = 1.0; }",
+}
+
+
+def test_a_draw_over_a_buffer_that_update_writes_each_frame(draw: Draw) -> None:
+    text = "nodes: {q: {type: quads, params: {half: 0.25}}}\noutputs: {image: q.color}"
+    for frames, share in ((range(1, 2), 1 / 16), (range(1, 3), 1 / 4)):
+        assert draw(text, Quads, shaders=QUADS, size=(16, 16), frames=frames)["image"].mean() == share
+
+
+def test_an_update_that_writes_too_much_is_named(draw: Draw) -> None:
+    class TooMuch(Quads):
+        """Writes more than it declared."""
+
+        def update(self, frame: Frame) -> None:
+            frame.write(self.corners, np.zeros(9, np.float32))
+
+    text = "nodes: {q: {type: too_much}}\noutputs: {image: q.color}"
+    with pytest.raises(RenderError, match=r"node 'q' writes 36 bytes into 'corners', which holds 32"):
+        draw(text, TooMuch, shaders=QUADS)
+
+
+def test_a_draw_whose_count_a_compute_shader_decides(draw: Draw) -> None:
+    class Indirect(Node):
+        """As many points as a compute shader says."""
+
+        color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 where a point is.")
+        command = Internal(kind="buffer", bytes=20)
+
+        def record(self, steps: Steps) -> None:
+            steps.compute("command.comp", groups=(1, 1, 1), out=self.command)
+            steps.draw("one.frag", vertex="points.vert", vertices=self.command, topology="points", out=self.color)
+
+    shaders = QUADS | {
+        "command.comp": """layout(local_size_x = 1) in; layout(std430) buffer command { uint c[5]; };
+            void main() { c[0] = 5u; c[1] = 1u; c[2] = 0u; c[3] = 0u; c[4] = 0u; }""",
+        "points.vert": """void main() { gl_PointSize = 1.0;
+            gl_Position = vec4((float(gl_VertexID) + 0.5) / 8.0 - 1.0, 1.0 / 8.0 - 1.0, 0.0, 1.0); }""",
+    }
+    image = draw("nodes: {i: {type: indirect}}\noutputs: {image: i.color}", Indirect, shaders=shaders, size=(16, 8))["image"]
+    assert image.sum() == 5
