@@ -140,7 +140,8 @@ class Pipeline:
 
         file = self.spec.scene
         stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
-        key = (file, stamp, self.environment, self.camera, self.spec.roots.folders)
+        roots = self.spec.roots.folders if file is not None else ()
+        key = (file, stamp, self.environment, self.camera, roots)
         found = _SCENES.get(key)
         if found is None:
             scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check)
