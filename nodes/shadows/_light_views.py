@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from rendergraph.api import ViewMatrices
 
 Matrix = npt.NDArray[np.float64]
-Corners = npt.NDArray[np.float64]
+Points = npt.NDArray[np.float64]
 
 CUBE_FACES = 6
 _WIDEST = math.radians(80)  # half angle of a cone that one perspective view still covers with care
@@ -49,24 +50,24 @@ def _index(name: str, names: list[str]) -> int:
     raise ValueError(f"the scene has no light '{name}'; {way_out}")
 
 
-def light_views(
-    table: Sequence[int], lights: Sequence[Any], camera: ViewMatrices, bounds: Any, resolution: int
-) -> list[ViewMatrices]:
+def light_views(table: Sequence[int], scene: Any, camera: ViewMatrices, resolution: int) -> list[ViewMatrices]:
     """A view for each layer of a table of lights.
 
     Args:
         table: the light of each layer; a point light stands six times.
-        lights: the scene's lights (scene/model.py).
+        scene: its `lights`, `bounds`, `objects` and `meshes` in this frame.
         camera: what the picture is seen with.
-        bounds: smallest and largest corner of the scene.
         resolution: texels along a side.
     """
-    box = np.asarray(bounds, np.float64)
+    lights = scene.lights
+    box = np.asarray(scene.bounds, np.float64)
     views: list[ViewMatrices] = []
     for index, group in groupby(table):
         light = lights[index]
         if light.type == "directional":
-            made: Iterable[ViewMatrices] = [directional_view(light.direction, camera, box, resolution)]
+            made: Iterable[ViewMatrices] = [
+                directional_view(light.direction, camera, box, casting_points(scene, light.direction), resolution)
+            ]
         elif light.type == "spot":
             made = [spot_view(light, box, resolution)]
         else:
@@ -81,32 +82,37 @@ def light_views(
 # --- one kind each ---------------------------------------------------------------------------------------------------
 
 
-def directional_view(direction: Sequence[float], camera: ViewMatrices, box: Corners, resolution: int) -> ViewMatrices:
-    """An orthographic view along a direction around what the camera sees of the box.
+def directional_view(
+    direction: Sequence[float], camera: ViewMatrices, box: Points, casting: Points, resolution: int
+) -> ViewMatrices:
+    """An orthographic view along a direction around what may have shadow on it in the picture.
 
-    Across it is as narrow as what is seen; along the light it holds the whole box, for what stands outside the picture
-    may cast into it.
+    Across the light it is as narrow as what the camera sees of the box and as what casts; what lies outside is lit.
+    Along the light it holds the whole box, for what stands outside the picture may cast into it.
     """
-    corners = box_corners(box)
-    seen = visible_part(camera, box)
     rotation = facing(direction, _grain(direction, camera))
-    across = seen @ rotation[:3, :3].T if len(seen) else corners @ rotation[:3, :3].T
-    along = (corners @ rotation[:3, :3].T)[:, 2]
-    low, high = across[:, :2].min(axis=0), across[:, :2].max(axis=0)
+    along = box_corners(box) @ rotation[2, :3]
+    low, high = np.full(2, -np.inf), np.full(2, np.inf)
+    for points in (visible_part(camera, box), casting, box_corners(box)):
+        if not len(points):
+            continue
+        across = points @ rotation[:2, :3].T
+        lower, higher = np.maximum(low, across.min(axis=0)), np.minimum(high, across.max(axis=0))
+        if np.any(lower > higher):  # nothing that casts is near what is seen
+            break
+        low, high = lower, higher
     size = np.maximum(high - low, 1e-6 * max(1.0, float(np.abs(along).max())))
     size = size * resolution / max(resolution - 2 * _MARGIN, 0.5 * resolution)
-    middle = (low + high) / 2
     slack = 1e-3 * max(float(np.ptp(along)), float(size.max()), 1e-6)
     near, far = -along.max() - slack, -along.min() + slack
     view = rotation.copy()
-    view[:2, 3] = -middle
+    view[:2, 3] = -(low + high) / 2
     view[2, 3] = near  # the box begins at the near plane
-    return ViewMatrices(
-        view, orthographic(size[0] / 2, size[1] / 2, 0.0, far - near), (resolution, resolution), 0.0, far - near
-    )
+    projection = orthographic(size[0] / 2, size[1] / 2, 0.0, far - near)
+    return ViewMatrices(view, projection, (resolution, resolution), 0.0, far - near)
 
 
-def spot_view(light: Any, box: Corners, resolution: int) -> ViewMatrices:
+def spot_view(light: Any, box: Points, resolution: int) -> ViewMatrices:
     """A perspective view that holds a spot light's cone."""
     half = min(light.outer, _WIDEST)
     wider = math.atan(math.tan(half) * resolution / max(resolution - 2 * _MARGIN, 0.5 * resolution))
@@ -117,7 +123,7 @@ def spot_view(light: Any, box: Corners, resolution: int) -> ViewMatrices:
     return ViewMatrices(view, perspective(wider, near, far), (resolution, resolution), near, far)
 
 
-def point_views(light: Any, box: Corners, resolution: int) -> list[ViewMatrices]:
+def point_views(light: Any, box: Points, resolution: int) -> list[ViewMatrices]:
     """Six perspective views around a point light, in the order of a cube map's faces; each a little wider than 90°."""
     near, far = reach(light, box)
     wider = math.atan(resolution / max(resolution - 2.0, 0.5 * resolution))
@@ -132,7 +138,7 @@ def point_views(light: Any, box: Corners, resolution: int) -> list[ViewMatrices]
     return views
 
 
-def reach(light: Any, box: Corners) -> tuple[float, float]:
+def reach(light: Any, box: Points) -> tuple[float, float]:
     """Nearest and farthest distance from a light that anything in the box may have, within the light's range."""
     position = np.asarray(light.position, np.float64)
     outside = np.maximum(np.maximum(box[0] - position, position - box[1]), 0.0)
@@ -187,16 +193,67 @@ def perspective(half_angle: float, near: float, far: float) -> Matrix:
     return matrix
 
 
+# --- what casts -------------------------------------------------------------------------------------------------------
+
+_corners_of: WeakKeyDictionary[Any, tuple[Points, npt.NDArray[np.int64]]] = WeakKeyDictionary()
+_MOST_FLAT = 16  # flat objects that are looked at: floors and walls are few, and large
+
+
+def casting_points(scene: Any, direction: Sequence[float]) -> Points:
+    """Corners of the boxes of everything that may cast on something, shape (n, 3).
+
+    A flat object with nothing on the far side of its plane casts on nothing: without the floor everything stands on, a
+    map need not cover all of it.
+    """
+    if scene not in _corners_of:
+        _corners_of[scene] = _caster_corners(scene)
+    corners, flat = _corners_of[scene]
+    casts = np.ones(len(corners), bool)
+    everything = corners.reshape(-1, 3)
+    for index in flat:
+        a, b, c = corners[index][_spanning(corners[index])]
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal) * (-1.0 if normal @ direction < 0 else 1.0)  # along the light
+        beyond = (everything - a) @ normal
+        casts[index] = beyond.max() > 1e-6 * np.abs(everything).max()
+    return corners[casts].reshape(-1, 3)
+
+
+def _caster_corners(scene: Any) -> tuple[Points, npt.NDArray[np.int64]]:
+    """World-space corners of each caster's box, shape (n, 8, 3), and the largest flat ones' indices."""
+    placed = [
+        entry for entry in scene.objects
+        if entry.casts_shadow and not entry.hidden and scene.materials[entry.material].alpha_mode != "blend"
+    ]  # fmt: skip
+    if not placed:
+        return np.empty((0, 8, 3)), np.empty(0, np.int64)
+    boxes = np.array([box_corners(np.asarray(mesh.box, np.float64)) for mesh in scene.meshes])
+    local = boxes[[entry.mesh for entry in placed]]
+    transforms = np.array([entry.transform for entry in placed])
+    corners = np.einsum("nij,nkj->nki", transforms[:, :3, :3], local) + transforms[:, None, :3, 3]
+    extent = np.sort(np.ptp(local, axis=1), axis=1)
+    flat = np.nonzero((extent[:, 0] < 1e-5 * extent[:, 2]) & (extent[:, 1] > 1e-5 * extent[:, 2]))[0]
+    size = np.linalg.norm(np.ptp(corners[flat], axis=1), axis=1)
+    return corners, flat[np.argsort(-size, kind="stable")][:_MOST_FLAT]
+
+
+def _spanning(corners: Points) -> list[int]:
+    """Three corners of a flat box that span its plane."""
+    edges = [int(np.argmax(np.linalg.norm(corners - corners[0], axis=1)))]
+    away = np.cross(corners - corners[0], corners[edges[0]] - corners[0])
+    return [0, edges[0], int(np.argmax(np.linalg.norm(away, axis=1)))]
+
+
 # --- what is seen of a box -------------------------------------------------------------------------------------------
 
 
-def box_corners(box: Corners) -> Corners:
+def box_corners(box: Points) -> Points:
     """The eight corners of a box given by its smallest and largest, shape (8, 3)."""
     return np.array([[box[x, 0], box[y, 1], box[z, 2]] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 
 
-def visible_part(camera: ViewMatrices, box: Corners) -> Corners:
-    """Corners of the part of a box that a camera sees, shape (n, 3); none where it sees nothing of it.
+def visible_part(camera: ViewMatrices, box: Points) -> Points:
+    """Points of the part of a box that a camera sees, shape (n, 3); none where it sees nothing of it.
 
     The box's faces cut by the frustum, and the frustum's edges cut by the box: together every corner of the
     intersection, also for an infinite far plane.
@@ -208,7 +265,7 @@ def visible_part(camera: ViewMatrices, box: Corners) -> Corners:
     return np.concatenate(points) if points else np.empty((0, 3))
 
 
-def frustum_planes(camera: ViewMatrices) -> Corners:
+def frustum_planes(camera: ViewMatrices) -> Points:
     """Planes (a, b, c, d) with a x + b y + c z + d >= 0 inside, shape (n, 4); the far one is left out if infinite."""
     rows = camera.projection @ camera.view
     planes = [rows[3] + sign * rows[axis] for axis in (0, 1, 2) for sign in (1.0, -1.0)]
@@ -217,7 +274,7 @@ def frustum_planes(camera: ViewMatrices) -> Corners:
     return np.array([plane / length for plane, length in zip(planes, lengths, strict=True) if length > 1e-9 * longest])
 
 
-def clip_polygon(polygon: Corners, planes: Corners) -> Corners:
+def clip_polygon(polygon: Points, planes: Points) -> Points:
     """The part of a convex polygon inside all planes (Sutherland and Hodgman 1974), shape (n, 3)."""
     for plane in planes:
         if not len(polygon):
@@ -233,9 +290,9 @@ def clip_polygon(polygon: Corners, planes: Corners) -> Corners:
     return polygon
 
 
-def _frustum_corners_inside(planes: Corners, box: Corners) -> list[Corners]:
+def _frustum_corners_inside(planes: Points, box: Points) -> list[Points]:
     """Where the frustum's edges lie inside the box: their ends, cut to it."""
-    points: list[Corners] = []
+    points: list[Points] = []
     axes = np.eye(3)
     sides = [np.append(axis, -axis @ box[0]) for axis in axes] + [np.append(-axis, axis @ box[1]) for axis in axes]
     middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9

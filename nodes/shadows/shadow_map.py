@@ -18,9 +18,9 @@ def _layers(node: ShadowMapNode, facts: Facts) -> int:
 class ShadowMapNode(Node):
     """Depth seen from lights: what every shadow-map technique starts from.
 
-    A directional light's layer is fitted to what the camera can see of the scene, and reaches back to everything that
-    may cast into it; a spot light's is its cone; a point light has six layers, the faces of a cube. The layers stand in
-    the scene's order of lights.
+    A directional light's layer is fitted to what the camera can see of the scene and to what casts, and reaches back
+    along the light to everything that may cast into the picture; a spot light's is its cone; a point light has six
+    layers, the faces of a cube. The layers stand in the scene's order of lights.
     """
 
     scene = Input(SceneRef, kind="scene", optional=True, doc="What casts; the pipeline's scene by default.")
@@ -50,6 +50,5 @@ class ShadowMapNode(Node):
 
     def update(self, frame: Frame) -> None:
         """Fit the views to where the lights and the camera are now."""
-        lights = frame.scene.lights
-        table = layer_lights(self.light, lights)
-        frame.set_views(self.views, light_views(table, lights, frame.camera, frame.scene.bounds, self.resolution))
+        table = layer_lights(self.light, frame.scene.lights)
+        frame.set_views(self.views, light_views(table, frame.scene, frame.camera, self.resolution))
