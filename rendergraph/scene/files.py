@@ -10,7 +10,7 @@ import re
 import stat
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 from rendergraph.errors import InputError, Place, Problem
@@ -19,6 +19,9 @@ from rendergraph.scene.model import ImageSource
 
 CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 """The root rule: returns the resolved path, or raises InputError where it leaves every root."""
+
+
+_MOST_WARNINGS = 50
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,7 @@ class Reading:
     check_path: CheckPath
     limits: Limits = Limits()
     _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
+    _images: dict[Path, ImageSource] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
@@ -108,7 +112,9 @@ class Reading:
         return tuple(self._warnings.values())
 
     def warn(self, code: str, kind: str, text: str, *, line: int = 0, file: Path | None = None) -> None:
-        """Say something once: a second warning of the same kind about the same file is dropped."""
+        """Say something once: a second warning of the same kind about the same file is dropped, so are too many."""
+        if len(self._warnings) >= _MOST_WARNINGS:
+            return
         place = Place(str(file or self.path), line, 1 if line else 0)
         self._warnings.setdefault((code, kind, place.file), Problem(code, text, place, severity="warning"))
 
@@ -123,7 +129,8 @@ class Reading:
 
     def over(self, what: str, limit: str) -> InputError:
         """An error for a limit passed; names the limit."""
-        return self.error("RG307", f"{what} (limit '{limit}', {getattr(self.limits, limit):,})")
+        most = getattr(self.limits, limit)
+        return self.error("RG307", f"{what}, the limit is {most:,}; --limit scene-{limit.replace('_', '-')}=N allows more")
 
     def beside(self, name: str, *, line: int = 0, file: Path | None = None) -> Path:
         """The file `name` means, relative to this one, inside the roots; it need not exist.
@@ -134,9 +141,6 @@ class Reading:
         holder = file or self.path
         if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name) or "\0" in name:
             raise self.error("RG302", f"'{shown(name)}' is no path; only files are read", line=line, file=holder)
-        if PureWindowsPath(name).is_absolute() or name.startswith(("/", "\\\\")):
-            raise self.error("RG302", f"'{shown(name)}' is absolute; paths in a file are relative to it", line=line,
-                             file=holder)  # fmt: skip
         place = Place(str(holder), line, 1 if line else 0)
         try:
             return self.check_path(holder.parent / name, place)
@@ -177,6 +181,8 @@ class Reading:
         Raises:
             InputError: it is missing, no image, or beyond the limits.
         """
+        if path in self._images:
+            return self._images[path]
         self.exists(path, what, line=line)
         try:
             size = path.stat().st_size
@@ -186,7 +192,8 @@ class Reading:
             raise self.error("RG301", f"{what} '{shown(str(path))}' cannot be read: {reason(problem)}") from None
         label = shown(path.name)
         self._check_header(head, size, f"{what} '{label}'", path.suffix, line)
-        return ImageSource(path, None, label)
+        self._images[path] = ImageSource(path, None, label)
+        return self._images[path]
 
     def embedded_image(self, data: bytes, what: str) -> ImageSource:
         """An image inside this file whose header is plausible.

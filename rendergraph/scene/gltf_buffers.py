@@ -139,7 +139,7 @@ class Buffers:
         self.buffers = [self._buffer(part, index, binary) for index, part in enumerate(top.parts("buffers"))]
         self.total = sum(len(buffer) for buffer in self.buffers)
         self.views = [self._view(part) for part in top.parts("bufferViews")]
-        self._declared = 0
+        self._declared = self._copied = 0
         self._unbacked = 0
         self.accessors = [self._accessor(part) for part in top.parts("accessors")]
         self._arrays: dict[int, npt.NDArray[np.generic]] = {}
@@ -165,8 +165,15 @@ class Buffers:
         return values
 
     def view_bytes(self, index: int) -> bytes:
-        """The bytes of a view."""
+        """The bytes of a view.
+
+        Raises:
+            InputError: the views asked for overlap so much that copies would balloon.
+        """
         view = self.views[index]
+        self._copied += view.length
+        if self._copied > 4 * self.total + (64 << 20):
+            raise self._reading.over(f"images inside the file take {self._copied:,} bytes", "memory_bytes")
         return bytes(self.buffers[view.buffer][view.offset : view.offset + view.length])
 
     def _buffer(self, part: Part, index: int, binary: bytes | None) -> memoryview:

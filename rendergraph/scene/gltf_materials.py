@@ -25,6 +25,7 @@ class Materials:
 
     def __init__(self, top: Part, buffers: Buffers, reading: Reading) -> None:
         self._reading, self._buffers = reading, buffers
+        self._embedded: dict[int, ImageSource] = {}
         self._images = [self._image(part) for part in top.parts("images")]
         self._samplers = [self._sampler(part) for part in top.parts("samplers")]
         self._textures = [self._texture(part) for part in top.parts("textures")]
@@ -37,7 +38,9 @@ class Materials:
         if part.has("uri") == (view is not None):
             raise part.wrong("needs either 'uri' or 'bufferView'")
         if view is not None:
-            return self._reading.embedded_image(self._buffers.view_bytes(view), part.path)
+            if view not in self._embedded:
+                self._embedded[view] = self._reading.embedded_image(self._buffers.view_bytes(view), part.path)
+            return self._embedded[view]
         found = uri_bytes(part.text("uri"), part, self._reading, "image")
         if isinstance(found, Path):
             return self._reading.image(found, "image")

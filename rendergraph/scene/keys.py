@@ -25,6 +25,7 @@ class Key:
         choices: the words of a choice, or the section a link looks into.
         size: numbers of a vector or colour.
         required: it must be there.
+        infinite: `.inf` is a value too.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Key:
     choices: tuple[str, ...] = ()
     size: int = 3
     required: bool = False
+    infinite: bool = False
 
 
 def positive(name: str, doc: str, default: float, unit: str = "m") -> Key:

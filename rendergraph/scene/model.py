@@ -224,10 +224,24 @@ class Environment:
 
 @dataclass(frozen=True)
 class Orbit:
-    """A camera that turns about its target."""
+    """A camera that turns about its target, counter-clockwise seen from above; the default camera where it has no name."""
 
     camera: str
     degrees_per_second: float
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """What a scene file's object placed: the parts of a shape or file, where they stand within it.
+
+    Attributes:
+        objects, lights: index in the scene and transform within the placed thing, (4, 4).
+        cameras: by name likewise.
+    """
+
+    objects: tuple[tuple[int, Matrix], ...] = ()
+    lights: tuple[tuple[int, Matrix], ...] = ()
+    cameras: tuple[tuple[str, Matrix], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,6 +257,8 @@ class Scene:
         keyframes: dotted path to times in seconds and values, linear between, held outside.
         orbit: or None.
         warnings: what a reader left out, replaced or clamped, once a kind and file.
+        recipe: section and name (`("cameras", "main")`) to the values a scene file gave: what keyframes change.
+        placements: name of a scene file's object to what it placed.
     """
 
     name: str
@@ -256,3 +272,5 @@ class Scene:
     keyframes: Mapping[str, tuple[tuple[float, Any], ...]] = field(default_factory=dict)
     orbit: Orbit | None = None
     warnings: tuple[Any, ...] = ()
+    recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
+    placements: Mapping[str, Placement] = field(default_factory=dict)

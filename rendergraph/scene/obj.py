@@ -22,6 +22,7 @@ from rendergraph.scene.obj_text import ABSENT, Ints, Statements, statements
 from rendergraph.scene.polygons import MOST_CORNERS, newell, triangulate
 
 _DEFAULT = "default"
+_MOST_LIBRARIES = 256
 
 
 def read_obj(path: Path, reading: Reading) -> Scene:
@@ -74,6 +75,8 @@ def _check_indices(found: Statements, reading: Reading) -> None:
 def _libraries(found: Statements, reading: Reading) -> dict[str, Material]:
     """Materials of every `mtllib`; a missing library is a warning."""
     library: dict[str, Material] = {}
+    if len(found.libraries) > _MOST_LIBRARIES:
+        raise reading.error("RG307", f"names more than {_MOST_LIBRARIES} material libraries")
     for text, line in found.libraries:
         whole = reading.beside(text, line=line)
         names = [text] if file_kind(whole) == "file" else re.split(r"\s+(?=\S)", text)

@@ -6,8 +6,9 @@ again line by line, to find the mistake or the oddity.
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,12 +20,13 @@ Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
 
-BLOCK_BYTES = 16 << 20
+BLOCK_BYTES = 8 << 20
 ABSENT = 9_999_999_999
 """Stands for a texture coordinate or normal that a corner does not have."""
 _ARRAYS = (b"v", b"vt", b"vn", b"f")
 _STATES = (b"o", b"g", b"s", b"usemtl")
 _SILENT = (b"vp", b"mg", b"lod", b"bevel", b"c_interp", b"d_interp", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
+_CORNER = re.compile(rb"[-+]?[0-9]+(/([-+]?[0-9]+)?(/([-+]?[0-9]+)?)?)?\Z")
 _BLANKS = np.zeros(256, bool)
 _BLANKS[[9, 11, 12, 13, 32]] = True
 
@@ -73,7 +75,7 @@ class _Growing:
     counts: list[int] = field(default_factory=lambda: [0, 0, 0])
     numbers: tuple[dict[str, int], ...] = field(default_factory=lambda: ({"": 0}, {"": 0}, {"": 0}, {"": 0}))
     current: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
-    libraries: list[tuple[str, int]] = field(default_factory=list)
+    libraries: dict[str, int] = field(default_factory=dict)
     smoothed: bool = False
 
 
@@ -105,7 +107,7 @@ def statements(data: bytes, reading: Reading) -> Statements:
         np.concatenate(grown.positions), np.concatenate(grown.colors), np.concatenate(grown.uvs),
         np.concatenate(grown.normals), np.concatenate(grown.corners), np.concatenate(grown.sizes),
         np.concatenate(grown.lines), np.concatenate(grown.states), (names[0], names[1], names[2], names[3]),
-        grown.libraries, grown.smoothed,
+        list(grown.libraries.items()), grown.smoothed,
     )  # fmt: skip
 
 
@@ -114,7 +116,7 @@ def _blocks(data: bytes) -> Iterator[tuple[bytes, int]]:
     at, line = 0, 1
     while at < len(data):
         end = data.find(b"\n", min(len(data), at + BLOCK_BYTES))
-        while end > 0 and data[at:end].rstrip(b"\r").endswith(b"\\"):
+        while end > 0 and (data[end - 1 : end] == b"\\" or data[end - 2 : end] == b"\\\r"):
             end = data.find(b"\n", end + 1)
         end = len(data) if end < 0 else end + 1
         block = data[at:end]
@@ -129,6 +131,7 @@ class _Block:
     def __init__(self, block: bytes, first_line: int, grown: _Growing, reading: Reading) -> None:
         self.grown, self.reading, self.first_line = grown, reading, first_line
         self.original = block
+        self._newlines: Ints | None = None
         if b"\\" in block:  # a continued line becomes one; byte offsets, and so line numbers, stay
             block = block.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
         if not block.endswith(b"\n"):
@@ -137,7 +140,6 @@ class _Block:
             block = _without_comments(block)
         self.block = block
         self.bytes: Bytes = np.frombuffer(block, np.uint8)
-        self._line_starts: Ints | None = None
         ends = np.flatnonzero(self.bytes == 10)
         self.starts = np.concatenate([[0], ends[:-1] + 1])
         self.lengths = ends + 1 - self.starts
@@ -154,7 +156,13 @@ class _Block:
 
     def line(self, row: int) -> int:
         """The number in the file of one of the block's (joined) lines."""
-        return self.first_line + self.original.count(b"\n", 0, int(self.starts[row]))
+        return self.first_line + int(self.lines_before(self.starts[row : row + 1])[0])
+
+    def lines_before(self, offsets: Ints) -> Ints:
+        """Line ends of the file in front of each byte offset."""
+        if self._newlines is None:
+            self._newlines = np.flatnonzero(np.frombuffer(self.original, np.uint8) == 10)
+        return np.searchsorted(self._newlines, offsets)
 
     def read(self) -> None:
         """Add everything in the block to what is grown."""
@@ -204,7 +212,7 @@ class _Block:
         if word in _STATES:
             return 4
         if word == b"mtllib":
-            self.grown.libraries.append((text_of(self._rest(row)), self.line(row)))
+            self.grown.libraries.setdefault(text_of(self._rest(row)), self.line(row))
         elif word in (b"l", b"p"):
             what = "lines" if word == b"l" else "points"
             self.reading.warn("RG333", what, f"{what} are left out; only faces are drawn", line=self.line(row))
@@ -229,7 +237,10 @@ class _Block:
         chosen[self.word_ends[first] - 1] = 32  # vt and vn have a second letter
         text = chosen[np.repeat(keep, self.lengths)].tobytes()
         if slashes:
-            text = text.replace(b"//", b"/%d/" % ABSENT).replace(b"/", b" ")
+            text = text.replace(b"//", b"/%d/" % ABSENT)
+            for blank in (b" ", b"\n", b"\r", b"\t"):  # a trailing slash stands for nothing
+                text = text.replace(b"/" + blank, b"/%d" % ABSENT + blank)
+            text = text.replace(b"/", b" ")
         return text
 
     def _parse(self, text: bytes, kind: type[np.float64] | type[np.int64], count: int) -> npt.NDArray[np.generic] | None:
@@ -250,17 +261,25 @@ class _Block:
             raise self._wrong(int(row), f"'{word}' takes {least} to {most} numbers, here are {self.word_counts[row] - 1}")
         values = self._parse(self._text(rows), np.float64, int(counts.sum()))
         if values is None:
-            for row in rows:
-                for word in self._rest(int(row)).split():
-                    if self._parse(word, np.float64, 1) is None:
-                        raise self._wrong(int(row), f"'{shown(text_of(word), 30)}' is no number")
-            raise self._wrong(int(rows[0]), "its numbers cannot be told apart")
+            row = self._first_bad(
+                rows, lambda some: self._parse(self._text(some), np.float64, int((self.word_counts[some] - 1).sum())) is not None)
+            for word in self._rest(row).split():
+                if self._parse(word, np.float64, 1) is None:
+                    raise self._wrong(row, f"'{shown(text_of(word), 30)}' is no number")
+            raise self._wrong(row, "its numbers cannot be told apart")
         at = np.cumsum(counts) - counts
         bad = ~np.isfinite(values.astype(np.float32))
         if bad.any():
             row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
             raise self.reading.error("RG306", f"'{shown(text_of(self._rest(row)), 60)}' is not finite", line=self.line(row))
         return values.astype(np.float64), counts, at
+
+    def _first_bad(self, rows: Ints, good: Callable[[Ints], bool]) -> int:
+        """The first line that spoils a parse, by halving."""
+        while len(rows) > 1:
+            half = rows[: len(rows) // 2]
+            rows = rows[len(rows) // 2 :] if good(half) else half
+        return int(rows[0])
 
     def _wrong(self, row: int, text: str) -> Exception:
         return self.reading.error("RG304", text, line=self.line(row))
@@ -297,18 +316,16 @@ class _Block:
             line = self.line(int(faces[face]))
             raise self.reading.error("RG305", "index 0 is out of range; indices start at 1", line=line)
         corners = np.where(corners < 0, corners + seen, np.where(corners == ABSENT, ABSENT, corners - 1))
-        newlines = np.cumsum(np.frombuffer(self.original, np.uint8) == 10) if b"\\" in self.original else None
-        where = faces if newlines is None else np.where(self.starts[faces] > 0, newlines[self.starts[faces] - 1], 0)
         self.grown.corners.append(corners)
         self.grown.sizes.append(sizes.astype(np.int64))
-        self.grown.lines.append(where.astype(np.int64) + self.first_line)
+        self.grown.lines.append(self.lines_before(self.starts[faces]) + self.first_line)
         self.grown.states.append(states)
 
     def _corners(self, faces: Ints, sizes: Ints) -> Ints:
         """Indices of every corner as written, `ABSENT` for missing ones."""
-        marks = np.concatenate([[0], np.cumsum(self.bytes == ord("/"))])
+        marks = np.flatnonzero(self.bytes == ord("/"))
         words = np.repeat(self.first_word[faces] + 1, sizes) + _within(sizes)
-        slashes = marks[self.word_ends[words]] - marks[self.words[words]]
+        slashes = np.searchsorted(marks, self.word_ends[words]) - np.searchsorted(marks, self.words[words])
         if int(slashes.max()) <= 2:
             values = self._parse(self._text(faces, slashes=True), np.int64, int((slashes + 1).sum()))
             if values is not None:
@@ -321,21 +338,16 @@ class _Block:
                     table[has, column] = whole[at[has] + column]
                 table[:, 0] = np.where(table[:, 0] == ABSENT, 0, table[:, 0])
                 return table
-        return np.array([self._corner(int(row), word) for row in faces for word in self._rest(int(row)).split()], np.int64)
+        def good(some: Ints) -> bool:
+            text = self._text(some, slashes=True)
+            between = text.translate(None, b"+-0123456789 \t\v\f\r\n") == b""
+            return between and self._parse(text, np.int64, _needed(self._text(some))) is not None
 
-    def _corner(self, row: int, word: bytes) -> tuple[int, int, int]:
-        """One corner by itself; a trailing slash stands for nothing."""
-        fields = word.split(b"/")
-        numbers = [ABSENT, ABSENT, ABSENT]
-        for column, digits in enumerate(fields):
-            if column > 2 or (not digits and column == 0) or not (digits == b"" or digits.lstrip(b"+-").isdigit()):
+        row = self._first_bad(faces, good)
+        for word in self._rest(row).split():
+            if not _CORNER.match(word):
                 raise self._wrong(row, f"'{shown(text_of(word), 40)}' is no corner; write v, v/vt, v//vn or v/vt/vn")
-            if digits:
-                try:
-                    numbers[column] = max(-(2**53), min(2**53, int(digits[:20])))
-                except ValueError:
-                    raise self._wrong(row, f"'{shown(text_of(word), 40)}' is no corner") from None
-        return numbers[0], numbers[1], numbers[2]
+        raise self._wrong(row, "its corners cannot be told apart")
 
     def _states(self, faces: Ints, changes: Ints) -> Ints:
         """Numbers of object, group, smoothing group and material in force at each face."""
@@ -354,6 +366,11 @@ class _Block:
                 grown.current[1] = 0
             table.append(list(grown.current))
         return np.array(table, np.int64)[np.searchsorted(changes, faces)]
+
+
+def _needed(text: bytes) -> int:
+    """How many numbers the corners in a text have, those left out between and behind slashes counted."""
+    return len(text.split()) + text.count(b"/")
 
 
 def _within(sizes: Ints) -> Ints:

@@ -1,0 +1,180 @@
+"""A scene at a moment, and what a scene lacks to be looked at: a camera that frames it, a light."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.scene import scene_build
+from rendergraph.scene.cameras import look_at
+from rendergraph.scene.geometry import rigid, unit, vec3
+from rendergraph.scene.model import Camera, Light, Matrix, Scene, Vec3
+
+FRAMING_DIRECTION = (1.0, 0.6, 1.5)
+FRAMING_FOV = math.radians(45.0)
+KEY_LUX = 3.0
+
+
+def bounds(scene: Scene) -> tuple[Vec3, Vec3]:
+    """Minimum and maximum corner of what is drawn; a unit cube where nothing is.
+
+    Boxes of meshes are transformed, so a turned object's box may be larger than the object.
+    """
+    corners = []
+    for entry in scene.objects:
+        if entry.hidden:
+            continue
+        low, high = (np.asarray(corner, np.float64) for corner in scene.meshes[entry.mesh].box)
+        center = entry.transform[:3, :3] @ ((low + high) / 2) + entry.transform[:3, 3]
+        extent = np.abs(entry.transform[:3, :3]) @ ((high - low) / 2)
+        corners += [center - extent, center + extent]
+    if not corners:
+        return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
+    table = np.array(corners)
+    return vec3(table.min(axis=0)), vec3(table.max(axis=0))
+
+
+def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
+    """Centre and radius of a sphere around everything drawn."""
+    low, high = (np.array(corner) for corner in bounds(scene))
+    return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
+
+
+def framing_camera(scene: Scene) -> Camera:
+    """The camera of a scene without one: the bounding sphere seen from (1, 0.6, 1.5), 45° high."""
+    center, radius = bounding_sphere(scene)
+    distance = radius / math.sin(FRAMING_FOV / 2)
+    eye = np.array(center) + unit(FRAMING_DIRECTION) * distance
+    return Camera("default", look_at(eye, center), fov_y=FRAMING_FOV, near=0.1 * radius, far=20 * radius, target=center)
+
+
+def key_light(scene: Scene, camera: Camera) -> Light:
+    """The light of a scene without one: 3 lux over the viewer's left shoulder."""
+    taken = {light.name for light in scene.lights}
+    direction = unit(camera.transform[:3, :3] @ np.array([1.0, -1.0, -1.0]))
+    return Light("key" if "key" not in taken else "key_light", "directional", direction=vec3(direction), intensity=KEY_LUX)
+
+
+def complete(scene: Scene, camera_name: str | None = None) -> Scene:
+    """The scene with a camera and a light, added where it has none; the chosen camera comes first.
+
+    Call it once, before `at`: the added light stays where it is while the camera moves.
+
+    Raises:
+        InputError: there is no camera of that name.
+    """
+    cameras = dict(scene.cameras)
+    if not cameras:
+        cameras["default"] = framing_camera(scene)
+    if camera_name is not None:
+        if camera_name not in cameras:
+            text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"
+            raise InputError(Problem("RG322", text, Place(str(scene.source)) if scene.source else None))
+        cameras = {camera_name: cameras[camera_name], **cameras}
+    first = next(iter(cameras.values()))
+    lights = scene.lights or (key_light(scene, first),)
+    return replace(scene, cameras=cameras, lights=lights)
+
+
+def moves(scene: Scene) -> bool:
+    """Whether the scene differs from moment to moment."""
+    return bool(scene.keyframes) or scene.orbit is not None
+
+
+def at(scene: Scene, time_s: float) -> Scene:
+    """The scene at a time in seconds: keyframes first, then the orbit. Meshes are shared, never copied."""
+    if not moves(scene):
+        return scene
+    changed: dict[tuple[str, str], dict[str, Any]] = {}
+    for path, frames in scene.keyframes.items():
+        section, _, rest = path.partition(".")
+        name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
+        changed.setdefault((section, name), {})[key] = interpolated(frames, time_s)
+    for (section, name), values in changed.items():
+        merged = {**scene.recipe.get((section, name), {}), **values}
+        scene = _CHANGE[section](scene, name, merged)
+    return scene if scene.orbit is None else _orbited(scene, time_s)
+
+
+def interpolated(frames: tuple[tuple[float, Any], ...], time_s: float) -> Any:
+    """The value at a time: linear between frames, held outside."""
+    times = [time for time, _ in frames]
+    values = np.array([value for _, value in frames], np.float64)
+    if values.ndim == 1:
+        return float(np.interp(time_s, times, values))
+    return tuple(float(np.interp(time_s, times, column)) for column in values.T)
+
+
+def _orbited(scene: Scene, time_s: float) -> Scene:
+    assert scene.orbit is not None  # the caller asked
+    name = scene.orbit.camera or next(iter(scene.cameras), "")
+    if name not in scene.cameras:
+        return scene
+    camera = scene.cameras[name]
+    target = camera.target or bounding_sphere(scene)[0]
+    angle = math.radians(scene.orbit.degrees_per_second * time_s)
+    c, s = math.cos(angle), math.sin(angle)
+    turn = np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
+    here, back = np.eye(4), np.eye(4)
+    here[:3, 3], back[:3, 3] = target, [-value for value in target]
+    return _with_camera(scene, replace(camera, transform=here @ turn @ back @ camera.transform))
+
+
+def _with_camera(scene: Scene, camera: Camera) -> Scene:
+    return replace(scene, cameras={**scene.cameras, camera.name: camera})
+
+
+def _change_camera(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    return _with_camera(scene, _mended(scene, "cameras", name, scene_build.camera, values))
+
+
+def _change_light(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    light = _mended(scene, "lights", name, scene_build.light, values)
+    return replace(scene, lights=tuple(light if entry.name == name else entry for entry in scene.lights))
+
+
+def _mended(scene: Scene, section: str, name: str, make: Any, values: Mapping[str, Any]) -> Any:
+    try:
+        return make(name, values)
+    except ValueError as problem:  # two moving values can meet in between: eye and target, near and far
+        text = f"keyframes bring {section}.{name} to a state it cannot have: {problem}"
+        raise InputError(Problem("RG323", text, Place(str(scene.source)) if scene.source else None)) from None
+
+
+def _change_material(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    materials = tuple(
+        scene_build.material(name, values, entry.textures) if entry.name == name else entry for entry in scene.materials)
+    return replace(scene, materials=materials)
+
+
+def _change_environment(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    if scene.environment is None:
+        return scene
+    turn = math.radians(values.get("rotate_degrees", 0.0))
+    return replace(scene, environment=replace(scene.environment, intensity=values.get("intensity", 1.0), rotate=turn))
+
+
+def _change_object(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    if name not in scene.placements:
+        return scene
+    world: Matrix = scene_build.placed(values)
+    placed = scene.placements[name]
+    objects, lights, cameras = list(scene.objects), list(scene.lights), dict(scene.cameras)
+    for index, local in placed.objects:
+        objects[index] = replace(objects[index], transform=world @ local)
+    for index, local in placed.lights:
+        lights[index] = scene_build.moved_light(lights[index], world @ local)
+    for word, local in placed.cameras:
+        cameras[word] = replace(cameras[word], transform=rigid(world @ local))
+    return replace(scene, objects=tuple(objects), lights=tuple(lights), cameras=cameras)
+
+
+_CHANGE = {
+    "objects": _change_object, "materials": _change_material, "lights": _change_light, "cameras": _change_camera,
+    "environment": _change_environment,
+}  # fmt: skip

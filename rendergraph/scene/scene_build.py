@@ -1,0 +1,91 @@
+"""Materials, lights, cameras and placements from a scene file's values; keyframes build them again in between."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rendergraph.scene.cameras import look_at
+from rendergraph.scene.geometry import euler_matrix, placement, unit, vec3
+from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
+
+_PLAIN = ("base_color", "metallic", "roughness", "occlusion_strength", "normal_scale", "alpha_mode", "alpha_cutoff",
+          "double_sided", "unlit", "ior", "specular", "specular_color", "anisotropy_strength", "anisotropy_rotation",
+          "ambient", "diffuse", "specular_phong", "shininess")  # fmt: skip
+
+
+def material(name: str, values: Mapping[str, Any], textures: Mapping[str, Texture]) -> Material:
+    """A material from its values."""
+    given = {key: values[key] for key in _PLAIN if key in values}
+    r, g, b = values.get("emissive", (0.0, 0.0, 0.0) if "emissive" not in textures else (1.0, 1.0, 1.0))
+    strength = values.get("emissive_strength", 1.0)
+    if "metallic_roughness" in textures:  # a texture scales its factor: without one it counts whole
+        given.setdefault("metallic", 1.0)
+    return Material(name, emissive=(r * strength, g * strength, b * strength), textures=textures, **given)
+
+
+def light(name: str, values: Mapping[str, Any]) -> Light:
+    """A light from its values.
+
+    Raises:
+        ValueError: the direction has no length, or the cone is inside out.
+    """
+    direction = unit(values.get("direction", (0.0, -1.0, 0.0)))
+    if not direction.any():
+        raise ValueError("'direction' has no length")
+    inner, outer = values.get("inner_degrees", 0.0), values.get("outer_degrees", 45.0)
+    if values["type"] == "spot" and inner >= outer:
+        raise ValueError(f"'inner_degrees' ({inner:g}) must be below 'outer_degrees' ({outer:g})")
+    return Light(
+        name, values["type"], values.get("at", (0.0, 0.0, 0.0)), vec3(direction), values.get("color", (1.0, 1.0, 1.0)),
+        values.get("intensity", 1.0), values.get("range"), math.radians(inner), math.radians(outer),
+        values.get("casts_shadow", True),
+    )  # fmt: skip
+
+
+def camera(name: str, values: Mapping[str, Any]) -> Camera:
+    """A camera from its values.
+
+    Raises:
+        ValueError: eye and target coincide, the planes are in the wrong order, or it is of two types at once.
+    """
+    near, far = values.get("near", 0.05), values.get("far", 100.0)
+    if near >= far:
+        raise ValueError(f"'near' ({near:g}) must be below 'far' ({far:g})")
+    given = [key for key in ("fov_y_degrees", "height", "frustum") if key in values]
+    if len(given) > 1:
+        raise ValueError(f"has both '{given[0]}' and '{given[1]}'; one says how wide it sees")
+    if "height" in values and math.isinf(far):
+        raise ValueError("an orthographic camera needs a finite 'far'")
+    if "frustum" in values and not (values["frustum"][0] < values["frustum"][1] and values["frustum"][2] < values["frustum"][3]):
+        raise ValueError("'frustum' must be left < right, bottom < top")
+    target = values.get("target", (0.0, 0.0, 0.0))
+    transform = look_at(values.get("eye", (0.0, 0.0, 5.0)), target, values.get("up", (0.0, 1.0, 0.0)))
+    kind = "orthographic" if "height" in values else "frustum" if "frustum" in values else "perspective"
+    return Camera(
+        name, transform, kind, math.radians(values.get("fov_y_degrees", 45.0)), values.get("height", 2.0),
+        values.get("frustum"), near, far, target,
+    )  # fmt: skip
+
+
+def placed(values: Mapping[str, Any]) -> Matrix:
+    """Where an object stands: scaled, turned, moved."""
+    rotation = euler_matrix(values.get("rotate_degrees", (0.0, 0.0, 0.0)))
+    return placement(values.get("at", (0.0, 0.0, 0.0)), rotation, values.get("scale", (1.0, 1.0, 1.0)))
+
+
+def light_matrix(found: Light) -> Matrix:
+    """A light as a transform: where it is, its -Z the way it shines."""
+    matrix = look_at((0.0, 0.0, 0.0), found.direction)
+    matrix[:3, 3] = found.position
+    return matrix
+
+
+def moved_light(found: Light, matrix: Matrix) -> Light:
+    """A light with the place and direction of a transform; scale does not count."""
+    direction = unit(-matrix[:3, 2])
+    values = {**found.__dict__, "position": vec3(matrix[:3, 3])}
+    if direction.any():
+        values["direction"] = vec3(direction)
+    return Light(**values)
