@@ -15,7 +15,7 @@ from typing import NoReturn
 from rendergraph import __version__
 from rendergraph.cli.output import print_error, say
 from rendergraph.cli.words import click
-from rendergraph.errors import Problem, RendergraphError
+from rendergraph.errors import Problem, RendergraphError, suggestion
 
 VERBS = ("run", "check", "plan", "graph", "config", "bench", "nodes", "explain", "schema", "doctor")
 """In the order of `--help`; verb `x` is the function `command` in `rendergraph.cli.x`."""
@@ -38,6 +38,13 @@ class _Verbs(click.Group):
             return None
         found: click.Command = importlib.import_module(f"rendergraph.cli.{cmd_name}").command
         return found
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in VERBS and not args[0].startswith("-"):
+            ctx.fail(f"there is no verb '{args[0]}'{suggestion(args[0], VERBS)}")
+        return super().resolve_command(ctx, args)
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -123,16 +130,18 @@ def _told(problems: Sequence[Problem], code: int, as_json: bool) -> int:
 
 def _usage(error: click.UsageError) -> Problem:
     path = error.ctx.command_path if error.ctx else "rendergraph"
-    text = " ".join(error.format_message().split()).rstrip(".")
+    if isinstance(error, click.NoSuchOption) and error.ctx:
+        known = [name for parameter in error.ctx.command.params for name in parameter.opts if name.startswith("--")]
+        text = f"there is no option '{error.option_name}'{suggestion(error.option_name, known, most=0)}"
+    else:
+        text = " ".join(error.format_message().split()).rstrip(".")
     return Problem("RG500", f"{text[:1].lower()}{text[1:]}; see '{path} --help'")
 
 
 def _unexpected(error: Exception) -> Problem:
-    text = (
-        f"this is a mistake in rendergraph, not yours: {type(error).__name__}: {' '.join(str(error).split())[:300]}; "
-    )
-    text += "RENDERGRAPH_TRACEBACK=1 shows where; please report that with the output of `rendergraph doctor`"
-    return Problem("RG599", text)
+    what = f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
+    text = f"a mistake in rendergraph, not yours: {what}; RENDERGRAPH_TRACEBACK=1 shows where, please report that "
+    return Problem("RG599", text + "with what `rendergraph doctor` prints")
 
 
 def _flush() -> None:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 def command(frames: int, fps: float, no_alias: bool, as_json: bool, device: int | None, **selection: Any) -> None:
     """Time each pass.
 
-    Renders frames and prints the median time of each pass, with its spread. All of the pipeline's outputs are computed; one more frame is rendered beforehand, unmeasured. Times of a software
-    renderer say nothing about GPUs.
+    Renders frames and prints the median time of each pass, with its spread. All of the pipeline's outputs are
+    computed; one more frame is rendered beforehand, unmeasured. Times of a software renderer say nothing about GPUs.
 
     \b
     Examples:

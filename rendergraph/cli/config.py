@@ -19,7 +19,8 @@ _PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr")
 def command(as_json: bool, **selection: Any) -> None:
     """Print the resolved pipeline, with origins.
 
-    That is the file with `extends`, patches and settings applied, and beside each value the line it comes from. Of a picture that `rendergraph run` wrote (EXR or PNG) it prints the pipeline that the picture was made with.
+    That is the file with `extends`, patches and settings applied, and beside each value the line it comes from. Of a
+    picture that `rendergraph run` wrote (EXR or PNG) it prints the pipeline that the picture was made with.
 
     \b
     Examples:

@@ -23,7 +23,8 @@ NO_DEVICE = 5
 def command(as_json: bool) -> None:
     """Check devices, drivers and versions.
 
-    Shows each GL device and what it can, and says what to install where something is missing. Exits 5 where no device can be used.
+    Shows each GL device and what it can, and says what to install where something is missing. Exits 5 where no
+    device can be used.
 
     \b
     Examples:

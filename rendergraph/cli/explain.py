@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,8 @@ def error_page(code: str) -> dict[str, Any]:
 
 
 def _error_text(page: dict[str, Any]) -> str:
-    parts = [f"{page['code']}  {page['title']}", _indented(page["about"])]
+    about = "\n\n".join(textwrap.fill(" ".join(part.split()), 98) for part in str(page["about"]).split("\n\n"))
+    parts = [f"{page['code']}  {page['title']}", _indented(about)]
     for key, title in (("wrong", "Wrong"), ("message", "Message"), ("right", "Right")):
         if page.get(key):
             parts.append(f"{title}\n{_indented(page[key])}")

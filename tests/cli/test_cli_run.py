@@ -1,0 +1,140 @@
+"""`run`: which picture goes into which file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rendergraph import images
+
+
+def test_without_a_file_the_picture_is_named_after_the_pipeline(cli: Any, fake: Any) -> None:
+    result = cli("run", "some/where.yaml")
+    assert result.code == 0
+    assert result.out == "where.png\n"
+    assert "not drawn: idle: nobody reads it" in result.err
+    assert "6×4, 0 passes, 1.0 ms a frame on none (software: no measure of a GPU)" in result.err
+    assert images.read("where.png").shape == (4, 6, 3)
+    assert fake.calls["outputs"] == ["image"]
+    assert fake.calls["frames"] == range(1, 2)
+
+
+def test_json_is_one_document_with_the_paths(cli: Any, fake: Any) -> None:
+    result = cli("run", "x", "-o", "a.png", "-o", "b.exr", "--tap", "n.p=c.exr", "--json")
+    assert result.json["outputs"] == ["a.png", "b.exr", "c.exr"]
+    assert set(result.json) == {"pipeline", "device", "size", "passes", "frame_ms", "memory", "culled", "outputs"}
+    assert fake.calls["outputs"] == ["image", "radiance"]
+    assert fake.calls["taps"] == ["n.p"]
+
+
+@pytest.mark.parametrize(
+    ("outputs", "file", "expected"),
+    [
+        (("image", "radiance"), "a.png", "image"),
+        (("image", "radiance"), "a.JPEG", "image"),
+        (("image", "radiance"), "a.exr", "radiance"),
+        (("image",), "a.hdr", "image"),
+        (("image", "radiance"), "radiance=a.png", "radiance"),
+        (("image", "radiance"), "./a=b.png", "image"),
+    ],
+)
+def test_the_extension_or_the_name_chooses_the_output(
+    cli: Any, fake: Any, outputs: tuple[str, ...], file: str, expected: str
+) -> None:
+    fake.graph.outputs = dict.fromkeys(outputs)
+    assert cli("run", "x", "-o", file).code == 0
+    assert fake.calls["outputs"] == [expected]
+
+
+def test_a_pipeline_without_the_output_is_told(cli: Any, fake: Any) -> None:
+    fake.graph.outputs = {"ao": None}
+    result = cli("run", "x")
+    assert result.code == 3
+    assert result.err == ("RG505 'x.png' takes the output 'image', which the pipeline lacks; name one: -o ao=x.png\n")
+    assert not fake.calls
+
+
+def test_frames_are_numbered(cli: Any, fake: Any, tmp_path: Path) -> None:
+    result = cli("run", "x", "--frames", "9-11", "-o", "a.####.png", "--fps", "25")
+    assert result.out.split() == ["a.0009.png", "a.0010.png", "a.0011.png"]
+    assert fake.calls["fps"] == 25
+    assert images.read("a.0010.png")[0, 0, 0] == 255
+    assert cli("run", "x", "--frames", "2-3", "--json").json["outputs"] == ["x.0002.png", "x.0003.png"]
+    assert cli("run", "x", "--frames", "7", "-o", "one.png").out == "one.png\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["-o", "a.gif"], 2, "RG501 '.gif' files are not written; there is .exr, .hdr, .jpeg, .jpg, .png"),
+        (["-o", "a"], 2, "RG501 'a' has no extension to choose the format by"),
+        (["-o", "a.png", "--tap", "n.p=./a.png"], 2, "RG502 two pictures go to 'a.png'; give each a file of its own"),
+        (["-o", "a.png", "-o", "link/a.png"], 2, "RG502 two pictures go to 'link/a.png'"),
+        (["--environment", "sky.hdr", "-o", "sky.hdr"], 2, "RG502 'sky.hdr' is read by this very run"),
+        (
+            ["--frames", "1-9", "-o", "a.png"],
+            2,
+            "RG503 9 frames do not fit one file 'a.png'; number them: 'a.####.png'",
+        ),
+        (["-o", "no/a.png"], 3, "no/a.png: RG504 cannot be written: there is no folder 'no'"),
+        (["-o", "sky.hdr/a.png"], 3, "RG504 cannot be written: 'sky.hdr' is no folder"),
+        (["--tap", "n.p=folder.exr"], 3, "folder.exr: RG504 cannot be written: it is a folder"),
+    ],
+)
+def test_wrong_targets_are_said_before_rendering(
+    cli: Any, fake: Any, tmp_path: Path, words: list[str], code: int, message: str
+) -> None:
+    (tmp_path / "link").symlink_to(tmp_path)
+    (tmp_path / "sky.hdr").write_text("")
+    (tmp_path / "folder.exr").mkdir()
+    result = cli("run", "x", *words)
+    assert (result.code, result.out) == (code, "")
+    assert message in result.err
+    assert not fake.calls
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write everywhere")
+def test_a_folder_without_permission_is_said_before_rendering(cli: Any, fake: Any, tmp_path: Path) -> None:
+    (tmp_path / "locked").mkdir(mode=0o555)
+    result = cli("run", "x", "-o", "locked/a.png")
+    assert result.code == 3
+    assert "RG504 cannot be written: the folder 'locked' cannot be written to" in result.err
+    assert not fake.calls
+
+
+def test_modes_reach_the_renderer(cli: Any, fake: Any) -> None:
+    cli("run", "x", "--no-alias", "--poison", "--shuffle", "7", "--device", "1")
+    asked = {key: fake.calls[key] for key in ("alias", "poison", "shuffle", "device", "fps")}
+    assert asked == {"alias": False, "poison": True, "shuffle": 7, "device": 1, "fps": 30.0}
+
+
+def test_the_selection_reaches_load(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    import rendergraph
+    from rendergraph.errors import InputError, Problem
+
+    seen: dict[str, Any] = {}
+
+    def load(source: str, **options: Any) -> Any:
+        seen.update(options, source=source)
+        raise InputError(Problem("RG015", "enough"))
+
+    monkeypatch.setattr(rendergraph, "load", load, raising=False)
+    words = "run x --scene s.glb --camera c --environment e.hdr --size 4x5 -s a.b=1 -s c=2 -p p.yaml --asset-root r"
+    assert cli(*words.split(), "--plugin", "n").code == 3
+    assert seen == {
+        "source": "x", "scene": "s.glb", "camera": "c", "environment": "e.hdr", "size": (4, 5),
+        "sets": ["a.b=1", "c=2"], "patches": [Path("p.yaml")], "asset_roots": [Path("r")], "plugins": [Path("n")],
+    }  # fmt: skip
+
+
+def test_a_failure_keeps_the_frames_that_are_done(cli: Any, fake: Any, tmp_path: Path) -> None:
+    from rendergraph.errors import Problem, RenderError
+
+    fake.fail = RenderError(Problem("RG604", "the driver reported out of memory while drawing"))
+    result = cli("run", "x", "--frames", "1-3", "-o", "a.##.png", "-o", "b.##.exr")
+    assert result.code == 1
+    assert result.out.split() == ["a.01.png", "b.01.exr"]
+    assert sorted(os.listdir(tmp_path)) == ["a.01.png", "b.01.exr"]
