@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -18,7 +19,8 @@ from rendergraph.expand import CAMERA
 from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
 from rendergraph.link import Graph, GraphNode
-from rendergraph.scene.model import Scene
+from rendergraph.scene.animate import bounds
+from rendergraph.scene.model import Light, Mesh, Object, Scene, Vec3
 from rendergraph.steps import ViewMatrices
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -40,6 +42,33 @@ class FrameTimes:
     steps: tuple[StepTime, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class FrameScene:
+    """The scene of one frame as `update` sees it; see `steps.FrameScene`."""
+
+    scene: Scene
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The scene's lights, in its order."""
+        return self.scene.lights
+
+    @property
+    def objects(self) -> tuple[Object, ...]:
+        """Placed objects."""
+        return self.scene.objects
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """What `Object.mesh` counts through."""
+        return self.scene.meshes
+
+    @cached_property
+    def bounds(self) -> tuple[Vec3, Vec3]:
+        """Least and greatest corner of what is drawn."""
+        return bounds(self.scene)
+
+
 @dataclass(eq=False)
 class FrameContext:
     """What a node's `update` sees and does in one frame (`steps.Frame`)."""
@@ -49,7 +78,7 @@ class FrameContext:
     index: int
     time: float
     camera: ViewMatrices
-    scene: Any
+    scene: FrameScene
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
@@ -84,6 +113,7 @@ class Runner:
     executable: Executable
     graph: Graph
     _updating: list[GraphNode] = field(default_factory=list)
+    _scene: FrameScene | None = None
 
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
@@ -123,8 +153,10 @@ class Runner:
         start = perf_counter()
         views.set_frame(time, delta, index)
         views.set(CAMERA, (camera,))
+        if self._scene is None or self._scene.scene is not scene:
+            self._scene = FrameScene(scene)
         for node in self._updating:
-            self._update(node, index, time, camera, scene)
+            self._update(node, index, time, camera, self._scene)
         if views.changed:
             for sort in executable.sorters:
                 sort(views)
@@ -160,7 +192,7 @@ class Runner:
             call()
         self.executable.fresh = False
 
-    def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: Scene) -> None:
+    def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: FrameScene) -> None:
         frame = FrameContext(self.executable, node, index, time, camera, scene)
         try:
             node.node.update(frame)

@@ -520,6 +520,29 @@ class ViewMatrices:
     light: int = -1
 
 
+class FrameScene(Protocol):
+    """The scene of one frame, with `scene.model`'s values.
+
+    Attributes:
+        lights: in the scene's order.
+        bounds: least and greatest corner of what is drawn.
+        objects: placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`.
+        meshes: what an object's `mesh` counts through.
+    """
+
+    @property
+    def lights(self) -> Sequence[Any]: ...
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
+
+    @property
+    def objects(self) -> Sequence[Any]: ...
+
+    @property
+    def meshes(self) -> Sequence[Any]: ...
+
+
 class Frame(Protocol):
     """What `update` may ask and do."""
 
@@ -529,8 +552,8 @@ class Frame(Protocol):
     """Seconds since frame 1."""
     camera: ViewMatrices
     """The pipeline's camera in this frame."""
-    scene: Any
-    """The scene in this frame: `lights`, `bounds` (minimum and maximum corner), `objects`, `meshes` by name."""
+    scene: FrameScene
+    """The scene in this frame."""
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""

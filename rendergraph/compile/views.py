@@ -30,6 +30,7 @@ class ViewBuffers:
     current: dict[str, tuple[ViewMatrices, ...]] = field(default_factory=dict)
     changed: bool = True
     _buffers: dict[str, moderngl.Buffer] = field(default_factory=dict)
+    _packed: dict[str, bytes] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, table in self.tables.items():
@@ -50,11 +51,15 @@ class ViewBuffers:
             return
         if self.current.get(table) == now:
             return
+        packed = b"".join(pack_view(view) for view in now)
         expected = max(1, self.tables[table].count)
         if len(now) != expected:
             raise ValueError(f"'{table}' has {expected} views, but update set {len(now)}")
-        self._buffers[table].write(b"".join(pack_view(view) for view in now))
         self.current[table] = now
+        if self._packed.get(table) == packed:
+            return
+        self._packed[table] = packed
+        self._buffers[table].write(packed)
         self.changed = True
 
     def set_frame(self, time: float, delta: float, index: int) -> None:

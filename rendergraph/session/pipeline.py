@@ -134,8 +134,8 @@ class Pipeline:
 
         Pipelines that ask for the same unchanged file share one scene, and so its place on the GPU.
         """
-        from rendergraph.scene import load
         from rendergraph.scene.animate import complete
+        from rendergraph.scene.load import load
         from rendergraph.scene.model import Environment, ImageSource, Scene
 
         file = self.spec.scene

@@ -122,7 +122,7 @@ class Session:
     ) -> FrameTimes | None:
         time = (number - 1) / fps
         scene = pipeline.scene
-        if scene.keyframes or scene.orbit:
+        if animate.moves(scene):
             scene = animate.at(scene, time)
             self._scenes[id(pipeline.scene)][1].update(scene)
         name = pipeline.camera or next(iter(scene.cameras))

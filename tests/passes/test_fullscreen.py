@@ -98,7 +98,8 @@ outputs: {image: d.result}"""
 
 def test_a_changed_uniform_rebuilds_nothing_and_a_changed_define_one_program(bench: Any) -> None:
     text = "nodes: {a: {type: ramp}, b: {type: add, inputs: {source: a.color}}}\noutputs: {image: b.result}"
-    pipeline = bench.pipeline(text, Ramp, Add, shaders=SHADERS)
+    shaders = SHADERS | {"add.frag": SHADERS["add.frag"].replace("was", "own")}  # a text no other test has compiled
+    pipeline = bench.pipeline(text, Ramp, Add, shaders=shaders)
     session = bench.session
     session.render(pipeline)
     programs, executable = session.programs.compiled, session._last[1]
