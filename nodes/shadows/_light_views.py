@@ -221,10 +221,7 @@ def casting_points(scene: Any, direction: Sequence[float]) -> Points:
 
 def _caster_corners(scene: Any) -> tuple[Points, npt.NDArray[np.int64]]:
     """World-space corners of each caster's box, shape (n, 8, 3), and the largest flat ones' indices."""
-    placed = [
-        entry for entry in scene.objects
-        if entry.casts_shadow and not entry.hidden and scene.materials[entry.material].alpha_mode != "blend"
-    ]  # fmt: skip
+    placed = [entry for entry in scene.objects if entry.casts_shadow and not entry.hidden]
     if not placed:
         return np.empty((0, 8, 3)), np.empty(0, np.int64)
     boxes = np.array([box_corners(np.asarray(mesh.box, np.float64)) for mesh in scene.meshes])
