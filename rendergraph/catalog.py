@@ -65,11 +65,12 @@ class Catalog:
         self._types = dict(types or {})
 
     @classmethod
-    def discover(cls, plugin_paths: Iterable[Path] = ()) -> Catalog:
+    def discover(cls, plugin_paths: Iterable[Path] = (), *, installed: bool = True) -> Catalog:
         """All installed node types, and those in files and folders the user named.
 
         Args:
             plugin_paths: node modules, or folders of them; code, so never taken from a pipeline file.
+            installed: look at entry points too.
 
         Raises:
             InputError: a plugin path does not exist.
@@ -77,7 +78,7 @@ class Catalog:
         from importlib.metadata import entry_points
 
         listed: dict[str, list[_Listed]] = {}
-        for entry in entry_points(group=GROUP):
+        for entry in entry_points(group=GROUP) if installed else ():
             _add(listed, _package(entry.name, entry.value.partition(":")[0]))
         for path in plugin_paths:
             _add(listed, _loose(path))

@@ -22,6 +22,9 @@ Scalar: TypeAlias = "str | int | float | bool | None"
 Key: TypeAlias = "str | int | float"
 
 
+Data: TypeAlias = "Scalar | list[Value] | dict[Any, Value] | Broken"
+
+
 @dataclass(frozen=True)
 class Limits:
     """Budgets of one YAML file; each is a small multiple of what a person writes.
@@ -75,11 +78,21 @@ class Source:
         return Problem(code, text, Place(self.name, line, column), self.line(line))
 
 
+class Broken:
+    """What stands for a value that is wrong and has been reported, where the reading goes on."""
+
+    def __repr__(self) -> str:
+        return "BROKEN"
+
+
+BROKEN = Broken()
+
+
 class Value:
     """One value of a document with its place; `data` holds further `Value`s in mappings and lists.
 
     Attributes:
-        data: a scalar, a list of values, or a dict of values.
+        data: a scalar, a list of values, or a dict of values; `BROKEN` in a document with problems.
         source: the file it stands in.
         line, column: where it starts, from 1; 0 where the source has no lines.
         key_line, key_column: where its key starts, the value's own place where it has none.
@@ -89,7 +102,7 @@ class Value:
 
     def __init__(
         self,
-        data: Scalar | list[Value] | dict[Any, Value],
+        data: Data,
         source: Source,
         line: int = 0,
         column: int = 0,
@@ -119,7 +132,7 @@ class Value:
         """What it is, in words for messages."""
         return kind_of(self.data)
 
-    def with_data(self, data: Scalar | list[Value] | dict[Any, Value]) -> Value:
+    def with_data(self, data: Data) -> Value:
         """The same place with other contents."""
         return Value(data, self.source, self.line, self.column, (self.key_line, self.key_column))
 
@@ -172,11 +185,13 @@ class Document:
         root: the outermost value.
         source: the file.
         problems: mistakes that did not stop the reading, where the caller asked to keep going.
+        dropped: paths of what was left out because it was wrong, so that nobody complains that it is missing.
     """
 
     root: Value
     source: Source
     problems: tuple[Problem, ...] = ()
+    dropped: frozenset[tuple[str, ...]] = frozenset()
 
     @property
     def file(self) -> str:
@@ -420,6 +435,8 @@ class _Builder:
             else:
                 while not isinstance(following := parser.get_event(), yaml.MappingEndEvent):
                     self.entry(parser, following, depth + 1, items)
+        if event.tag:
+            value.data = BROKEN
         if event.anchor:
             self.anchors[event.anchor] = (value, self.nodes - before)
         return value
@@ -431,6 +448,8 @@ class _Builder:
         value = self.build(parser, parser.get_event(), depth, (mark.line + 1, mark.column + 1))
         if merge:
             self.say("RG003", "merge keys ('<<') are not allowed; use `extends`, or write the values out", mark)
+        elif name is BROKEN:
+            pass
         elif isinstance(name, bool) or not isinstance(name, str | int | float) or name != name:
             self.say("RG009", f"a key must be text or a number, this is {kind_of(name)}", mark)
         elif name in into:
@@ -451,12 +470,12 @@ class _Builder:
             inside = event.anchor in self.anchors
             reason = "contains itself" if inside else f"has no anchor '&{name}' before it"
             self.say("RG006", f"the alias '*{name}' {reason}", mark)
-            return Value(None, *place)
+            return Value(BROKEN, *place)
         value, size = found
         self.count(size, mark)
         return Value(value.data, *place)
 
-    def scalar(self, event: Any) -> Scalar:
+    def scalar(self, event: Any) -> Scalar | Broken:
         # Plain or quoted is asked of `implicit`: tag and style are '' in the C parser where they are None in the other.
         if not event.implicit[0]:
             return str(event.value)
@@ -464,7 +483,7 @@ class _Builder:
             return scalar(event.value)
         except ValueError as error:
             self.say("RG010", f"{error}", event.start_mark)
-            return 0
+            return BROKEN
 
 
 def _parse(text: str, source: Source, limits: Limits, keep_going: bool) -> Document:

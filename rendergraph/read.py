@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
-from rendergraph.document import Document, Limits, Value, load, parse, shown
+from rendergraph.document import BROKEN, Document, Limits, Value, load, parse, shown
 from rendergraph.errors import InputError, Problem, suggestion
 
 VERSION = 1
@@ -65,13 +65,13 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
     Raises:
         InputError: something was left out and `keep_going` is off, or the whole is not a mapping.
     """
-    grammar = _Grammar(patch)
+    grammar = _Grammar(patch, bool(document.problems))
     root = grammar.top(document.root)
     problems = (*document.problems, *grammar.problems)
     if problems and (not keep_going or root is None):
         raise InputError(problems)
     assert root is not None
-    return Document(root, document.source, problems)
+    return Document(root, document.source, problems, document.dropped | grammar.dropped)
 
 
 Shape: TypeAlias = "Callable[[Value, str], Value | None]"
@@ -80,14 +80,30 @@ Shape: TypeAlias = "Callable[[Value, str], Value | None]"
 class _Grammar:
     """One walk over a file; every method gives the value back without what does not belong there."""
 
-    def __init__(self, patch: bool) -> None:
+    def __init__(self, patch: bool, suspect: bool) -> None:
         self.patch = patch
+        self.suspect = suspect
         self.problems: list[Problem] = []
+        self.dropped: set[tuple[str, ...]] = set()
+        self._path: list[str] = []
 
     def say(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
         self.problems.append(value.problem(code, text, key=key))
 
+    def enter(self, key: str, child: Value, shape: Shape, kept: dict[str, Value]) -> None:
+        """Keep a child as far as it is right; remember where something was left out."""
+        self._path.append(key)
+        if child.data is None:
+            kept[key] = child
+        elif child.data is not BROKEN and (good := shape(child, key)) is not None:
+            kept[key] = good
+        else:
+            self.dropped.add(tuple(self._path))
+        self._path.pop()
+
     def top(self, root: Value) -> Value | None:
+        if root.data is BROKEN:
+            return None
         if root.data is None and not self.patch:
             self.say(root, "RG013", "the file is empty; a pipeline has at least `nodes` and `outputs`")
             return None
@@ -119,10 +135,8 @@ class _Grammar:
                     where = "a pipeline" if known is TOP_KEYS else f"'{what}'"
                     text = f"{where} has no key '{shown(key)}'{suggestion(str(key), known)}"
                     self.say(child, "RG101" if known is TOP_KEYS else "RG105", text, key=True)
-                elif child.data is None:
-                    kept[key] = child
-                elif (good := shape(child, key)) is not None:
-                    kept[key] = good
+                else:
+                    self.enter(key, child, shape, kept)
             return value.with_data(kept)
 
         return check
@@ -138,12 +152,12 @@ class _Grammar:
                 if not isinstance(key, str) or not NAME.match(key):
                     text = f"'{shown(key)}' is no {what}; letters, digits, '_' and '-' make one, no digit first"
                     self.say(child, "RG107", text, key=True)
+                    self.dropped.add((*self._path, str(key)))
                 elif where == "nodes" and key == "inputs":
                     self.say(child, "RG107", "a node cannot be called 'inputs'; rename it", key=True)
-                elif child.data is None:
-                    kept[key] = child
-                elif (good := shape(child, key)) is not None:
-                    kept[key] = good
+                    self.dropped.add((*self._path, key))
+                else:
+                    self.enter(key, child, shape, kept)
             return value.with_data(kept)
 
         return check
@@ -177,6 +191,8 @@ class _Grammar:
         data = value.data
         if isinstance(data, list) and len(data) == 2 and all(type(side.data) is int for side in data):
             return value
+        if _has_broken(value):
+            return None
         self.say(value, "RG106", f"'{key}' takes width and height in pixels, as in [1280, 720]")
         return None
 
@@ -190,16 +206,20 @@ class _Grammar:
         parts = value.data if isinstance(value.data, list) else [value]
         if all(isinstance(part.data, str) and part.data for part in parts):
             return value
+        if any(part.data is BROKEN for part in parts):
+            return None
         self.say(value, "RG106", f"'{key}' takes a link as in 'node.port', a list of links, or null")
         return None
 
     def anything(self, value: Value, key: str) -> Value | None:
-        return value
+        return None if self.suspect and _has_broken(value) else value
 
     def parameter_part(self, value: Value, key: str) -> Value | None:
         if key == "doc":
             return self.text(value, key)
-        if key == "default" or (isinstance(value.data, int | float) and not isinstance(value.data, bool)):
+        if key == "default":
+            return self.anything(value, key)
+        if isinstance(value.data, int | float) and not isinstance(value.data, bool):
             return value
         self.say(value, "RG106", f"'{key}' takes a number, this is {value.kind}")
         return None
@@ -211,6 +231,12 @@ class _Grammar:
             return value
         self.say(value, "RG106", f"'{key}' takes true or false, this is {value.kind}")
         return None
+
+
+def _has_broken(value: Value) -> bool:
+    data = value.data
+    parts = data if isinstance(data, list) else data.values() if isinstance(data, dict) else ()
+    return data is BROKEN or any(map(_has_broken, parts))
 
 
 def entries(value: Value | None, *path: str) -> dict[str, Value]:

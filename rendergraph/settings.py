@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -156,10 +158,11 @@ class Roots:
 
 def _neighbour(path: Path) -> str:
     try:
-        names = [entry.name for entry in path.parent.iterdir()][:1000]
+        names = sorted(entry.name for entry in islice(path.parent.iterdir(), 1000))
     except OSError:
         return ""
-    return suggestion(path.name, names, most=0)
+    close = get_close_matches(path.name, names, n=1, cutoff=0.8)
+    return f"; did you mean '{shown(close[0])}'?" if close else ""
 
 
 def _resolved(path: Path) -> Path:

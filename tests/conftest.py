@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +13,7 @@ import pytest
 
 if TYPE_CHECKING:
     from rendergraph import Session
+    from rendergraph.catalog import Catalog
 
 
 @pytest.fixture(scope="session")
@@ -29,3 +32,16 @@ def gl() -> Iterator[Session]:
 
     with rg.Session() as session:
         yield session
+
+
+@pytest.fixture(scope="session")
+def toy_catalog() -> Catalog:
+    """The node types of `toys.py`."""
+    spec = importlib.util.spec_from_file_location("toys", Path(__file__).parent / "toys.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["toys"] = module
+    spec.loader.exec_module(module)
+    catalog: Catalog = module.CATALOG
+    return catalog

@@ -12,7 +12,7 @@ from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
-from rendergraph.link.names import Bound, Link, Names, Wrong
+from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import instance
 from rendergraph.resolve import NodeSpec, PipelineSpec
@@ -79,6 +79,7 @@ class _Linker:
             self.problems += knots
         else:
             self.problems += needs(nodes, outputs) + versions(nodes, outputs)
+            self._crossings(nodes, infer)
             textures = self._textures(nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
             self._shown(nodes, outputs, infer)
@@ -93,7 +94,6 @@ class _Linker:
             size=self.spec.size,
             lights=self.lights,
             textures=textures,
-            warnings=self.spec.notes,
             aliases=self._aliases(names),
         )
 
@@ -141,9 +141,19 @@ class _Linker:
                 text = f"node type '{bound.type.name}' has no input '{name}'{hint}"
                 self.problems.append(value.problem("RG111", text, key=True))
         for name, port in inputs.items():
-            if not bound.links[name] and not port.optional and name not in bound.failed:
+            if (
+                not bound.links[name]
+                and not port.optional
+                and name not in bound.failed
+                and not self._dropped(bound, name)
+            ):
                 text = f"input '{name}' of node '{bound.spec.id}' ({bound.type.name}) is not connected"
                 self.problems.append(bound.spec.value.problem("RG114", text + self._source_for(bound, port), key=True))
+
+    def _dropped(self, bound: Bound, name: str) -> bool:
+        """Whether a link was left out for a mistake that has been said."""
+        path = ("nodes", bound.spec.id.removeprefix(bound.spec.scope), "inputs")
+        return path in self.spec.dropped or (*path, name) in self.spec.dropped
 
     def _input(self, bound: Bound, names: Names, name: str, port: Input | InOut, value: Value) -> None:
         if isinstance(value.data, list):
@@ -238,6 +248,28 @@ class _Linker:
                 if info is not None:
                     textures[end] = info
         return textures
+
+    def _crossings(self, nodes: Mapping[str, Bound], infer: Infer) -> None:
+        """Links into sub-pipelines against what those declare; a wrong one is cut, so that nothing inside complains."""
+        for bound in nodes.values():
+            for name, links in bound.links.items():
+                for found in [found for found in links if found.declared]:
+                    info = infer.info(found.source)
+                    problem = self._crossing(nodes, found, info.semantic.name) if info is not None else None
+                    if problem is not None:
+                        self.problems.append(problem)
+                        links.remove(found)
+                        bound.failed.add(name)
+
+    def _crossing(self, nodes: Mapping[str, Bound], found: Link, carried: str) -> Problem | None:
+        for crossing in found.declared:
+            if crossing.semantic is not None and "any" not in (crossing.semantic, carried):
+                if crossing.semantic == carried:
+                    continue
+                where = line_of(nodes[found.source.node].spec.place, crossing.given.place)
+                text = f"'{crossing.name}' takes {crossing.semantic}, but '{found.source}' ({where}) carries {carried}"
+                return crossing.given.problem("RG110", text)
+        return None
 
     def _shown(self, nodes: Mapping[str, Bound], outputs: Mapping[str, Link], infer: Infer) -> None:
         for name, found in outputs.items():

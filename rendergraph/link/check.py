@@ -7,10 +7,10 @@ from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Function, InOut, Input, Made, Node, Output, Port, TextureInfo, Views
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Problem
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.infer import Infer
-from rendergraph.link.names import Bound, Link
+from rendergraph.link.names import Bound, Link, line_of
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, Semantic, Signature
 
 Accepts = Callable[[type[Node]], bool]
@@ -68,12 +68,6 @@ class Checker:
 
     def _semantic(self, bound: Bound, port: Input | InOut, link: Link, info: TextureInfo) -> bool:
         carried = info.semantic
-        for declared in link.declared:
-            name = declared.get("semantic")
-            if name is not None and "any" not in (name.data, carried.name) and name.data != carried.name:
-                text = f"the sub-pipeline's input takes {name.data}, but '{link.source}'{self._at(link)} carries"
-                self.problems.append(link.value.problem("RG110", f"{text} {carried.name}"))
-                return False
         wanted = port.semantic
         if not isinstance(wanted, Semantic) or "any" in (wanted.name, carried.name):
             return True
@@ -82,7 +76,7 @@ class Checker:
         elif wanted.space and carried.space and wanted.space != carried.space:
             code, takes, carries = "RG202", f"{wanted.name} in {wanted.space} space", f"it in {carried.space} space"
         elif wanted.encoding and carried.encoding and wanted.encoding != carried.encoding:
-            code, takes, carries = "RG203", f"{wanted.encoding} {wanted.name}", f"it {carried.encoding}"
+            code, takes, carries = "RG203", f"{wanted.encoding} {wanted.name}", f"{carried.encoding} {carried.name}"
         else:
             return True
         self._say(bound, port, link, code, f"takes {takes}", f"carries {carries}", self._by_semantic(carried, wanted))
@@ -93,9 +87,9 @@ class Checker:
         samples = info.desc.samples
         if port.samples == "single" and samples > 1:
             carries = f"has {samples} samples a texel"
-            self._say(bound, port, link, "RG204", "takes one sample a texel", carries, self._resolving(info))
+            self._say(bound, port, link, "RG214", "takes one sample a texel", carries, self._resolving(info))
         elif port.samples == "multi" and samples == 1:
-            self._say(bound, port, link, "RG204", "takes several samples a texel", "has one", None)
+            self._say(bound, port, link, "RG214", "takes several samples a texel", "has one", None)
 
     def _format(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
@@ -111,13 +105,28 @@ class Checker:
         elif smooth != "nearest" and not port.compare and texel.family in ("uint", "int"):
             takes = "is filtered, so no whole numbers"
         if takes:
-            self._say(bound, port, link, "RG205", takes, f"has the format {info.desc.format}", None)
+            self._say(bound, port, link, "RG215", takes, f"has the format {info.desc.format}", None)
 
     def _say(
         self, bound: Bound, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
     ) -> None:  # fmt: skip
         text = f"'{bound.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
-        self.problems.append(link.value.problem(code, text + self._converters(hint)))
+        self.problems.append(link.value.problem(code, text + (self._neighbour(port, link) or self._converters(hint))))
+
+    def _neighbour(self, port: Port, link: Link) -> str:
+        """Another port of the same node that would fit."""
+        source = self.nodes[link.source.node]
+        for name, other in source.type.cls.outputs().items():
+            info = self.infer.info(Endpoint(link.source.node, name))
+            if name == link.source.port or info is None or not isinstance(port, Input):
+                continue
+            if isinstance(port.semantic, Signature):
+                fits = isinstance(other, Function) and other.signature.name == port.semantic.name
+            else:
+                fits = kind_of(other, info) == port.kind and _means(port, info.semantic)
+            if fits:
+                return f"; '{link.source.node}.{name}' would fit"
+        return ""
 
     def _at(self, link: Link) -> str:
         """Where the other end stands: its line, with the file where that is another."""
@@ -141,7 +150,7 @@ class Checker:
             (a, one), (b, other) = list(made.items())[:2]
             ends = f"'{bound.spec.id}.{one}' is {_size(a)} and '{bound.spec.id}.{other}' {_size(b)}"
             text = f"{ends}: one pass draws all its targets in one size"
-            self.problems.append(bound.spec.value.problem("RG206", text, key=True))
+            self.problems.append(bound.spec.value.problem("RG216", text, key=True))
             return
         for name, links in bound.links.items():
             port = bound.inputs[name]
@@ -152,7 +161,7 @@ class Checker:
                 (size, target), *_ = made.items()
                 takes = f"takes the size of '{bound.spec.id}.{target}', {_size(size)}"
                 carries = f"is {_size(info.desc.size)}"
-                self._say(bound, port, link, "RG206", takes, carries, self._resizing(info))
+                self._say(bound, port, link, "RG216", takes, carries, self._resizing(info))
 
     # Ways out ---------------------------------------------------------------------------------------------------------
 
@@ -173,14 +182,15 @@ class Checker:
 
     def _by_semantic(self, carried: Semantic, wanted: Semantic) -> Accepts:
         return lambda cls: (
-            any(_means(port, carried) for port in _inputs(cls)) and any(_means(port, wanted) for port in _outputs(cls))
+            any(_means(port, carried) for port in _only_input(cls))
+            and any(_means(port, wanted) for port in _outputs(cls))
         )
 
     def _by_kind(self, info: TextureInfo, kind: str, port: Input | InOut) -> Accepts:
         given = info.desc.kind if info.desc is not None else ""
         meant = port.semantic if isinstance(port.semantic, Semantic) else info.semantic
         return lambda cls: (
-            any(p.kind == given and _means(p, info.semantic) for p in _inputs(cls))
+            any(p.kind == given and _means(p, info.semantic) for p in _only_input(cls))
             and any(p.kind == kind and _means(p, meant) for p in _outputs(cls))
         )
 
@@ -188,14 +198,14 @@ class Checker:
         return lambda cls: any(
             port.samples != "single" and _means(port, info.semantic, any_too=True)
             and any(_continues(out, port, info) and out.samples == 1 for out in _outputs(cls))
-            for port in _inputs(cls)
+            for port in _only_input(cls)
         )  # fmt: skip
 
     def _resizing(self, info: TextureInfo) -> Accepts:
         return lambda cls: any(
             port.size == "any" and _means(port, info.semantic, any_too=True)
-            and any(_continues(out, port, info) and out.like is None for out in _outputs(cls))
-            for port in _inputs(cls)
+            and any(_continues(out, port, info) and out.like is None and out.size == 1.0 for out in _outputs(cls))
+            for port in _only_input(cls)
         )  # fmt: skip
 
 
@@ -210,15 +220,10 @@ def kind_of(port: Port, info: TextureInfo) -> str:
     return port.kind if isinstance(port, Made) else ""
 
 
-def line_of(place: Place, here: Place) -> str:
-    """A place for a message that already names a file: its line, with the file where that is another one."""
-    if not place.line:
-        return place.file
-    return f"line {place.line}" if place.file == here.file else f"{place.file}:{place.line}"
-
-
-def _inputs(cls: type[Node]) -> Iterator[Input]:
-    return (port for port in cls.inputs().values() if isinstance(port, Input))
+def _only_input(cls: type[Node]) -> list[Input]:
+    """The input of a type that needs no other: such a node can simply be put between two."""
+    needed = [port for port in cls.inputs().values() if not port.optional]
+    return [port for port in needed if isinstance(port, Input)] if len(needed) == 1 else []
 
 
 def _outputs(cls: type[Node]) -> Iterator[Made]:

@@ -25,6 +25,7 @@ from rendergraph.declare import (
     TextureInfo,
     Views,
 )  # fmt: skip
+from rendergraph.document import shown
 from rendergraph.errors import Problem
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Bound
@@ -142,6 +143,7 @@ class Infer:
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):
+            self._ruled(end, "count", port.count)
             return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port))
         if isinstance(port, InOut) and bound.links.get(port.name):
             return self.info(bound.links[port.name][0].source)
@@ -169,9 +171,22 @@ class Infer:
                 raise _Unknown from None  # nobody uses what lacks an input
             if missing:
                 self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
+            elif isinstance(error, ValueError):
+                self._refused(bound, str(error))
             else:
-                self._say(end, "RG209", f"the rule for its {what} fails: {type(error).__name__}: {error}")
+                self._say(end, "RG209", f"the rule for its {what} fails: {type(error).__name__}: {shown(error, 200)}")
             raise _Unknown from None
+
+    def _refused(self, bound: Bound, message: str) -> None:
+        """A rule's own complaint, where the parameter stands that it speaks of; several rules may have the same."""
+        value, key = bound.spec.value, True
+        for param in bound.spec.params.values():
+            for part in param.data if isinstance(param.data, list) else [param]:
+                if f"'{part.data}'" in message:
+                    value, key = part, False
+        problem = value.problem("RG209", f"node '{bound.spec.id}' ({bound.type.name}): {shown(message, 200)}", key=key)
+        if problem not in self.problems:
+            self.problems.append(problem)
 
     def _made(self, end: Endpoint, bound: Bound, port: Made) -> TextureInfo | None:
         like = self._linked(bound, port.like)

@@ -9,12 +9,28 @@ from dataclasses import dataclass, replace
 from rendergraph.catalog import NodeType
 from rendergraph.declare import InOut, Input, Node, Port
 from rendergraph.document import Value, shown
-from rendergraph.errors import Problem, suggestion
+from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
+from rendergraph.read import word
 from rendergraph.resolve import NodeSpec, PipelineSpec
 
 _ID = "[A-Za-z_][A-Za-z0-9_-]*"
 _LINK = re.compile(rf"({_ID}(?:/{_ID})*)(?:\.({_ID}))?(@previous)?\Z")
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """An input of a sub-pipeline that a link passes through.
+
+    Attributes:
+        name: `glow.radiance`.
+        semantic: what it is declared to take, None where nothing is said.
+        given: the link outside.
+    """
+
+    name: str
+    semantic: str | None
+    given: Value
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +45,7 @@ class Link:
 
     source: Endpoint
     value: Value
-    declared: tuple[Value, ...] = ()
+    declared: tuple[Crossing, ...] = ()
 
 
 @dataclass(eq=False)
@@ -120,10 +136,17 @@ class Names:
             raise Wrong(value.problem("RG117", f"'{shown(value.data)}' leads back to itself; link it to a node's port"))
         if name == "inputs" and scope:
             return self._outside(scope, port or wanted, value, depth)
+        if name == "inputs" and (declared := self.spec.tree.get("inputs", port or wanted)):
+            optional = declared.get("optional")
+            if optional is not None and optional.data:
+                return None
+            raise Wrong(None)  # a sub-pipeline run on its own
         inner = self.spec.scopes.get(f"{scope}{name}/")
         if inner is not None:
             return self._inside(f"{scope}{name}/", port, wanted, value, depth)
         node = self.spec.nodes.get(f"{scope}{name}")
+        if node is None and (("nodes", name) in self.spec.dropped or not self.spec.nodes):
+            raise Wrong(None)
         if node is None:
             text = f"there is no node '{name}'{suggestion(name, self.nodes_of(scope))}"
             raise Wrong(value.problem("RG109", text))
@@ -132,7 +155,7 @@ class Names:
             raise Wrong(None)
         outputs = node_type.cls.outputs()
         if (port or wanted) not in outputs:
-            raise Wrong(value.problem("RG112", self._no_output(node, node_type, port, wanted)))
+            raise Wrong(value.problem("RG112", self._no_output(node, node_type, port, wanted, value)))
         return Link(Endpoint(node.id, port or wanted), value)
 
     def _outside(self, scope: str, port: str, value: Value, depth: int) -> Link | None:
@@ -143,7 +166,10 @@ class Names:
             raise Wrong(value.problem("RG111", text))
         given = found.links.get(port)
         if given is None or given.data is None:
-            return None
+            optional = found.inputs[port].get("optional")
+            if optional is not None and optional.data:
+                return None
+            raise Wrong(None)  # said at the node
         match = _LINK.match(given.data) if isinstance(given.data, str) else None
         if match is None:
             kind = "takes one link" if isinstance(given.data, list) else "takes a link as in node.port"
@@ -152,7 +178,8 @@ class Names:
         if link is None:
             return None
         source = replace(link.source, previous=link.source.previous or bool(match[3]))
-        return replace(link, source=source, declared=(*link.declared, found.inputs[port]))
+        crossing = Crossing(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
+        return replace(link, source=source, declared=(*link.declared, crossing))
 
     def _inside(self, scope: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
         """The port inside that a sub-pipeline's output stands for."""
@@ -172,12 +199,19 @@ class Names:
         source = replace(link.source, previous=link.source.previous or bool(match[3]))
         return replace(link, source=source)
 
-    def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str) -> str:
+    def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str, value: Value) -> str:
         outputs = node_type.cls.outputs()
         name = port or wanted
-        text = f"node '{node.id}' ({node_type.name}) has no output '{name}'"
+        text = f"node '{node.id}' ({node_type.name}, {line_of(node.place, value.place)}) has no output '{name}'"
         if port is None:
             return f"{text}; name one as in {node.id}.PORT{suggestion('', outputs)}"
         if name in node_type.cls.inputs():
             return f"{text}, only an input of that name{suggestion(name, outputs)}"
         return text + suggestion(name, outputs)
+
+
+def line_of(place: Place, here: Place) -> str:
+    """A place for a message that already names a file: its line, with the file where that is another one."""
+    if not place.line:
+        return place.file
+    return f"line {place.line}" if place.file == here.file else f"{place.file}:{place.line}"

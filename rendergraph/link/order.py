@@ -7,9 +7,8 @@ from dataclasses import replace
 
 from rendergraph.declare import InOut
 from rendergraph.errors import Problem
-from rendergraph.link.check import line_of
 from rendergraph.link.graph import Endpoint
-from rendergraph.link.names import Bound, Link
+from rendergraph.link.names import Bound, Link, line_of
 
 
 def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:

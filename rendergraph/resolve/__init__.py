@@ -89,6 +89,7 @@ def resolve(
         tree=tree,
         notes=tuple(files.notes),
         problems=tuple(files.problems),
+        dropped=frozenset(files.dropped),
     )
 
 
@@ -123,8 +124,8 @@ def _patch(patch: Path | Mapping[str, Any], files: Files, limits: Limits) -> Val
 
 def _complete(tree: Value, files: Files) -> None:
     """Say what a pipeline lacks to be run."""
-    for part, example in (("nodes", "display: {type: tonemap, …}"), ("outputs", "{image: display.color}")):
-        if not entries(tree, part) and not any(problem.code in ("RG101", "RG106") for problem in files.problems):
+    for part, example in (("nodes", "{display: {type: tonemap, …}}"), ("outputs", "{image: display.color}")):
+        if not entries(tree, part) and not files.problems:
             text = f"the pipeline has no {part}; add {part}: {example}"
             files.problems.append(tree.problem("RG125", text))
     for name, declared in entries(tree, "inputs").items():

@@ -32,7 +32,7 @@ class Files:
         self.limits = limits
         self.problems: list[Problem] = []
         self.notes: list[Problem] = []
-        self.sources: list[Source] = []
+        self.dropped: set[tuple[str, ...]] = set()
         self._roots: dict[Source, Roots] = {}
         self._open: list[Path] = []
         self._trees: dict[Path, Value | None] = {}
@@ -48,7 +48,7 @@ class Files:
         """Remember where a file may read from; its own surroundings where it was named by the user."""
         around = document.path or Path("x")
         self._roots[document.source] = roots or Roots.around(around, self.asset_roots)
-        self.sources.append(document.source)
+        self.dropped |= document.dropped
 
     def beside(self, value: Value) -> Path:
         """A path that a file's value holds, joined to the file's folder."""

@@ -82,7 +82,8 @@ class Flattener:
             if problem:
                 self.files.problems.append(problem)
             self._add(NodeSpec(node_id, "" if problem else word(node, "type") or "", scope, inputs, params, node))
-            if node_type is None or node_type.data is None:
+            said = ("nodes", name, "type") in self.files.dropped
+            if (node_type is None or node_type.data is None) and not said:
                 self._without_type(name, node)
             return node
         return self._composite(name, node, node_type, sub, scope, params, inputs, sets)
@@ -96,6 +97,7 @@ class Flattener:
         if path in self._open or len(self._open) >= MOST_NESTED:
             text = f"the sub-pipeline '{display(node_type.data)}' contains itself"
             self.files.problems.append(node_type.problem("RG123", text))
+            self.files.dropped.add(("nodes", name))
             return node
         sub = self._set_inside(sub, sets)
         declared_inputs, parameters = entries(sub, "inputs"), entries(sub, "parameters")
@@ -184,8 +186,10 @@ class Flattener:
                 return value
             used.add(match[1])
             if match[1] not in values:
-                text = f"the pipeline has no parameter '{match[1]}'{suggestion(match[1], values)}; '$$' writes a dollar"
-                self.files.problems.append(value.problem("RG119", text))
+                if ("parameters", match[1]) not in self.files.dropped:
+                    hint = suggestion(match[1], values) or "; declare it under `parameters`, or write '$$' for a dollar"
+                    text = f"the pipeline has no parameter '{match[1]}'{hint}"
+                    self.files.problems.append(value.problem("RG119", text))
                 return None
             found = values[match[1]]
             return None if found is None else value.with_data(found.data)

@@ -90,6 +90,7 @@ class PipelineSpec:
         tree: the resolved file, sub-pipelines in place of their names; prints as `to_yaml`.
         notes: warnings: what was dropped, what is unused.
         problems: mistakes found so far. `link` raises them together with its own, so that a user sees all at once.
+        dropped: paths of what was left out because of them.
     """
 
     name: str
@@ -105,6 +106,7 @@ class PipelineSpec:
     tree: Value = field(repr=False)
     notes: tuple[Problem, ...] = ()
     problems: tuple[Problem, ...] = ()
+    dropped: frozenset[tuple[str, ...]] = frozenset()
 
     def check(self) -> None:
         """Stop here if anything is wrong so far; for callers that do not go on to `link`.
