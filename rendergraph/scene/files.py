@@ -123,14 +123,19 @@ class Reading:
         for problem in problems:
             self._warnings.setdefault((problem.code, problem.text, str(problem.place)), problem)
 
+    def named(self, path: Path) -> str:
+        """A path for messages: relative to this file's folder where it lies below."""
+        folder = self.path.parent.resolve()
+        return shown(str(path.relative_to(folder) if path != self.path and path.is_relative_to(folder) else path))
+
     def error(self, code: str, text: str, *, line: int = 0, file: Path | None = None) -> InputError:
         """An error in this file, to be raised by the caller."""
         return InputError(Problem(code, text, Place(str(file or self.path), line, 1 if line else 0)))
 
-    def over(self, what: str, limit: str) -> InputError:
+    def over(self, what: str, limit: str, code: str = "RG307") -> InputError:
         """An error for a limit passed; names the limit."""
         most = getattr(self.limits, limit)
-        return self.error("RG307", f"{what}, the limit is {most:,}; --limit scene-{limit.replace('_', '-')}=N allows more")
+        return self.error(code, f"{what}, the limit is {most:,}; --limit scene-{limit.replace('_', '-')}=N allows more")
 
     def beside(self, name: str, *, line: int = 0, file: Path | None = None) -> Path:
         """The file `name` means, relative to this one, inside the roots; it need not exist.
@@ -157,13 +162,13 @@ class Reading:
         self.exists(path, what, line=line)
         try:
             if path.stat().st_size > self.limits.file_bytes:
-                raise self.over(f"{what} {shown(str(path))} has {path.stat().st_size:,} bytes", "file_bytes")
+                raise self.over(f"{what} '{self.named(path)}' has {path.stat().st_size:,} bytes", "file_bytes")
             return path.read_bytes()
         except (OSError, ValueError) as problem:
-            raise self.error("RG301", f"{what} '{shown(str(path))}' cannot be read: {reason(problem)}") from None
+            raise self.error("RG301", f"{what} '{self.named(path)}' cannot be read: {reason(problem)}") from None
 
-    def exists(self, path: Path, what: str, *, line: int = 0) -> None:
-        """Check that a path is a regular file that can be opened.
+    def exists(self, path: Path, what: str, *, line: int = 0, code: str = "RG301") -> None:
+        """Check that a path is a regular file.
 
         Raises:
             InputError: it is not.
@@ -172,8 +177,8 @@ class Reading:
         if kind == "file":
             return
         if path == self.path:
-            raise InputError(Problem("RG301", f"{what} '{shown(str(path))}' {_NOT[kind]}"))
-        raise self.error("RG301", f"{what} '{shown(str(path))}' {_NOT[kind]}", line=line)
+            raise InputError(Problem(code, f"{what} '{self.named(path)}' {_NOT[kind]}"))
+        raise self.error(code, f"{what} '{self.named(path)}' {_NOT[kind]}", line=line)
 
     def image(self, path: Path, what: str, *, line: int = 0) -> ImageSource:
         """An image file whose header is plausible.
@@ -183,13 +188,13 @@ class Reading:
         """
         if path in self._images:
             return self._images[path]
-        self.exists(path, what, line=line)
+        self.exists(path, what, line=line, code="RG350")
         try:
             size = path.stat().st_size
             with path.open("rb") as file:
                 head = file.read(image_header.HEAD_BYTES)
         except OSError as problem:
-            raise self.error("RG301", f"{what} '{shown(str(path))}' cannot be read: {reason(problem)}") from None
+            raise self.error("RG350", f"{what} '{self.named(path)}' cannot be read: {reason(problem)}") from None
         label = shown(path.name)
         self._check_header(head, size, f"{what} '{label}'", path.suffix, line)
         self._images[path] = ImageSource(path, None, label)
@@ -207,19 +212,21 @@ class Reading:
     def _check_header(self, head: bytes, size: int, what: str, suffix: str, line: int) -> None:
         try:
             facts = image_header.read(head, suffix)
+        except image_header.NoImageError as problem:
+            raise self.error("RG351", f"{what} {problem}", line=line) from None
         except ValueError as problem:
-            raise self.error("RG310", f"{what} {problem}", line=line) from None
+            raise self.error("RG352", f"{what} {problem}", line=line) from None
         if facts.width is None or facts.height is None:
             return
         if facts.width < 1 or facts.height < 1:
-            raise self.error("RG310", f"{what} is {facts.width}×{facts.height} texels", line=line)
+            raise self.error("RG352", f"{what} is {facts.width}×{facts.height} texels", line=line)
         if max(facts.width, facts.height) > self.limits.image_side:
-            raise self.over(f"{what} is {facts.width}×{facts.height} texels", "image_side")
+            raise self.over(f"{what} is {facts.width}×{facts.height} texels", "image_side", "RG353")
         decoded = facts.width * facts.height * facts.channels * facts.channel_bytes
         if decoded > self.limits.image_bytes:
-            raise self.over(f"{what} decodes to {decoded:,} bytes", "image_bytes")
+            raise self.over(f"{what} decodes to {decoded:,} bytes", "image_bytes", "RG353")
         if decoded > 64 << 20 and decoded > self.limits.image_ratio * size:
-            raise self.over(f"{what} decodes to {decoded:,} bytes from {size:,}", "image_ratio")
+            raise self.over(f"{what} decodes to {decoded:,} bytes from {size:,}", "image_ratio", "RG353")
 
 
 _NOT = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}

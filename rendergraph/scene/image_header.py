@@ -15,6 +15,10 @@ _MAGIC = {b"BM": "bmp", b"GIF8": "gif", b"II*\0": "tiff", b"MM\0*": "tiff", b"RI
 _BY_EXTENSION = {".tga", ".pnm", ".ppm", ".pgm", ".pfm", ".pic"}
 
 
+class NoImageError(ValueError):
+    """The bytes are those of something else."""
+
+
 @dataclass(frozen=True)
 class Header:
     """What the first bytes say; sizes are None where they do not."""
@@ -34,7 +38,8 @@ def read(head: bytes, suffix: str = "") -> Header:
         suffix: the file's extension, for formats that have no mark of their own.
 
     Raises:
-        ValueError: it is no image, or its header is broken; the text continues "the file …".
+        NoImageError: it is something else; the text continues "the file …".
+        ValueError: its header is broken; likewise.
     """
     if not head:
         raise ValueError("is empty")
@@ -49,7 +54,7 @@ def read(head: bytes, suffix: str = "") -> Header:
             return Header(name)
     if suffix.lower() in _BY_EXTENSION:
         return Header(suffix.lower()[1:])
-    raise ValueError("is no image that can be read (PNG, JPEG, HDR, EXR)")
+    raise NoImageError("is no image that can be read (PNG, JPEG, HDR, EXR)")
 
 
 def _png(head: bytes) -> Header:

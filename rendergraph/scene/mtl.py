@@ -104,7 +104,7 @@ def _map(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, reading:
         image = reading.image(file, "map", line=line)
         facts = image_header.read(file.open("rb").read(image_header.HEAD_BYTES), file.suffix)
     except InputError as problem:
-        if problem.problems[0].code in ("RG302", "RG307"):
+        if problem.problems[0].code in ("RG302", "RG353"):
             raise
         reading.warn("RG330", f"map {file}", f"{problem.problems[0].text}; it is left out", line=line, file=path)
         return

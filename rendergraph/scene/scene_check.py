@@ -99,6 +99,8 @@ class Checker:
 
 def _said(value: Value) -> str:
     data = value.data
+    if isinstance(data, list) and len(data) <= 8 and not any(isinstance(entry.data, list | dict) for entry in data):
+        return shown(str([entry.data for entry in data]))
     return f"'{shown(data)}'" if isinstance(data, str) else shown(data) if isinstance(data, int | float) else value.kind
 
 
@@ -106,11 +108,11 @@ def _number(value: Value, key: Key) -> tuple[Any, str | None]:
     wanted = "a whole number" if key.kind == "integer" else "a number"
     data = value.data
     if isinstance(data, bool) or not isinstance(data, int | float):
-        return None, wanted
+        return None, wanted + _limits(key)
     if key.kind == "integer" and not isinstance(data, int):
         return None, wanted
     if not _within(float(data), key):
-        return None, f"{wanted}{_limits(key)}"
+        return None, wanted + _limits(key)
     return (int(data) if key.kind == "integer" else float(data)), None
 
 
@@ -129,7 +131,7 @@ def _numbers(value: Value, key: Key) -> tuple[Any, str | None]:
         if isinstance(number, bool) or not isinstance(number, int | float):
             return None, wanted
         if not _within(float(number), key):
-            return None, f"{wanted}{_limits(key)}"
+            return None, wanted + _limits(key)
     result = tuple(float(number) for number in numbers if isinstance(number, int | float))
     return (*result, 1.0) if sizes == (3, 4) and len(result) == 3 else result, None
 
@@ -144,5 +146,5 @@ def _limits(key: Key) -> str:
     low = f"above {key.low:g}" if key.above else f"of at least {key.low:g}" if key.low > -math.inf else ""
     high = f"at most {key.high:g}" if key.high < math.inf else ""
     if not low and not high:
-        return ", and finite"
+        return "" if key.infinite else ", finite"
     return " " + " and ".join(filter(None, (low, high)))

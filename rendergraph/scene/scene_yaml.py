@@ -180,7 +180,7 @@ class _Reader:
         what = f"object '{shown(name)}'"
         shape, file = entry.get("shape"), entry.get("file")
         given = [value for value in (shape, file) if value is not None and value.data is not None]
-        if isinstance(entry.data, dict) and len(given) != 1:
+        if (entry.data is None or isinstance(entry.data, dict)) and len(given) != 1:
             self.check.say(entry, "RG321", f"{what} needs either 'shape' or 'file'", key=True)
         own: tuple[Key, ...] = ()
         if shape is not None and shape.data in SHAPES:
@@ -315,7 +315,8 @@ class _Reader:
             if key is None:
                 continue
             if not isinstance(entry.data, dict) or not entry.data:
-                self.check.say(entry, "RG321", f"keyframes of '{shown(path)}' are a mapping of seconds to values, not {entry.kind}")
+                what = "empty" if entry.data == {} else entry.kind
+                self.check.say(entry, "RG321", f"keyframes of '{shown(path)}' are {what}, not a mapping of seconds to values")
                 continue
             frames = []
             for time, value in entry.items():
