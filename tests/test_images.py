@@ -12,6 +12,7 @@ import sys
 import time
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -411,8 +412,8 @@ def test_broken_values_are_replaced_and_counted(tmp_path: Path) -> None:
     assert found[0, 0].tolist() == [0, 0, 0, 1]
     assert found[0, 1, :2].tolist() == [1, 65504]
     assert [str(problem) for problem in said] == [
-        "sky: warning: RG355 1 pixels are NaN or -inf and become 0; "
-        "4 pixels are infinite or beyond 65504 and become 65504"
+        "sky: warning: RG355 1 pixel is NaN or -inf, taken as 0; "
+        "4 pixels are infinite or beyond 65504, taken as 65504"
     ]
 
 
@@ -548,6 +549,20 @@ def test_hdr_headers_that_lie(tmp_path: Path, size: str, capfd: pytest.CaptureFi
     data = sample(tmp_path, "a.hdr").replace(b"-Y 33 +X 47", size.encode())
     (tmp_path / "a.hdr").write_bytes(data)
     refused(tmp_path / "a.hdr", capfd)
+
+
+def test_threads_decode_together_and_stderr_comes_back(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.png").write_bytes(sample(tmp_path, "a.png")[:5000])
+
+    def attempt(number: int) -> bool:
+        with contextlib.suppress(InputError):
+            return decode(ImageSource(tmp_path / ("a.png" if number % 2 else "bad.png")), srgb=False) is not None
+        return False
+
+    with ThreadPoolExecutor(8) as pool:
+        assert sum(pool.map(attempt, range(200))) == 100
+    os.write(2, b"still here")
+    assert capfd.readouterr().err == "still here"
 
 
 def test_limits_can_be_set(tmp_path: Path) -> None:

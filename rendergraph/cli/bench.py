@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
-from rendergraph.cli.output import emit, emit_json, megabytes, say, table
+from rendergraph.cli.output import emit, emit_json, megabytes, say, table, warn
 from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def command(frames: int, fps: float, no_alias: bool, as_json: bool, device: int 
     """
     pipeline = options.load(**selection)
     frame = pipeline.render(frames=range(1, frames + 1), fps=fps, alias=not no_alias, device=device)
+    warn(frame.warnings)
     report = measured(frame)
     emit_json(report) if as_json else emit(_text(report))
     if report["device"]["software"]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rendergraph.cli import options
 from rendergraph.cli.options import Target
-from rendergraph.cli.output import Progress, emit, emit_json, say
+from rendergraph.cli.output import Progress, emit, emit_json, say, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import Problem, UsageError
 
@@ -87,6 +87,7 @@ def command(
         device=device, on_frame=save,
     )  # fmt: skip
     progress.clear()
+    warn(frame.warnings)
     report = frame.as_json()
     _say_summary(report)
     if as_json:

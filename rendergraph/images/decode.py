@@ -144,7 +144,7 @@ class _Image:
 
         wanted = oiio.TypeDesc(kind) if kind else self.spec.format
         _check_size(self, len(channels), wanted.basesize())
-        with _quiet():
+        with _hush:
             pixels = self.handle.read_image(0, 0, channels.start, channels.stop, wanted)
         problem = _error_of(self.handle)
         if pixels is None or problem:
@@ -171,7 +171,7 @@ def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
             path = str(named)
         config = oiio.ImageSpec()
         config.attribute("oiio:UnassociatedAlpha", 1)
-        with _quiet():
+        with _hush:
             handle = oiio.ImageInput.open(path, config)
         if handle is None:
             _refuse(source, "RG352", f"the image is broken: {_plain(_error_of(oiio), path)}")
@@ -266,24 +266,40 @@ def _plain(problem: str, path: str) -> str:
     return "".join(c if c.isprintable() else "?" for c in line)[:200]
 
 
-_stderr_lock = threading.Lock()
+class _Hush:
+    """Keeps libpng from writing to stderr beside our message: it does so itself, past Python.
+
+    Images are decoded in several threads; the first one in redirects, the last one out restores.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._kept = -1
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._inside += 1
+            if self._inside > 1:
+                return
+            try:
+                self._kept = os.dup(2)
+            except OSError:  # no stderr at all
+                return
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, 2)
+            os.close(nowhere)
+
+    def __exit__(self, *problem: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0 and self._kept >= 0:
+                os.dup2(self._kept, 2)
+                os.close(self._kept)
+                self._kept = -1
 
 
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Keeps libpng from writing to stderr beside our message: it does so itself, past Python."""
-    with _stderr_lock, contextlib.ExitStack() as stack:
-        try:
-            kept = os.dup(2)
-        except OSError:  # no stderr at all
-            yield
-            return
-        stack.callback(os.close, kept)
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        stack.callback(os.close, nowhere)
-        os.dup2(nowhere, 2)
-        stack.callback(os.dup2, kept, 2)
-        yield
+_hush = _Hush()
 
 
 # --- pixels ----------------------------------------------------------------------------------------------------------
@@ -327,11 +343,15 @@ def _finite(image: _Image, pixels: Pixels, warn: Callable[[Problem], None] | Non
         return pixels
     unknown = int((np.isnan(pixels) | np.isneginf(pixels)).any(axis=-1).sum())
     large = int(np.isposinf(pixels).any(axis=-1).sum())
-    said = [f"{unknown} pixels are NaN or -inf and become 0"] if unknown else []
-    said += [f"{large} pixels are infinite or beyond {HALF_MAX:.0f} and become {HALF_MAX:.0f}"] if large else []
+    said = [f"{_pixels(unknown)} NaN or -inf, taken as 0"] if unknown else []
+    said += [f"{_pixels(large)} infinite or beyond {HALF_MAX:.0f}, taken as {HALF_MAX:.0f}"] if large else []
     if warn:
         warn(Problem("RG355", "; ".join(said), Place(_name(image.source)), severity="warning"))
     return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+
+
+def _pixels(count: int) -> str:
+    return f"{count} pixels are" if count != 1 else "1 pixel is"
 
 
 def _as_rgba(pixels: Pixels) -> Pixels:

@@ -54,6 +54,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         culled: node to the reason why it did not run.
         metadata: what goes into a picture file.
         times: what each frame so far took, step by step.
+        warnings: what was replaced in the scene's images.
     """
 
     number: int
@@ -68,6 +69,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
     culled: Mapping[str, str]
     metadata: Mapping[str, str] = field(default_factory=dict)
     times: tuple[FrameTimes, ...] = ()
+    warnings: tuple[Problem, ...] = ()
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if name not in self.arrays:

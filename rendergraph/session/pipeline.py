@@ -135,8 +135,9 @@ class Pipeline:
         Pipelines that ask for the same unchanged file share one scene, and so its place on the GPU.
         """
         from rendergraph.scene.animate import complete
+        from rendergraph.scene.files import Reading
         from rendergraph.scene.load import load
-        from rendergraph.scene.model import Environment, ImageSource, Scene
+        from rendergraph.scene.model import Environment, Scene
 
         file = self.spec.scene
         stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
@@ -146,7 +147,7 @@ class Pipeline:
         if found is None:
             scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check)
             if self.environment is not None:
-                image = ImageSource(self.environment, label=str(self.environment))
+                image = Reading(self.environment, lambda path, place: path).image(self.environment, "environment")
                 scene = replace(scene, environment=Environment(image))
             _SCENES[key] = found = complete(scene, self.camera)
         return found

@@ -17,13 +17,14 @@ from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.images import decode
 from rendergraph.scene import animate, pack
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.scene.model import Scene
+from rendergraph.scene.model import ImageSource, Scene
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.pipeline import Pipeline
 from rendergraph.textures import FORMATS, TextureDesc
 
 if TYPE_CHECKING:
     import moderngl
+    import numpy.typing as npt
 
     from rendergraph.expand import Expansion
     from rendergraph.link import Endpoint
@@ -53,6 +54,7 @@ class Session:
         self._scenes: dict[int, tuple[Scene, GpuScene]] = {}
         self._last: tuple[tuple[Any, ...], Executable, Runner] | None = None
         self._expansion: Expansion | None = None
+        self._image_warnings: list[Problem] = []
 
     def __enter__(self) -> Session:
         return self
@@ -160,8 +162,14 @@ class Session:
             for _, old in self._scenes.values():
                 old.release(self.programs)
             self._forget_executable()
-            self._scenes = {id(scene): (scene, GpuScene(self.device, scene, pack.pack(scene), _decode))}
+            self._image_warnings = []
+            self._scenes = {id(scene): (scene, GpuScene(self.device, scene, pack.pack(scene), self._decode))}
+            if pipeline.environment is not None and scene.environment is not None:
+                self._decode(scene.environment.image, False)  # named by the user: a broken one is said, used or not
         return self._scenes[id(scene)][1]
+
+    def _decode(self, source: ImageSource, srgb: bool) -> npt.NDArray[Any]:
+        return decode(source, srgb=srgb, warn=self._image_warnings.append)
 
     def _forget_executable(self) -> None:
         if self._last is not None:
@@ -199,6 +207,7 @@ class Session:
             culled=dict(plan.schedule.culled),
             metadata=self._metadata(pipeline),
             times=tuple(times),
+            warnings=tuple(dict.fromkeys(self._image_warnings)),
         )
 
     def _metadata(self, pipeline: Pipeline) -> dict[str, str]:
@@ -210,10 +219,6 @@ class Session:
             "rendergraph:versions": ", ".join(f"{name} {version(name)}" for name in names),
             "rendergraph:device": f"{self.device.renderer}, OpenGL {self.device.as_json()['version']}",
         }
-
-
-def _decode(source: Any, srgb: bool) -> Any:
-    return decode(source, srgb=srgb)
 
 
 def _structure(expansion: Expansion) -> tuple[Any, ...]:

@@ -76,6 +76,7 @@ class FakeFrame:
     def __init__(self, number: int) -> None:
         self.metadata = {"pipeline": "nodes: {}\n"}
         self.number = number
+        self.warnings: tuple[Any, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         return np.full((4, 6, 4), self.number / 10, np.float32)
