@@ -15,6 +15,7 @@ from rendergraph.errors import InputError
 from rendergraph.expand import Expansion
 from rendergraph.resources import folder
 from rendergraph.schedule import Schedule, schedule
+from rendergraph.schedule.dependencies import touched_ids
 from rendergraph.steps import FunctionBinding, Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -35,8 +36,8 @@ def writes(*ids: str, **extra: Any) -> tuple[Write, ...]:
     found = []
     for text in ids:
         id, _, version = text.partition(":")
-        load = "load" if int(version or 1) > 1 else "discard"
-        found.append(replace(Write(id.split(".")[1], id, int(version or 1), load=load), **extra))
+        write = Write(id.split(".")[1], id, int(version or 1), load="load" if int(version or 1) > 1 else "discard")
+        found.append(replace(write, **extra))
     return tuple(found)
 
 
@@ -48,7 +49,7 @@ def step(name: str, takes: tuple[str, ...] = (), makes: tuple[str, ...] = ()) ->
 
 def expansion(*steps: Step, image: str | None = None, sizes: dict[str, int] | None = None, **roles: str) -> Expansion:
     """Every resource is 1 MiB unless `sizes` says otherwise; what the last step writes is the picture."""
-    ids = {touch.resource: None for one in steps for touch in (*one.all_reads, *one.writes)}
+    ids = {id: None for one in steps for id in touched_ids(one)}
     shown = image or steps[-1].writes[-1].resource
     resources = {
         id: Resource(id, mebibytes((sizes or {}).get(id, 1)), roles.get(id.replace(".", "_"), "transient"))  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from rendergraph.allocate import allocate
 from rendergraph.expand import Expansion
 from rendergraph.schedule import schedule
 from rendergraph.steps import Read, Resource, Step, Write
-from rendergraph.textures import TextureDesc
+from rendergraph.textures import Kind, TextureDesc
 
 MIB = 1 << 20
 FORMATS = ("rgba8", "r11f_g11f_b10f", "rgba16f", "r8", "r32f", "depth32f", "rgba32f")
@@ -27,7 +27,7 @@ FORMATS = ("rgba8", "r11f_g11f_b10f", "rgba16f", "r8", "r32f", "depth32f", "rgba
 
 def texture(format: str, scale: float = 1.0, layers: int = 1, size: tuple[int, int] = (1920, 1080)) -> TextureDesc:
     """A texture at a factor of the picture's size."""
-    kind = "texture2d_array" if layers > 1 else "texture2d"
+    kind: Kind = "texture2d_array" if layers > 1 else "texture2d"
     return TextureDesc(kind, format, max(1, round(size[0] * scale)), max(1, round(size[1] * scale)), layers)
 
 
