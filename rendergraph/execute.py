@@ -20,7 +20,7 @@ from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import bounds
-from rendergraph.scene.model import Light, Mesh, Object, Scene, Vec3
+from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
 from rendergraph.steps import ViewMatrices
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -57,6 +57,11 @@ class FrameScene:
     def objects(self) -> tuple[Object, ...]:
         """Placed objects."""
         return self.scene.objects
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """What `Object.material` counts through."""
+        return self.scene.materials
 
     @property
     def meshes(self) -> tuple[Mesh, ...]:

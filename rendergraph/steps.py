@@ -527,7 +527,8 @@ class FrameScene(Protocol):
         lights: in the scene's order.
         bounds: least and greatest corner of what is drawn.
         objects: placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`.
-        meshes: what an object's `mesh` counts through.
+        meshes: what an object's `mesh` counts through; `box` is a mesh's least and greatest corner.
+        materials: what an object's `material` counts through.
     """
 
     @property
@@ -541,6 +542,9 @@ class FrameScene(Protocol):
 
     @property
     def meshes(self) -> Sequence[Any]: ...
+
+    @property
+    def materials(self) -> Sequence[Any]: ...
 
 
 class Frame(Protocol):
