@@ -34,7 +34,6 @@ float shadow(int light, vec3 position, vec3 normal) {
     for (int layer = 0; layer < MAP_LAYERS; ++layer) {
         if (MAP_LIGHTS[layer] != light) continue;
         vec3 to_light = to_viewer(MAP_VIEWS[layer], position);
-        if (dot(normal, to_light) <= 0.0) return 0.0;  // the surface itself is in the way
         vec3 place;
         if (place_in_layer(layer, position, normal, to_light, place)) return map_visibility(layer, place);
     }
