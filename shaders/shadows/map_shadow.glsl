@@ -6,6 +6,7 @@
 //
 // The offset: a receiver at the angle a to the light's plane is deeper by w tan(a) at the distance w in the map. Moving
 // the point by w sin(a) along its normal lifts it by just that much, so the offset vanishes where light falls straight on.
+// A face turned away from the light is moved away from it, and so lies behind what it belongs to.
 #ifndef MAP_VIEWS
 #define MAP_VIEWS shadow_map_views
 #define MAP_LIGHTS shadow_map_lights
@@ -19,7 +20,8 @@ uniform float normal_offset;  // factor on what the slope asks for
 bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out vec3 place) {
     View view = MAP_VIEWS[layer];
     float w = (view.view_projection * vec4(position, 1.0)).w;
-    float texel = 2.0 * w * view.viewport.z / view.projection[0][0];  // metres across at this distance
+    vec2 sides = view.viewport.zw / vec2(view.projection[0][0], view.projection[1][1]);
+    float texel = 2.0 * w * max(sides.x, sides.y);  // metres across at this distance
     float cosine = dot(normal, to_light);
     float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
     vec3 moved = position + texel * (normal * (normal_offset * MAP_HALF_WIDTH * sine) + to_light * bias);
