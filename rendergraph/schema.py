@@ -15,7 +15,7 @@ from rendergraph.textures import Signature
 
 Schema = dict[str, Any]
 
-_NAMES = {"pattern": NAME.pattern.replace("\\Z", "$")}
+_NAMES = {"pattern": "^" + NAME.pattern.replace("\\Z", "$")}
 _LINK: Schema = {"type": ["string", "null"], "description": "`node.port`, a node's id, or null for nothing."}
 _SIDE: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_SIDE}
 _OWN_WORDS = ("role", "unit", "glsl", "title")
@@ -88,7 +88,9 @@ def _node(types: Mapping[str, type[Node] | None]) -> Schema:
         {"$ref": "#"},
     ]
     found = _object(NODE_KEYS, {
-        "type": {"anyOf": [*known, *elsewhere, {"type": "null"}]}, "inputs": {"type": "object"}, "params": {"type": "object"},
+        "type": {"anyOf": [*known, *elsewhere, {"type": "null"}]},
+        "inputs": {"type": "object"},
+        "params": {"type": "object"},
     })  # fmt: skip
     found["allOf"] = [
         {
