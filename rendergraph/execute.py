@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
@@ -18,6 +17,7 @@ from rendergraph.errors import Problem, RenderError
 from rendergraph.expand import CAMERA
 from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
+from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import bounds
 from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
@@ -176,18 +176,20 @@ class Runner:
                 for call in step.calls:
                     call()
             return None
-        times = []
-        for number, step in enumerate(executable.steps[parity]):
-            query = executable.queries[number]
+        taken: list[tuple[str, float, Timer | None]] = []
+        for step, timer in zip(executable.steps[parity], executable.timers, strict=True):
+            draws = bool(step.all_draws)
             before = perf_counter()
-            scope: Any = query if step.draws else nullcontext()
-            with scope:
-                for call in step.calls:
-                    call()
-            times.append((step.step.node, perf_counter() - before, query if step.draws else None))
+            if draws:
+                timer.start()
+            for call in step.calls:
+                call()
+            if draws:
+                timer.stop()
+            taken.append((step.step.node, perf_counter() - before, timer if draws else None))
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        steps = tuple(StepTime(n, cpu * 1e3, _gpu_ms(q)) for n, cpu, q in times)
+        steps = tuple(StepTime(node, cpu * 1e3, timer.milliseconds() if timer else None) for node, cpu, timer in taken)
         return FrameTimes(frame_ms, steps)
 
     def activate(self) -> None:
@@ -231,12 +233,6 @@ class Runner:
         texels = textures.read(executable.device, executable.memory.texture(resource, parity))
         assert isinstance(desc, TextureDesc)
         return texels[0] if desc.kind == "texture2d" else texels
-
-
-def _gpu_ms(query: Any) -> float | None:
-    """Milliseconds of a time query; None where the driver has given its largest number instead of an answer."""
-    nanoseconds = query.elapsed if query is not None else 0xFFFFFFFF
-    return None if nanoseconds == 0xFFFFFFFF else nanoseconds * 1e-6
 
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:

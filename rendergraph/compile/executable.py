@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.views import ViewBuffers
     from rendergraph.gl.device import Device
+    from rendergraph.gl.timer import Timer
 
 Call = Callable[[], object]
 
@@ -107,7 +108,7 @@ class Executable:
         steps: compiled steps, a list a parity.
         statics: uniform writes that hold for the whole frame.
         sorters: called with the view tables when a view has changed: objects front to back.
-        queries: one time query a step.
+        timers: one a step.
         buffers: draw commands.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written before the next frame.
@@ -121,7 +122,7 @@ class Executable:
     steps: list[list[CompiledStep]]
     statics: list[Call] = field(default_factory=list)
     sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
-    queries: list[moderngl.Query] = field(default_factory=list)
+    timers: list[Timer] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
     vertex_arrays: Call = bool
     fresh: bool = True
@@ -180,7 +181,9 @@ class Executable:
         self.views.release()
         for buffer in self.buffers:
             buffer.release()
-        self.queries.clear()
+        for timer in self.timers:
+            timer.release()
+        self.timers.clear()
 
 
 def step_uniforms(step: Step) -> dict[str, Any]:

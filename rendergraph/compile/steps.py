@@ -24,6 +24,7 @@ from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
+from rendergraph.gl.timer import Timer
 from rendergraph.glsl import prefix
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
@@ -101,7 +102,7 @@ class _Compiler:
         made.sorters = list(self.geometry.sorters)
         made.buffers = list(self.geometry.buffers)
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
-        made.queries = [self.device.ctx.query(time=True) for _ in self.plan.schedule.steps]
+        made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
         made.assemble()
         return made
 

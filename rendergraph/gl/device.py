@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,6 +39,10 @@ class Device:
         if self._idle is None:
             self._idle = self.ctx.framebuffer([self.ctx.renderbuffer((1, 1))])
         self._idle.use()
+
+    def current(self) -> AbstractContextManager[Any]:
+        """Makes an owned context the thread's current one meanwhile; a borrowed one is the caller's matter."""
+        return self.ctx if self.owned else nullcontext()
 
     @property
     def renderer(self) -> str:
@@ -90,10 +97,24 @@ def open_device(index: int | None = None) -> Device:
 
 
 def borrow_device(ctx: moderngl.Context) -> Device:
-    """The caller's current context; it stays the caller's, and its state is set afresh each frame."""
-    import glcontext
+    """The caller's current context; it stays the caller's, and its state is set afresh each frame.
 
-    return wrap(ctx, glcontext.get_backend_by_name("egl")(mode="detect", glversion=330).load, owned=False)
+    Raises:
+        DeviceError: it is older than OpenGL 4.5, or no loader of GL functions is found.
+    """
+    return wrap(ctx, _system_loader(), owned=False)
+
+
+def _system_loader() -> Callable[[str], int]:
+    """The address of a GL function of whatever context is current."""
+    for library, name in (("libEGL.so.1", "eglGetProcAddress"), ("libGL.so.1", "glXGetProcAddressARB")):
+        try:
+            function = getattr(ctypes.CDLL(library), name)
+        except (OSError, AttributeError):
+            continue
+        function.argtypes, function.restype = [ctypes.c_char_p], ctypes.c_void_p
+        return lambda wanted: function(wanted.encode()) or 0
+    raise DeviceError(Problem("RG601", "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more"))
 
 
 def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:

@@ -66,11 +66,13 @@ class Session:
 
     def close(self) -> None:
         """Free everything; the context too, unless it was borrowed."""
-        self._forget_executable()
-        for _, scene in self._scenes.values():
-            scene.release(self.programs)
-        self._scenes.clear()
-        self.programs.release()
+        with self.device.current():
+            self.device.raw.glUseProgram(0)  # one in use would outlive its deletion
+            self._forget_executable()
+            for _, scene in self._scenes.values():
+                scene.release(self.programs)
+            self._scenes.clear()
+            self.programs.release()
         self.device.release()
 
     # Drawing ---------------------------------------------------------------------------------------------------------
@@ -95,8 +97,15 @@ class Session:
         """
         if threading.get_ident() != self._thread:
             raise RenderError(Problem("RG605", "a session must be used by the thread that made it; make one a thread"))
-        frames = range(1, 2) if frames is None else frames
         wanted = pipeline.wanted(outputs, taps)
+        with self.device.current():
+            return self._render(pipeline, wanted, outputs, taps, frames or range(1, 2), alias, poison, shuffle, fps, on_frame, warm_up)
+
+    def _render(
+        self, pipeline: Pipeline, wanted: Mapping[str, Endpoint], outputs: Sequence[str] | None, taps: Sequence[str],
+        frames: range, alias: bool, poison: bool, shuffle: int | None, fps: float,
+        on_frame: Callable[[Frame], None] | None, warm_up: bool,
+    ) -> Frame:  # fmt: skip
         executable, runner = self._prepare(pipeline, outputs, taps, alias, poison, shuffle)
         size = pipeline.graph.size
         times: list[FrameTimes] = []

@@ -1,0 +1,40 @@
+"""Time on the device, by queries around leaf steps (nested ones are an error in OpenGL)."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+
+from rendergraph.gl.device import Device
+
+_TIME_ELAPSED, _QUERY_RESULT = 0x88BF, 0x8866
+_NO_ANSWER = 1 << 40
+"""Nanoseconds, 18 minutes: a driver that has nothing to say answers with its largest number."""
+
+
+@dataclass(eq=False)
+class Timer:
+    """Measures what is drawn between `start` and `stop`."""
+
+    device: Device
+
+    def __post_init__(self) -> None:
+        self._glo = self.device.raw.make("glCreateQueries", _TIME_ELAPSED)
+
+    def start(self) -> None:
+        """Begin."""
+        self.device.raw.glBeginQuery(_TIME_ELAPSED, self._glo)
+
+    def stop(self) -> None:
+        """End; the answer comes when the device is done."""
+        self.device.raw.glEndQuery(_TIME_ELAPSED)
+
+    def milliseconds(self) -> float | None:
+        """What it took, None where the driver does not know; waits for the device."""
+        nanoseconds = ctypes.c_uint64()
+        self.device.raw.glGetQueryObjectui64v(self._glo, _QUERY_RESULT, ctypes.byref(nanoseconds))
+        return None if nanoseconds.value >= _NO_ANSWER else nanoseconds.value * 1e-6
+
+    def release(self) -> None:
+        """Free it."""
+        self.device.raw.delete("glDeleteQueries", self._glo)

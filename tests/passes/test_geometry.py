@@ -1,0 +1,170 @@
+"""Geometry steps: which objects, how they are culled, in what order, and how few calls draw them."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from rendergraph.api import ALPHA, Depth, Node, Output, Radiance, State, Steps, structural
+from rendergraph.errors import RenderError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import rendergraph as rg
+
+    Draw = Callable[..., rg.Frame]
+
+CAMERA = "cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 50}}\n"
+
+
+class Ids(Node):
+    """The object's number plus one, 0 where nothing is."""
+
+    color = Output(Radiance, format="r32f", clear=0.0, doc="Object.")
+    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    objects: str | tuple[str, ...] = structural(default="all", doc="Which.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(
+            "ids.frag", out={"color": self.color, "depth": self.depth}, objects=self.objects, materials="none"
+        )
+
+
+SHADERS = {"ids.frag": "flat in int v_object; out float color; void main() { color = float(v_object + 1); }"}
+TEXT = "nodes: {i: {type: ids}}\noutputs: {image: i.color}"
+BOXES = (
+    "objects:\n"
+    "  left: {shape: box, size: [1, 2, 1], at: [-0.5, 0, 0]}\n"
+    "  rightNS: {shape: box, size: [1, 2, 1], at: [0.5, 0, 0], casts_shadow: false}\n"
+    "  before: {shape: box, size: [0.5, 0.5, 0.5], at: [-0.5, 0, 1], material: thin}\n"
+    "materials: {thin: {alpha_mode: blend}}\n" + CAMERA
+)
+
+
+@pytest.mark.parametrize(
+    ("objects", "seen"),
+    [("all", {1, 2, 3}), ("opaque", {1, 2}), ("transparent", {0, 3}), ("casters", {0, 1}), (["before", "left"], {0, 1, 3})],
+)
+def test_a_step_draws_the_objects_it_names(draw: Draw, objects: Any, seen: set[int]) -> None:
+    text = f"nodes: {{i: {{type: ids, params: {{objects: {json.dumps(objects)}}}}}}}\noutputs: {{image: i.color}}"
+    image = draw(text, Ids, shaders=SHADERS, scene=BOXES, size=(16, 16))["image"]
+    assert {int(value) for value in np.unique(image)} == seen
+    if objects == "all":
+        assert image[8, 4, 0] == 3  # nearest wins, whatever the order of drawing
+        assert image[0, 0, 0] == 1
+        assert image[0, -1, 0] == 2
+
+
+def test_an_object_that_the_scene_lacks_is_named(draw: Draw) -> None:
+    text = "nodes: {i: {type: ids, params: {objects: [nobody]}}}\noutputs: {image: i.color}"
+    with pytest.raises(RenderError, match="node 'i' draws object 'nobody', which the scene does not have"):
+        draw(text, Ids, shaders=SHADERS, scene=BOXES)
+
+
+def _triangles(folder: Path, **material: Any) -> None:
+    """A glTF with one triangle that faces the camera, one that faces away, and one mirrored, which still faces it."""
+    points = np.array([[-1, -1, 0], [1, -1, 0], [-1, 1, 0]], np.float32)
+    (folder / "t.bin").write_bytes(points.tobytes() + np.array([0, 1, 2, 0, 2, 1], np.uint16).tobytes())
+    meshes = [
+        {"primitives": [{"attributes": {"POSITION": 0}, "indices": number, "material": 0}]} for number in (1, 2)
+    ]
+    gltf = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": "t.bin", "byteLength": 48}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"},
+            {"bufferView": 1, "byteOffset": 6, "componentType": 5123, "count": 3, "type": "SCALAR"},
+        ],
+        "materials": [material],
+        "meshes": meshes,
+        "cameras": [{"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 1, "znear": 0.1, "zfar": 9}}],
+        "nodes": [
+            {"mesh": 0, "translation": [-2, 0, 0]},
+            {"mesh": 1},
+            {"mesh": 0, "translation": [2, 0, 0], "scale": [-1, 1, 1]},
+            {"camera": 0, "translation": [0, 0, 5]},
+        ],
+        "scenes": [{"nodes": [0, 1, 2, 3]}],
+    }
+    (folder / "t.gltf").write_text(json.dumps(gltf))
+
+
+def test_back_faces_of_single_sided_materials_are_culled_and_mirrors_turn_the_winding(bench: Any) -> None:
+    pipeline = bench.pipeline(TEXT, Ids, shaders=SHADERS, size=(48, 16))
+    _triangles(bench.folder)
+    image = bench.session.render(pipeline.with_scene(bench.folder / "t.gltf"))["image"][..., 0]
+    assert image[12, 3] == 1
+    assert image[12, 19] == 0
+    assert image[12, 44] == 3
+    _triangles(bench.folder, doubleSided=True)
+    again = bench.pipeline(TEXT, Ids, shaders=SHADERS, size=(48, 16)).with_scene(bench.folder / "t.gltf")
+    assert bench.session.render(again)["image"][12, 19, 0] == 2
+
+
+class Blended(Node):
+    """Objects far to near, each blended over what is behind."""
+
+    color = Output(Radiance, format="rgba32f", clear=0.0, doc="Blended.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(
+            "blend.frag", objects="all", order="back_to_front", materials="none", state=State(blend=ALPHA, cull="back")
+        )
+
+
+BLEND = {"blend.frag": "flat in int v_object; out vec4 color; void main() { color = vec4(float(v_object + 1), 0, 0, 0.5); }"}
+
+
+@pytest.mark.parametrize(("eye", "expected"), [(5, 0.5 * 3 + 0.25 * 2 + 0.125), (-5, 0.5 * 1 + 0.25 * 2 + 0.125 * 3)])
+def test_back_to_front_follows_the_eye(draw: Draw, eye: float, expected: float) -> None:
+    scene = f"""objects:
+  a: {{shape: box, size: [2, 2, 0.1], at: [0, 0, -1]}}
+  b: {{shape: box, size: [2, 2, 0.1], at: [0, 0, 0], scale: [-1, 1, 1]}}
+  c: {{shape: box, size: [2, 2, 0.1], at: [0, 0, 1]}}
+cameras: {{main: {{eye: [0, 0, {eye}], target: [0, 0, 0], height: 2, near: 0.1, far: 50}}}}
+"""
+    text = "nodes: {b: {type: blended}}\noutputs: {image: b.color}"
+    image = draw(text, Blended, shaders=BLEND, scene=scene, size=(8, 8))["image"]
+    np.testing.assert_allclose(image[4, 4, 0], expected)
+
+
+def test_a_moving_eye_sorts_anew_within_one_run(draw: Draw) -> None:
+    scene = """objects:
+  a: {shape: box, size: [2, 2, 0.1], at: [0, 0, -1]}
+  b: {shape: box, size: [2, 2, 0.1], at: [0, 0, 1]}
+cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 50}}
+orbit: {camera: main, degrees_per_second: 180}
+"""
+    text = "nodes: {b: {type: blended}}\noutputs: {image: b.color}"
+    seen: list[float] = []
+    draw(
+        text, Blended, shaders=BLEND, scene=scene, size=(8, 8), frames=range(1, 3), fps=1.0,
+        on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])),
+    )  # fmt: skip
+    assert seen == [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2]
+
+
+def _grid(count: int) -> str:
+    side = int(np.ceil(np.sqrt(count)))
+    rows = [
+        f"  o{k}: {{shape: box, size: [0.05, 0.05, 0.05], at: [{(k % side + 0.5) * 2 / side - 1}, {(k // side + 0.5) * 2 / side - 1}, 0]}}"
+        for k in range(count)
+    ]
+    return "objects:\n" + "\n".join(rows) + "\n" + CAMERA
+
+
+def test_ten_objects_and_a_thousand_take_the_same_calls(bench: Any) -> None:
+    calls = []
+    for count in (10, 1000):
+        frame = bench.session.render(bench.pipeline(TEXT, Ids, shaders=SHADERS, scene=_grid(count), size=(64, 64)))
+        executable = bench.session._last[1]
+        calls.append([len(step.calls) for step in executable.steps[0]])
+        assert len(np.unique(frame["image"])) > 10
+    assert calls[0] == calls[1]

@@ -1,0 +1,127 @@
+"""Aliasing changes no picture: unaliased, aliased, poisoned and shuffled runs are bit-identical."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import rendergraph as rg
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Input, Internal, Node, Output, Radiance, Steps, define, param
+from rendergraph.resources import shipped_pipelines
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class Source(Node):
+    """A pattern."""
+
+    color = Output(Radiance, format="rgba16f", doc="Pattern.")
+    seed: float = param(default=1.0, doc="Variation.")
+
+
+class Mix(Node):
+    """Two inputs and a neighbour, through an internal texture of another format of the same texel class."""
+
+    a = Input(AnyTexel, doc="One.")
+    b = Input(AnyTexel, doc="Two.")
+    mixed = Output(Radiance, format="rgba16f", doc="Both.")
+    scratch = Internal(format="rg32f")
+    shift: int = define(default=1, min=0, max=5, doc="How far the neighbour is.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("narrow.frag", out=self.scratch, a=self.a)
+        steps.fullscreen("mix.frag", out=self.mixed, scratch=self.scratch, b=self.b)
+
+
+SHADERS = {
+    "source.frag": "uniform float seed; out vec4 color; void main() { color = fract(gl_FragCoord.xyxy * vec4(0.13, 0.37, 0.71, 0.29) * seed); }",
+    "narrow.frag": "uniform sampler2D a; out vec2 scratch; void main() { scratch = texelFetch(a, ivec2(gl_FragCoord.xy), 0).xz; }",
+    "mix.frag": """uniform sampler2D scratch; uniform sampler2D b; out vec4 mixed;
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy), size = textureSize(b, 0);
+            mixed = texelFetch(b, (p + SHIFT) % size, 0) * 0.5 + texelFetch(scratch, p, 0).xyxy * 0.25;
+        }""",
+}
+
+
+def _graph(parents: list[tuple[int, int, int]], outputs: list[int]) -> str:
+    lines = ["nodes:", "  n0: {type: source}", "  n1: {type: source, params: {seed: 2.5}}"]
+    for number, (a, b, shift) in enumerate(parents, start=2):
+        lines.append(
+            f"  n{number}: {{type: mix, inputs: {{a: n{a % number}.{_port(a % number)}, b: n{b % number}.{_port(b % number)}}}, "
+            f"params: {{shift: {shift}}}}}"
+        )
+    last = len(parents) + 1
+    shown = {last, *(n % (last + 1) for n in outputs)}
+    lines += ["outputs:", *(f"  o{n}: n{n}.{_port(n)}" for n in sorted(shown))]
+    return "\n".join(lines)
+
+
+def _port(number: int) -> str:
+    return "color" if number < 2 else "mixed"
+
+
+def _same(a: Mapping[str, Any], b: Mapping[str, Any]) -> None:
+    assert list(a) == list(b)
+    for name in a:
+        assert np.array_equal(a[name], b[name], equal_nan=False), name
+
+
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
+@given(
+    parents=st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30), st.integers(0, 5)), min_size=2, max_size=12),
+    outputs=st.lists(st.integers(0, 30), max_size=2),
+    seed=st.integers(0, 1000),
+)
+def test_random_graphs(bench: Any, parents: list[tuple[int, int, int]], outputs: list[int], seed: int) -> None:
+    pipeline = bench.pipeline(_graph(parents, outputs), Source, Mix, shaders=SHADERS)
+    plain = bench.session.render(pipeline, alias=False)
+    _same(plain, bench.session.render(pipeline, poison=True))
+    _same(plain, bench.session.render(pipeline, poison=True, shuffle=seed))
+
+
+@pytest.mark.parametrize("name", sorted(shipped_pipelines()))
+def test_shipped_pipelines(gl: rg.Session, name: str) -> None:
+    pipeline = rg.load(name, size=(48, 32))
+    plain = gl.render(pipeline, alias=False, frames=range(1, 3))
+    assert any(array.any() for array in plain.values())
+    _same(plain, gl.render(pipeline, poison=True, frames=range(1, 3)))
+    for seed in (1, 2):
+        _same(plain, gl.render(pipeline, poison=True, shuffle=seed, frames=range(1, 3)))
+
+
+def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
+    """The check of the check: release a texture one step before its last reader, and the poison must show."""
+    from rendergraph.compile import compile_plan
+    from rendergraph.execute import Runner
+    from rendergraph.scene.cameras import view_matrices
+
+    pipeline = bench.pipeline(_graph([(0, 1, 1), (2, 0, 2), (3, 1, 3)], []), Source, Mix, shaders=SHADERS)
+    session = bench.session
+    right = session.render(pipeline, poison=True)["o4"]
+    assert np.isfinite(right).all()
+    plan, views = pipeline.plan(), pipeline.expansion().views
+    caught = 0
+    cases = [(at, name) for at, names in plan.released.items() for name in names if at > 0]
+    for at, name in cases:
+        early = {p: tuple(n for n in names if n != name) for p, names in plan.released.items()}
+        early[at - 1] = (*early.get(at - 1, ()), name)
+        types = {node.id: node.type for node in pipeline.graph.nodes}
+        broken = compile_plan(
+            session.device, replace(plan, released=early), types, views, session._scene(pipeline), session.programs, poison=True
+        )
+        runner = Runner(broken, pipeline.graph)
+        camera = view_matrices(next(iter(pipeline.scene.cameras.values())), (16, 8))
+        runner.run(1, 0.0, 0.0, pipeline.scene, camera)
+        caught += not np.array_equal(runner.read("n4.mixed", 1), right)
+        broken.release()
+    session._forget_executable()
+    assert cases
+    assert caught == len(cases)

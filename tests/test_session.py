@@ -1,0 +1,99 @@
+"""Sessions: what a frame makes, what closing frees, borrowed contexts, frames and camera moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+import pytest
+
+import rendergraph as rg
+from rendergraph.errors import InputError
+from rendergraph.gl.raw import RawGL
+
+KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Program", "Query", "Renderbuffer")
+
+
+def living(raw: RawGL, most: int = 3000) -> dict[str, int]:
+    """How many GL objects of each kind exist."""
+    return {kind: sum(bool(getattr(raw, f"glIs{kind}")(name)) for name in range(1, most)) for kind in KINDS}
+
+
+def test_closing_a_session_frees_everything_it_made() -> None:
+    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)
+    session = rg.Session(ctx=ctx)
+    raw = session.device.raw
+    before = living(raw)
+    pipeline = rg.load("forward", size=(64, 36))
+    for variant in (pipeline, pipeline.set("shadows.taps", 1), pipeline.with_scene("spheres")):
+        session.render(variant)
+    assert living(raw) != before
+    session.close()
+    ctx.gc()
+    assert living(raw) == before
+    ctx.release()
+
+
+def test_frames_make_no_gl_object(gl: rg.Session) -> None:
+    pipeline = rg.load("forward-prepass", size=(64, 36))
+    counts: list[dict[str, int]] = []
+    gl.render(pipeline, frames=range(1, 5), on_frame=lambda frame: counts.append(living(gl.device.raw, 1500)))
+    assert counts[1] == counts[3]
+
+
+def test_a_borrowed_context_may_be_left_in_any_state_between_frames() -> None:
+    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)
+    with rg.Session(ctx=ctx) as session:
+        pipeline = rg.load("forward", size=(64, 36))
+        first = session.render(pipeline)["image"]
+        ctx.enable(moderngl.BLEND | moderngl.CULL_FACE)
+        ctx.front_face = "cw"
+        ctx.depth_func = ">"
+        session.device.raw.glBindTextureUnit(0, 0)
+        session.device.raw.glEnable(0x0B90)  # STENCIL_TEST
+        np.testing.assert_array_equal(session.render(pipeline)["image"], first)
+    assert ctx.error == "GL_NO_ERROR"
+    ctx.release()
+
+
+def test_an_orbit_moves_the_camera_and_frames_differ(gl: rg.Session, tmp_path: Any) -> None:
+    (tmp_path / "s.yaml").write_text(
+        "scene: 1\nobjects: {box: {shape: box, size: [1, 0.5, 0.2]}}\n"
+        "cameras: {main: {eye: [0, 1, 3], target: [0, 0, 0]}}\norbit: {camera: main, degrees_per_second: 90}\n"
+    )
+    seen: list[np.ndarray[Any, Any]] = []
+    pipeline = rg.load("forward", scene=tmp_path / "s.yaml", size=(32, 32))
+    gl.render(pipeline, frames=range(1, 6), fps=1.0, on_frame=lambda frame: seen.append(frame["image"]))
+    assert not np.array_equal(seen[0], seen[1])
+    difference = np.abs(seen[0].astype(float) - seen[4].astype(float))  # once around, but for rounding at edges
+    assert (difference > 2).mean() < 0.02
+
+
+def test_keyframes_move_objects_and_lights(gl: rg.Session, tmp_path: Any) -> None:
+    (tmp_path / "s.yaml").write_text(
+        "scene: 1\nobjects: {box: {shape: box, size: [1, 1, 1]}}\n"
+        "lights: {sun: {type: directional, direction: [0, 0, -1], intensity: 3}}\n"
+        "cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 4, near: 0.1, far: 50}}\n"
+        "keyframes: {objects.box.at: {0: [-1, 0, 0], 1: [1, 0, 0]}, lights.sun.intensity: {0: 3, 1: 1}}\n"
+    )
+    seen: list[np.ndarray[Any, Any]] = []
+    pipeline = rg.load("forward", scene=tmp_path / "s.yaml", size=(32, 32)).set("light.ambient", 0)
+    gl.render(pipeline, frames=range(1, 3), fps=1.0, on_frame=lambda frame: seen.append(frame["radiance"][..., 0]))
+    first, second = (array > 0 for array in seen)
+    np.testing.assert_array_equal(first, second[:, ::-1])
+    np.testing.assert_allclose(seen[0].max(), 3 * seen[1].max(), rtol=0.01)
+
+
+def test_unknown_outputs_and_taps_name_what_there_is(gl: rg.Session) -> None:
+    pipeline = rg.load("forward", size=(16, 16))
+    with pytest.raises(InputError, match=r"no output 'imgae'; did you mean 'image'"):
+        pipeline.render(outputs=["imgae"], session=gl)
+    with pytest.raises(InputError, match=r"RG206 --tap ligth.radiance: there is no node 'ligth'; did you mean 'light'"):
+        pipeline.render(taps=["ligth.radiance"], session=gl)
+
+
+def test_a_frame_shows_itself_in_a_notebook(gl: rg.Session) -> None:
+    frame = rg.load("forward", size=(16, 16)).render(session=gl)
+    assert frame._repr_png_().startswith(b"\x89PNG")
+    assert rg.load("forward")._repr_html_().lstrip().startswith("<svg")
