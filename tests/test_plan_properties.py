@@ -20,7 +20,9 @@ from hypothesis import strategies as st
 
 from rendergraph.allocate import ResourcePlan, allocate
 from rendergraph.expand import Expansion
+from rendergraph.resources import shipped_pipelines
 from rendergraph.schedule import Schedule, schedule
+from rendergraph.session.pipeline import load
 from rendergraph.steps import FunctionBinding, Read, Resource, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
 
@@ -311,6 +313,16 @@ def test_a_forgotten_reader_is_caught(base: Expansion, seed: int) -> None:
     if any(read.resource == id and read.version in first_versions and not read.previous for read in last_reads):
         with pytest.raises(AssertionError):
             assert_valid(replace(plan, released=released))
+
+
+@pytest.mark.parametrize("name", sorted(shipped_pipelines()))
+def test_shipped_pipelines_are_proven_and_valid(name: str) -> None:
+    base = load(name).expansion()
+    found = schedule(base)
+    assert found.proven
+    assert_legal(base, found)
+    for alias in (True, False):
+        assert_valid(allocate(found, alias=alias))
 
 
 def test_results_do_not_depend_on_the_hash_seed() -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 MOST_STEPS = 10_000
 # What a second of budget buys. Counts, so that a slow machine comes to the same schedule as a fast one, only later.
 MOVES_PER_SECOND = 150_000
-TOUCHES_PER_SECOND = 300_000
+TOUCHES_PER_SECOND = 100_000
 # Sets of steps are bit masks: beyond this the search would copy more than it decides.
 MOST_SEARCHED = 1_000
 
