@@ -40,7 +40,8 @@ class Bench:
         """Draw it; options of `pipeline` and of `Session.render` mixed."""
         own = {key: options.pop(key) for key in ("shaders", "scene", "size") if key in options}
         frame = self.session.render(self.pipeline(text, *classes, **own), **options)
-        assert self.session.device.raw.error() is None
+        with self.session.device.current():
+            assert self.session.device.raw.error() is None
         return frame
 
 

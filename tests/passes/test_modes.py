@@ -108,20 +108,20 @@ def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
     right = session.render(pipeline, poison=True)["o4"]
     assert np.isfinite(right).all()
     plan, views = pipeline.plan(), pipeline.expansion().views
+    types = {node.id: node.type for node in pipeline.graph.nodes}
+    camera = view_matrices(next(iter(pipeline.scene.cameras.values())), (16, 8))
     caught = 0
     cases = [(at, name) for at, names in plan.released.items() for name in names if at > 0]
     for at, name in cases:
         early = {p: tuple(n for n in names if n != name) for p, names in plan.released.items()}
         early[at - 1] = (*early.get(at - 1, ()), name)
-        types = {node.id: node.type for node in pipeline.graph.nodes}
-        broken = compile_plan(
-            session.device, replace(plan, released=early), types, views, session._scene(pipeline), session.programs, poison=True
-        )
-        runner = Runner(broken, pipeline.graph)
-        camera = view_matrices(next(iter(pipeline.scene.cameras.values())), (16, 8))
-        runner.run(1, 0.0, 0.0, pipeline.scene, camera)
-        caught += not np.array_equal(runner.read("n4.mixed", 1), right)
-        broken.release()
-    session._forget_executable()
+        wrong = replace(plan, released=early)
+        with session.device.current():
+            scene = session._scene(pipeline)
+            broken = compile_plan(session.device, wrong, types, views, scene, session.programs, poison=True)
+            runner = Runner(broken, pipeline.graph)
+            runner.run(1, 0.0, 0.0, pipeline.scene, camera)
+            caught += not np.array_equal(runner.read("n4.mixed", 1), right)
+            broken.release()
     assert cases
     assert caught == len(cases)
