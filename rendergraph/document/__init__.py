@@ -1,0 +1,87 @@
+"""YAML text to values that know where they stand.
+
+Values are built from PyYAML's parse events, not by its loaders: those forget an alias's own place, run user-chosen
+constructors, read YAML 1.1 scalars (`1e-3` as text, `no` as false) and die in many ways on hostile text. Here nothing
+is built but text, numbers, switches, null, lists and mappings, every one under a budget.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rendergraph.document.events import Limits, build, over_limit
+from rendergraph.document.scalars import scalar
+from rendergraph.document.values import BROKEN, Document, Source, Value, kind_of, shown
+from rendergraph.errors import InputError, Place, Problem
+
+
+def load(path: Path, *, limits: Limits = Limits(), keep_going: bool = False, name: str | None = None) -> Document:
+    """The values of a YAML file.
+
+    Args:
+        path: the file, opened as it is: whether it may be read is the caller's question.
+        limits: budgets.
+        keep_going: put mistakes that do not stop the reading into `Document.problems`.
+        name: how messages name it; the path as given by default.
+
+    Raises:
+        InputError: it cannot be read or is no YAML of ours; with all mistakes.
+    """
+    name = name or str(path)
+    raw = read_bytes(path, limits.bytes, name)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        good = Source(name, path, raw[: error.start].decode("utf-8-sig", "replace"))
+        line, column = good.at(len(good.text))
+        where = Place(name, line, column)
+        raise InputError(Problem("RG008", "the text is not UTF-8; save the file as UTF-8", where)) from None
+    return build(text, Source(name, path, text), limits, keep_going)
+
+
+def parse(
+    text: str, file: str = "<text>", *, path: Path | None = None, limits: Limits = Limits(), keep_going: bool = False
+) -> Document:
+    """The values of a YAML text.
+
+    Args:
+        text: the text.
+        file: how messages name it.
+        path: the file it comes from, to which its relative paths are relative.
+        limits: budgets.
+        keep_going: put mistakes that do not stop the reading into `Document.problems`.
+
+    Raises:
+        InputError: it is no YAML of ours; with all mistakes.
+    """
+    text = text.removeprefix("\ufeff")
+    return build(text, Source(file, path, text), limits, keep_going)
+
+
+def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
+    """The bytes of a regular file of at most `most` bytes.
+
+    Raises:
+        InputError: there is none, it is a folder or a device, it may not be read, or it is longer.
+    """
+    name = shown(name or str(path))
+    try:
+        if path.is_dir():
+            raise InputError(Problem("RG011", f"'{name}' is a folder, a file is needed"))
+        if path.exists() and not path.is_file():
+            raise InputError(Problem("RG011", f"'{name}' is not a regular file"))
+        with path.open("rb") as file:
+            raw = file.read(most + 1)
+    except FileNotFoundError:
+        raise InputError(Problem("RG011", f"there is no file '{name}'")) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise InputError(Problem("RG011", f"cannot read '{name}': {reason}")) from None
+    if len(raw) > most:
+        raise InputError(Problem("RG007", over_limit("bytes", most), Place(name)))
+    return raw
+
+
+__all__ = [
+    "BROKEN", "Document", "Limits", "Source", "Value", "kind_of", "load", "parse", "read_bytes", "scalar", "shown",
+]  # fmt: skip

@@ -1,0 +1,227 @@
+"""PyYAML's parse events to values, under budgets, with its complaints in words a user knows."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from rendergraph.document.scalars import scalar
+from rendergraph.document.values import BROKEN, Broken, Document, Scalar, Source, Value, kind_of, shown
+from rendergraph.errors import InputError, Place, Problem
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Budgets of one YAML file; each is a small multiple of what a person writes.
+
+    Attributes:
+        bytes: length of the text.
+        depth: lists and mappings inside each other; libyaml itself dies at about 25,000.
+        nodes: values after aliases are expanded.
+        aliases: uses of `*name`.
+    """
+
+    bytes: int = 2_000_000
+    depth: int = 64
+    nodes: int = 200_000
+    aliases: int = 1_000
+
+
+_MOST_PROBLEMS = 100
+_ILLEGAL = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_UNITS = {
+    "bytes": "is {} bytes long",
+    "depth": "is {} levels deep",
+    "nodes": "has {} values, aliases expanded",
+    "aliases": "has {} aliases",
+}
+
+
+def over_limit(what: str, limit: int) -> str:
+    """What to say about a text that passes one of its `Limits`."""
+    return f"the text {_UNITS[what].format(f'more than {limit:,}')}; --limit yaml-{what}=N allows more"
+
+
+class _Builder:
+    """Values from parse events; holds what several events share."""
+
+    def __init__(self, source: Source, limits: Limits) -> None:
+        self.source = source
+        self.limits = limits
+        self.problems: list[Problem] = []
+        self.anchors: dict[str, tuple[Value, int] | None] = {}
+        self.nodes = 0
+        self.aliases = 0
+
+    def say(self, code: str, text: str, mark: Any) -> None:
+        self.problems.append(self.source.problem(code, text, mark.line + 1, mark.column + 1))
+        if len(self.problems) >= _MOST_PROBLEMS:
+            raise InputError(self.problems)
+
+    def stop(self, code: str, text: str, mark: Any) -> InputError:
+        self.say(code, text, mark)
+        return InputError(self.problems)
+
+    def count(self, number: int, mark: Any) -> None:
+        self.nodes += number
+        if self.nodes > self.limits.nodes:
+            raise self.stop("RG007", over_limit("nodes", self.limits.nodes), mark)
+
+    def build(self, parser: Any, event: Any, depth: int, key: tuple[int, int] | None = None) -> Value:
+        import yaml
+
+        mark = event.start_mark
+        line, column = mark.line + 1, mark.column + 1
+        if isinstance(event, yaml.AliasEvent):
+            return self.alias(event, key)
+        before = self.nodes
+        self.count(1, mark)
+        if event.tag:
+            self.say("RG004", f"the tag '{shown(event.tag)}' is not allowed; values have no types but their own", mark)
+        if isinstance(event, yaml.ScalarEvent):
+            value = Value(self.scalar(event), self.source, line, column, key)
+        else:
+            if depth >= self.limits.depth:
+                raise self.stop("RG007", over_limit("depth", self.limits.depth), mark)
+            if event.anchor:
+                self.anchors[event.anchor] = None  # open: a use inside would be a cycle
+            items: list[Value] | dict[Any, Value] = [] if isinstance(event, yaml.SequenceStartEvent) else {}
+            value = Value(items, self.source, line, column, key)
+            if isinstance(items, list):
+                while not isinstance(following := parser.get_event(), yaml.SequenceEndEvent):
+                    items.append(self.build(parser, following, depth + 1))
+            else:
+                while not isinstance(following := parser.get_event(), yaml.MappingEndEvent):
+                    self.entry(parser, following, depth + 1, items)
+        if event.tag:
+            value.data = BROKEN
+        if event.anchor:
+            self.anchors[event.anchor] = (value, self.nodes - before)
+        return value
+
+    def entry(self, parser: Any, event: Any, depth: int, into: dict[Any, Value]) -> None:
+        mark = event.start_mark
+        merge = getattr(event, "value", None) == "<<" and event.implicit[0]
+        name = self.build(parser, event, depth).data
+        value = self.build(parser, parser.get_event(), depth, (mark.line + 1, mark.column + 1))
+        if merge:
+            self.say("RG003", "merge keys ('<<') are not allowed; use `extends`, or write the values out", mark)
+        elif name is BROKEN:
+            pass
+        elif isinstance(name, bool) or not isinstance(name, str | int | float) or name != name:
+            self.say("RG009", f"a key must be text or a number, this is {kind_of(name)}", mark)
+        elif name in into:
+            first = into[name].key_line
+            self.say("RG002", f"the key '{shown(name)}' stands here twice, first in line {first}; remove one", mark)
+        else:
+            into[name] = value
+
+    def alias(self, event: Any, key: tuple[int, int] | None) -> Value:
+        mark = event.start_mark
+        self.aliases += 1
+        if self.aliases > self.limits.aliases:
+            raise self.stop("RG007", over_limit("aliases", self.limits.aliases), mark)
+        found = self.anchors.get(event.anchor)
+        place = (self.source, mark.line + 1, mark.column + 1, key)
+        if found is None:
+            name = shown(event.anchor)
+            inside = event.anchor in self.anchors
+            reason = "contains itself" if inside else f"has no anchor '&{name}' before it"
+            self.say("RG006", f"the alias '*{name}' {reason}", mark)
+            return Value(BROKEN, *place)
+        value, size = found
+        self.count(size, mark)
+        return Value(value.data, *place)
+
+    def scalar(self, event: Any) -> Scalar | Broken:
+        # Plain or quoted is asked of `implicit`: tag and style are '' in the C parser where they are None in the other.
+        if not event.implicit[0]:
+            return str(event.value)
+        try:
+            return scalar(event.value)
+        except ValueError as error:
+            self.say("RG010", f"{error}", event.start_mark)
+            return BROKEN
+
+
+def build(text: str, source: Source, limits: Limits, keep_going: bool) -> Document:
+    """The values of a text.
+
+    Args:
+        text: without a byte order mark.
+        source: where it stands.
+        limits: budgets.
+        keep_going: leave mistakes that do not stop the reading to the caller.
+
+    Raises:
+        InputError: it is no YAML of ours.
+    """
+    import yaml
+
+    if len(text) > limits.bytes or len(text.encode("utf-8", "surrogatepass")) > limits.bytes:
+        raise InputError(Problem("RG007", over_limit("bytes", limits.bytes), Place(source.name)))
+    illegal = _ILLEGAL.search(text)
+    if illegal:
+        what = f'the character U+{ord(illegal[0]):04X} is not allowed in YAML; remove it, or write it as "\\u…"'
+        raise InputError(source.problem("RG008", what, *source.at(illegal.start())))
+    builder = _Builder(source, limits)
+    try:
+        parser: Any = _parser(text)
+        parser.get_event()  # the stream's start
+        event = parser.get_event()
+        if isinstance(event, yaml.StreamEndEvent):
+            return Document(Value(None, source, 1, 1), source)
+        root = builder.build(parser, parser.get_event(), 0)
+        parser.get_event()  # the document's end
+        event = parser.get_event()
+        if not isinstance(event, yaml.StreamEndEvent):
+            builder.say("RG005", "a file holds one document; remove everything from '---' on", event.start_mark)
+    except yaml.MarkedYAMLError as error:
+        raise InputError([*builder.problems, _syntax(source, error)]) from None
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, RecursionError) as error:
+        # PyYAML leaks these on some malformed text.
+        reason = shown(str(error).splitlines()[0] if str(error) else type(error).__name__)
+        raise InputError([*builder.problems, source.problem("RG001", f"not valid YAML: {reason}")]) from None
+    if builder.problems and not keep_going:
+        raise InputError(builder.problems)
+    return Document(root, source, tuple(builder.problems))
+
+
+def _parser(text: str) -> object:
+    try:
+        from yaml.cyaml import CParser  # type: ignore[attr-defined]  # the stubs leave it out
+    except ImportError:  # PyYAML built without libyaml: the same events, ten times slower
+        from yaml import SafeLoader
+
+        return SafeLoader(text)
+    return CParser(text)
+
+
+def _syntax(source: Source, error: Any) -> Problem:
+    """PyYAML's complaint in our words: its own name tokens, differ between its two parsers, and point at the end."""
+    mark = error.problem_mark or error.context_mark
+    problem, context = error.problem or "", error.context or ""
+    line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
+    char = source.line(line)[column - 1 : column] if line else ""
+    start = error.context_mark
+    if "mapping values are not allowed" in problem:
+        what = "a ':' cannot stand here; quote the text that holds it, or start a new line with the right indentation"
+    elif "cannot start any token" in problem and char == "\t":
+        what = "a tab cannot indent; use spaces"
+    elif "cannot start any token" in problem:
+        what = f"text cannot start with '{shown(char)}'; put it in quotes"
+    elif "quoted scalar" in context and "end of stream" in problem:
+        what, mark = "the quote that starts here is not closed", start or mark
+    elif "flow sequence" in context:
+        what, mark = "the '[' that starts here has no ']' or lacks a comma", start or mark
+    elif "flow mapping" in context:
+        what, mark = "the '{' that starts here has no '}' or lacks a comma", start or mark
+    elif "expected ':'" in problem:
+        what, mark = "this key has no ':'", start or mark
+    elif "block" in context:
+        what = "this does not fit what is above; check the indentation"
+    else:
+        what = shown(" ".join((f"{context}: " * bool(context) + problem).split()), 120)
+    line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
+    return source.problem("RG001", f"not valid YAML: {what}", line, column)

@@ -1,0 +1,230 @@
+"""Values with their places, and the sources they stand in."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from rendergraph.errors import Place, Problem
+
+Scalar: TypeAlias = "str | int | float | bool | None"
+Key: TypeAlias = "str | int | float"
+Data: TypeAlias = "Scalar | list[Value] | dict[Any, Value] | Broken"
+
+_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # what YAML takes for the end of a line
+_LONGEST_LINE = 400
+
+
+@dataclass(eq=False)
+class Source:
+    """Where values come from: a file, or an option of the command line.
+
+    Attributes:
+        name: how messages name it.
+        path: the file, None where there is none.
+        text: its text, to show the line of a mistake.
+    """
+
+    name: str
+    path: Path | None = None
+    text: str = field(default="", repr=False)
+
+    @cached_property
+    def _starts(self) -> list[int]:
+        return [0, *(match.end() for match in _BREAK.finditer(self.text))]
+
+    def line(self, number: int) -> str:
+        """The text of a line, from 1; empty where there is none or where it is too long to show."""
+        if not 0 < number <= len(self._starts):
+            return ""
+        text = self.text[self._starts[number - 1] : self._starts[number - 1] + _LONGEST_LINE + 1]
+        text = _BREAK.split(text, maxsplit=1)[0]
+        return text if len(text) <= _LONGEST_LINE and text.expandtabs(1).isprintable() else ""
+
+    def at(self, offset: int) -> tuple[int, int]:
+        """Line and column, from 1, of a character."""
+        line = bisect_right(self._starts, offset)
+        return line, offset - self._starts[line - 1] + 1
+
+    def problem(self, code: str, text: str, line: int = 0, column: int = 0) -> Problem:
+        """A mistake in this source."""
+        return Problem(code, text, Place(self.name, line, column), self.line(line))
+
+
+class Broken:
+    """What stands for a value that is wrong and has been reported, where the reading goes on."""
+
+    def __repr__(self) -> str:
+        return "BROKEN"
+
+
+BROKEN = Broken()
+
+
+class Value:
+    """One value of a document with its place; `data` holds further `Value`s in mappings and lists.
+
+    Attributes:
+        data: a scalar, a list of values, or a dict of values; `BROKEN` in a document with problems.
+        source: the file it stands in.
+        line, column: where it starts, from 1; 0 where the source has no lines.
+        key_line, key_column: where its key starts, the value's own place where it has none.
+    """
+
+    __slots__ = ("column", "data", "key_column", "key_line", "line", "source")
+
+    def __init__(
+        self,
+        data: Data,
+        source: Source,
+        line: int = 0,
+        column: int = 0,
+        key: tuple[int, int] | None = None,
+    ) -> None:
+        self.data = data
+        self.source = source
+        self.line = line
+        self.column = column
+        self.key_line, self.key_column = key or (line, column)
+
+    def __repr__(self) -> str:
+        return f"Value({self.data!r}, {self.place})"
+
+    @property
+    def place(self) -> Place:
+        """Where the value starts."""
+        return Place(self.source.name, self.line, self.column)
+
+    @property
+    def key_place(self) -> Place:
+        """Where its key starts."""
+        return Place(self.source.name, self.key_line, self.key_column)
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words for messages."""
+        return kind_of(self.data)
+
+    def with_data(self, data: Data) -> Value:
+        """The same place with other contents."""
+        return Value(data, self.source, self.line, self.column, (self.key_line, self.key_column))
+
+    def problem(self, code: str, text: str, *, key: bool = False) -> Problem:
+        """A mistake at this value, or at its key."""
+        line, column = (self.key_line, self.key_column) if key else (self.line, self.column)
+        return self.source.problem(code, text, line, column)
+
+    def items(self) -> Iterator[tuple[Any, Value]]:
+        """Keys and values of a mapping, nothing for anything else."""
+        return iter(self.data.items() if isinstance(self.data, dict) else ())
+
+    def get(self, *path: Key) -> Value | None:
+        """The value that lies at a path of keys and positions, or None."""
+        found: Value = self
+        for step in path:
+            data = found.data
+            if isinstance(data, dict) and step in data:
+                found = data[step]
+            elif isinstance(data, list) and step in range(len(data)):
+                found = data[int(step)]
+            else:
+                return None
+        return found
+
+    def plain(self) -> Any:
+        """The same as Python's own dict, list and scalars; what an alias repeats is one object, not copies."""
+        return _plain(self, {})
+
+
+def _plain(value: Value, seen: dict[int, Any]) -> Any:
+    data = value.data
+    if not isinstance(data, dict | list):
+        return data
+    # An alias's value shares `data` with its anchor's, so that a bomb of aliases costs what its text costs.
+    if id(data) not in seen:
+        seen[id(data)] = (
+            {key: _plain(child, seen) for key, child in data.items()}
+            if isinstance(data, dict)
+            else [_plain(child, seen) for child in data]
+        )
+    return seen[id(data)]
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """The values of one YAML file.
+
+    Attributes:
+        root: the outermost value.
+        source: the file.
+        problems: mistakes that did not stop the reading, where the caller asked to keep going.
+        dropped: paths of what was left out because it was wrong, so that nobody complains that it is missing.
+    """
+
+    root: Value
+    source: Source
+    problems: tuple[Problem, ...] = ()
+    dropped: frozenset[tuple[str, ...]] = frozenset()
+
+    @property
+    def file(self) -> str:
+        """How messages name the file."""
+        return self.source.name
+
+    @property
+    def path(self) -> Path | None:
+        """The file, None for text without one."""
+        return self.source.path
+
+    @cached_property
+    def value(self) -> Any:
+        """Everything as plain Python data; not to be changed, for aliases share it."""
+        return self.root.plain()
+
+    def place(self, path: Sequence[Key] = (), *, key: bool = False) -> Place:
+        """Where the value at a path of keys and positions starts, or its key.
+
+        The nearest place that exists stands in for a path that does not.
+        """
+        found, rest = self._nearest(path)
+        return found.key_place if key and not rest else found.place
+
+    def problem(self, code: str, text: str, path: Sequence[Key] = (), *, key: bool = False) -> Problem:
+        """A mistake at the value of a path, or at its key, with the line it stands in."""
+        found, rest = self._nearest(path)
+        return found.problem(code, text, key=key and not rest)
+
+    def _nearest(self, path: Sequence[Key]) -> tuple[Value, bool]:
+        found = self.root
+        for position, step in enumerate(path):
+            child = found.get(step)
+            if child is None:
+                return found, position < len(path)
+            found = child
+        return found, False
+
+
+def kind_of(data: object) -> str:
+    """What a value is, in words for messages."""
+    if data is None:
+        return "null"
+    if isinstance(data, bool):
+        return "true" if data else "false"
+    if isinstance(data, str):
+        return "text"
+    if isinstance(data, int | float):
+        return "a number"
+    return "a mapping" if isinstance(data, Mapping) else "a list"
+
+
+def shown(text: object, most: int = 60) -> str:
+    """Text of a user's for a message: one line, no control characters, not too long."""
+    word = str(text)
+    if len(word) > most:
+        word = word[: most - 1] + "…"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in word)
