@@ -50,11 +50,15 @@ def schema(catalog: Catalog) -> Schema:
         **_object(TOP_KEYS, properties),
         "definitions": {
             "parameter": _object(PARAMETER_KEYS, {
-                "default": {"description": "Its value where nothing sets it."}, "min": {"type": "number"},
-                "max": {"type": "number"}, "doc": {"type": "string"},
+                "default": {"description": "Its value where nothing sets it."},
+                "min": {"type": "number", "description": "Least legal value."},
+                "max": {"type": "number", "description": "Greatest legal value."},
+                "doc": {"type": "string", "description": "What it does, in a line."},
             }),
             "input": _object(INPUT_KEYS, {
-                "semantic": {"type": "string"}, "optional": {"type": "boolean"}, "doc": {"type": "string"},
+                "semantic": {"type": "string", "description": "What its texels mean, such as `radiance`."},
+                "optional": {"type": "boolean", "description": "Whether it may stay unconnected."},
+                "doc": {"type": "string", "description": "What it is for, in a line."},
             }),
             "node": _node(types),
         },
@@ -88,9 +92,9 @@ def _node(types: Mapping[str, type[Node] | None]) -> Schema:
         {"$ref": "#"},
     ]
     found = _object(NODE_KEYS, {
-        "type": {"anyOf": [*known, *elsewhere, {"type": "null"}]},
-        "inputs": {"type": "object"},
-        "params": {"type": "object"},
+        "type": {"anyOf": [*known, *elsewhere, {"type": "null"}], "description": "A node type, or a pipeline file."},
+        "inputs": {"type": "object", "description": "Input to `node.port`, to a node's id, or to null for nothing."},
+        "params": {"type": "object", "description": "Parameter to value; null is its default."},
     })  # fmt: skip
     found["allOf"] = [
         {

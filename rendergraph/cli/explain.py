@@ -87,14 +87,93 @@ def _indented(text: object) -> str:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
-def file_keys(kind: str) -> list[dict[str, str]]:
-    """Every key of a pipeline or scene file: `key` as a dotted path, `type` and `doc`."""
-    raise NotImplementedError(kind)
+def file_keys(kind: str) -> list[dict[str, Any]]:
+    """Every key of a pipeline or scene file, section by section."""
+    return _scene_keys() if kind == "scene" else _pipeline_keys()
 
 
-def _keys_text(kind: str, keys: list[dict[str, str]]) -> str:
-    head = f"A {kind} file: a mapping of these keys, all optional unless said."
-    return f"{head}\n\n" + table([(row["key"], row["type"], row["doc"]) for row in keys], ("key", "value", "meaning"))
+def _scene_keys() -> list[dict[str, Any]]:
+    from rendergraph.scene.scene_keys import keys
+
+    return [
+        {
+            "section": section,
+            "key": key.name,
+            "value": _value_words(key),
+            "default": list(key.default) if isinstance(key.default, tuple) else key.default,
+            "unit": key.unit,
+            "required": key.required,
+            "doc": key.doc,
+        }
+        for section, members in keys().items()
+        for key in members
+    ]
+
+
+def _value_words(key: Any) -> str:
+    if key.kind == "choice":
+        return " | ".join(key.choices)
+    if key.kind == "vector":
+        return f"[{key.size} numbers]"
+    return _KINDS.get(key.kind, str(key.kind))
+
+
+_KINDS = {
+    "flag": "true | false", "map": "mapping", "link": "name", "integer": "whole number",
+    "color": "[r, g, b]", "scale": "number | [x, y, z]", "file": "path",
+}  # fmt: skip
+
+
+def _pipeline_keys() -> list[dict[str, Any]]:
+    from rendergraph.catalog import Catalog
+    from rendergraph.schema import schema
+
+    found = schema(Catalog({}))
+    parts = found["definitions"]
+    sections = {"": found, "nodes": parts["node"], "parameters": parts["parameter"], "inputs": parts["input"]}
+    return [
+        {
+            "section": section,
+            "key": name,
+            "value": _schema_words(entry),
+            "default": None,
+            "unit": "",
+            "required": False,
+            "doc": entry["description"],
+        }
+        for section, part in sections.items()
+        for name, entry in part["properties"].items()
+    ]
+
+
+def _schema_words(entry: dict[str, Any]) -> str:
+    if "const" in entry:
+        return str(entry["const"])
+    types = entry.get("type", "string" if "anyOf" in entry else "any value")
+    word = next(word for word in ([types] if isinstance(types, str) else types) if word != "null")
+    if word == "array":
+        return f"[{len(entry['items'])} numbers]"
+    names = {"string": "text", "object": "mapping", "integer": "whole number", "boolean": "true | false"}
+    return names.get(word, word)
+
+
+def _keys_text(kind: str, keys: list[dict[str, Any]]) -> str:
+    parts = [f"Every key of a {kind} file. All are optional unless it is said."]
+    for section in dict.fromkeys(row["section"] for row in keys):
+        rows = [
+            (row["key"], row["value"], row["unit"], _default(row), row["doc"])
+            for row in keys
+            if row["section"] == section
+        ]
+        parts.append((f"{section}\n" if section else "") + _block(rows))
+    parts.append("`rendergraph config forward` prints a pipeline." if kind == "pipeline" else "")
+    return "\n\n".join(filter(None, parts))
+
+
+def _default(row: dict[str, Any]) -> str:
+    if row["required"]:
+        return "required"
+    return "" if row["default"] is None else _value(row["default"])
 
 
 # --- nodes -----------------------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ def command(
       rendergraph run forward
       rendergraph run forward --scene spheres --size 640x360 -o spheres.exr --json
       rendergraph run forward -s light.ambient=0 -o image=dark.jpg --tap sun.shadow_map=depth.exr
-      rendergraph run forward --frames 1-3 -o turn.####.png
+      rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
     """
     from rendergraph import images
 

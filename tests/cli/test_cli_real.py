@@ -1,0 +1,247 @@
+"""Whole command lines with nothing replaced: what a user does and sees."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from rendergraph import images
+from rendergraph.cli.app import VERBS
+from rendergraph.resources import folder
+
+SMALL = ("--size", "64x36")
+
+
+def examples(cli: Any, *verb: str) -> list[list[str]]:
+    text = cli(*verb, "--help").out.partition("Examples:")[2].partition("Options:")[0]
+    return [shlex.split(line)[1:] for line in text.splitlines() if line.strip().startswith("rendergraph ")]
+
+
+@pytest.mark.parametrize("verb", ["", *VERBS])
+def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> None:
+    if verb == "config":
+        assert cli("run", "forward", *SMALL).code == 0
+    (tmp_path / "my.yaml").write_text("extends: forward\n")
+    found = examples(cli, *filter(None, [verb]))
+    assert found
+    for words in found:
+        result = cli(*words)
+        assert result.code == 0, (words, result)
+        assert bool(result.out) == (words[0] != "check" or "--json" in words), words
+        if "--json" in words:
+            assert isinstance(result.json, dict)
+
+
+def test_run_json_has_the_contract_s_fields(cli: Any) -> None:
+    report = cli("run", "forward", *SMALL, "-o", "a.exr", "--json").json
+    assert report["pipeline"] == "forward"
+    assert isinstance(report["device"]["software"], bool)
+    assert report["size"] == [64, 36]
+    assert [entry["node"] for entry in report["passes"]] == ["sun", "light"]
+    for entry in report["passes"]:
+        assert set(entry) == {"node", "type", "gpu_ms", "cpu_ms"}
+    assert set(report["frame_ms"]) == {"median", "min", "max"}
+    memory = {"no_reuse_bytes", "allocated_bytes", "lower_bound_bytes", "peak_node", "proven", "tier"}
+    assert memory <= set(report["memory"])
+    assert report["outputs"] == ["a.exr"]
+
+
+def test_a_picture_gives_its_pipeline_back(cli: Any, tmp_path: Path) -> None:
+    for name in ("a.exr", "a.png"):
+        assert cli("run", "forward", *SMALL, "-s", "light.ambient=0.25", "-o", name).code == 0
+        text = cli("config", name).out
+        assert "ambient: 0.25" in text
+        (tmp_path / "again.yaml").write_text(text)
+        assert cli("run", "again.yaml", "-o", f"b{name[1:]}").code == 0
+        assert np.array_equal(images.read(name), images.read(f"b{name[1:]}"))
+        told = cli("config", name, "--json").json
+        assert yaml.safe_load(told["yaml"])["nodes"]["light"]["params"]["ambient"] == 0.25
+        assert {"versions", "device"} <= set(told["metadata"])
+
+
+def test_a_picture_that_says_nothing_is_told(cli: Any) -> None:
+    cli("run", "forward", *SMALL, "-o", "a.jpg")
+    result = cli("config", "a.jpg")
+    assert result.code == 3
+    assert result.err.startswith("a.jpg: RG510 the picture does not say how it was made")
+    assert cli("config", "none.png").err == "none.png: RG350 there is no such image\n"
+
+
+def test_test_modes_change_no_pixel(cli: Any) -> None:
+    cli("run", "forward-prepass", *SMALL, "-o", "a.exr")
+    for mode in (["--no-alias"], ["--poison"], ["--shuffle", "3"]):
+        assert cli("run", "forward-prepass", *SMALL, "-o", "b.exr", *mode).code == 0
+        assert np.array_equal(images.read("a.exr"), images.read("b.exr")), mode
+
+
+def test_taps_keep_values_and_are_viewable(cli: Any) -> None:
+    words = ["--tap", "sun.shadow_map=s.exr", "--tap", "light.surface_depth=d.exr", "--tap", "display.color=c.exr"]
+    assert cli("run", "forward", *SMALL, *words, "--tap", "sun.shadow_map=s.png").code == 0
+    assert images.read("s.exr").shape == (1, 2048, 2048, 1)
+    assert images.read("d.exr").shape == (36, 64, 1)
+    assert images.read("c.exr").shape == (36, 64, 4)
+    assert images.read("s.png").shape == (2048, 2048, 1)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run", "forwrd"], "RG015 there is no shipped pipeline 'forwrd'; did you mean 'forward'?"),
+        (
+            ["run", "forward", "--tap", "su.shadow_map=a.exr"],
+            "--tap su.shadow_map: there is no node 'su'; did you",
+        ),
+        (["run", "forward", "-o", "imag=a.png"], "pipeline 'forward' has no output 'imag'; did you mean 'image'?"),
+        (["run", "forward", "-s", "light.ambien=1"], "no param or input 'ambien'; did you mean 'ambient'?"),
+        (["check", "forward", "-s", "light.ambient=x"], "light.ambient"),
+        (["check", "forward", "--scene", "none.glb"], "none.glb"),
+        (["check", "forward", "--environment", "none.hdr"], "RG350 environment 'none.hdr' does not exist"),
+        (["check", "forward", "--camera", "none"], "the scene has no camera 'none'; there is main"),
+        (["check", "forward", "--size", "16385x1"], "RG207 "),
+        (["check", "forward", "-p", "none.yaml"], "none.yaml"),
+        (["plan", "none.yaml"], "RG011 there is no file 'none.yaml'"),
+        (["graph", "forward", "-o", "no/a.svg"], "no/a.svg: RG504 cannot be written: there is no folder 'no'"),
+        (["nodes", "shadow"], "RG511 there is no family of nodes 'shadow'; did you mean 'shadows'?"),
+        (["explain", "RG1O3"], "RG511 nothing is called 'RG1O3'"),
+        (["explain", "RG999"], "RG511 there is no error code 'RG999'"),
+    ],
+)
+def test_what_is_missing_or_wrong_exits_3(cli: Any, tmp_path: Path, words: list[str], message: str) -> None:
+    result = cli(*words)
+    assert (result.code, result.out) == (3, "")
+    assert message in result.err
+    told = cli(*words, "--json")
+    assert told.code == 3
+    assert any(problem["text"] in told.err for problem in told.json["error"]["problems"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_several_mistakes_are_told_at_once(cli: Any) -> None:
+    result = cli("check", "forward", "-s", "light.ambien=3", "-s", "sun.type=shadow_mp", "--json")
+    assert [problem["code"] for problem in result.json["error"]["problems"]] == ["RG103", "RG102"]
+
+
+def test_check_and_plan_say_what_they_found(cli: Any) -> None:
+    result = cli("check", "forward")
+    assert (result.code, result.out) == (0, "")
+    assert result.err == "forward: 4 nodes, 3 links, 1280×720, outputs image, radiance\n"
+    told = cli("check", "forward", "--json").json
+    assert told["outputs"] == {"image": "display.color", "radiance": "light.radiance"}
+    assert told["warnings"] == []
+    assert {"order", "resources", "memory"} <= set(cli("plan", "forward", "--json").json)
+
+
+@pytest.mark.parametrize(
+    ("name", "start"), [("a.svg", "<svg"), ("a.dot", "digraph"), ("a.mmd", "flowchart"), ("a.txt", "")]
+)
+def test_a_graph_s_file_says_what_it_is_drawn_as(cli: Any, tmp_path: Path, name: str, start: str) -> None:
+    result = cli("graph", "forward", "-o", name)
+    assert result.out == f"{name}\n"
+    assert (tmp_path / name).read_text().startswith(start)
+    assert cli("graph", "forward", "-o", name, "--json").json == {"output": name}
+
+
+def test_config_prints_origins_and_resolved_values(cli: Any) -> None:
+    result = cli("config", "forward-prepass", "-s", "light.ambient=0.5")
+    assert re.search(r"ambient: 0.5 +# --set light.ambient=0.5\n", result.out)
+    assert re.search(r"visibility: shadows.visibility +# forward-prepass:\d+\n", result.out)
+    told = cli("config", "forward-prepass", "--json").json
+    assert told["resolved"]["nodes"]["prepass"] == {"type": "depth_prepass"}
+    assert yaml.safe_load(told["yaml"]) == told["resolved"]
+
+
+def test_bench_has_spreads(cli: Any) -> None:
+    result = cli("bench", "forward", *SMALL, "-n", "3", "--json")
+    report = result.json
+    assert report["frames"] == 3
+    for figures in (report["frame_ms"], *(entry["cpu_ms"] for entry in report["passes"])):
+        assert figures["min"] <= figures["p10"] <= figures["median"] <= figures["p90"] <= figures["max"]
+    assert ("say nothing about GPUs" in result.err) == report["device"]["software"]
+    assert "forward_lighting" in cli("bench", "forward", *SMALL, "-n", "1").out
+
+
+# --- the error pages of the command line -----------------------------------------------------------------------------
+
+
+def pages() -> list[dict[str, str]]:
+    files = sorted(folder("rendergraph.errors").glob("RG5*.yaml"))
+    return [yaml.safe_load(file.read_text(encoding="utf-8")) for file in files]
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda page: page["code"])
+def test_the_wrong_line_of_a_page_prints_its_message(cli: Any, tmp_path: Path, page: dict[str, str]) -> None:
+    if page["code"] in ("RG507", "RG509", "RG599"):
+        pytest.skip("needs a full disk or a mistake of ours; tested elsewhere")
+    outputs = "{image: null, radiance: null, ao: display.color}"
+    (tmp_path / "occlusion.yaml").write_text(f"extends: forward\noutputs: {outputs}\n")
+    images.write(tmp_path / "photo.png", np.zeros((2, 2, 3), np.uint8))
+    result = cli(*shlex.split(page["wrong"], comments=True)[1:])
+    assert result.err == page["message"] + "\n"
+    assert result.code in (2, 3)
+    assert not list(tmp_path.glob("a.*"))
+
+
+# --- doctor ----------------------------------------------------------------------------------------------------------
+
+
+def test_doctor_finds_a_device_here(cli: Any) -> None:
+    result = cli("doctor", "--json")
+    assert result.code == 0
+    report = result.json
+    assert report["ok"]
+    assert report["install"] == []
+    assert {"moderngl", "numpy", "OpenImageIO", "networkx"} <= set(report["packages"])
+    (device, *_) = report["devices"]
+    assert device["usable"]
+    assert {"OpenGL 4.5", "compute shaders", "texture views", "indirect multi-draw"} <= set(device["features"])
+    assert "ready to render" in cli("doctor").out
+
+
+BROKEN: list[tuple[Any, str]] = [
+    (("-c", "import os; os.kill(os.getpid(), 11)"), "the driver crashed (signal 11)"),
+    (("-c", "print('no json')"), "the probe failed: no answer"),
+    (("-c", "import sys; sys.exit('libfoo is missing')"), "the probe failed: libfoo is missing"),
+    (("-c", "import time; time.sleep(60)"), "the driver did not answer within 1 s"),
+]
+
+
+@pytest.mark.parametrize(("instead", "problem"), BROKEN)
+def test_doctor_survives_a_broken_driver(
+    cli: Any, monkeypatch: pytest.MonkeyPatch, instead: tuple[str, ...], problem: str
+) -> None:
+    from rendergraph.cli import doctor
+
+    run = subprocess.run
+    monkeypatch.setattr(doctor, "_SECONDS", 1)
+    monkeypatch.setattr(subprocess, "run", lambda words, **rest: run([sys.executable, *instead], **rest))
+    result = cli("doctor", "--json")
+    assert result.code == 5
+    assert result.json["problem"] == problem
+    assert result.json["install"] == ["apt install libgl1-mesa-dri   (software rendering; or your GPU vendor's driver)"]
+    assert problem in cli("doctor").out
+
+
+def test_doctor_says_what_to_install(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rendergraph.cli import doctor
+
+    missing = {"libEGL.so.1": None, "libGL.so.1": "cannot open shared object file"}
+    answers = {
+        (): {"libraries": missing, "devices": [{"number": 0, "software": False, "vendor": "ACME"}], "problem": None},
+        ("0",): {"problem": "libGL.so.1 not loaded"},
+    }
+    monkeypatch.setattr(doctor, "_probe", lambda *words: answers[words])
+    monkeypatch.setattr(doctor, "_packages", lambda: {"numpy": "2", "moderngl": None})
+    result = cli("doctor")
+    assert result.code == 5
+    assert "pip install moderngl" in result.out
+    assert "apt install libgl1 libgl1-mesa-dri" in result.out
+    assert "0       no      ACME      libGL.so.1 not loaded" in result.out
+    assert "cannot render here yet" in result.out

@@ -1,0 +1,121 @@
+"""`nodes`, `explain` and `schema`: everything there is can be asked about."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+
+from rendergraph.api import DisplayColor, Function, InOut, Input, Internal, Node, Output, Radiance, ShadowLookup, param
+from rendergraph.catalog import Catalog
+from rendergraph.cli.describe import describe, example, type_words
+from rendergraph.cli.output import table
+from rendergraph.resources import folder
+
+CATALOG = Catalog.discover()
+CODES = sorted(path.name.partition("-")[0] for path in folder("rendergraph.errors").glob("RG*.yaml"))
+
+
+def test_nodes_lists_every_type(cli: Any) -> None:
+    listed = cli("nodes")
+    told = cli("nodes", "--json").json["nodes"]
+    assert [entry["name"] for entry in told] == [n for names in CATALOG.families().values() for n in names]
+    for entry in told:
+        assert entry["name"] in listed.out
+        assert entry["doc"].partition("\n")[0] in listed.out
+
+
+@pytest.mark.parametrize("name", CATALOG.names())
+def test_every_node_can_be_explained(cli: Any, name: str) -> None:
+    text = cli("explain", name).out
+    told = cli("explain", name, "--json").json
+    assert told["name"] == name
+    for port in (*told["inputs"], *told["outputs"], *told["parameters"]):
+        assert port["name"] in text
+        assert port["doc"] in text
+    assert f"type: {name}" in text
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_can_be_explained(cli: Any, code: str) -> None:
+    text = cli("explain", code.lower()).out
+    page = cli("explain", code, "--json").json
+    assert text.startswith(f"{code}  {page['title']}")
+    assert page["message"].strip().splitlines()[0].strip() in text
+
+
+@pytest.mark.parametrize(
+    ("topic", "keys"), [("scene", ["keyframes", "fov_y_degrees"]), ("pipeline", ["extends", "params"])]
+)
+def test_files_can_be_explained(cli: Any, topic: str, keys: list[str]) -> None:
+    text = cli("explain", topic).out
+    told = cli("explain", topic, "--json").json["keys"]
+    assert all(entry["doc"] for entry in told)
+    for key in keys:
+        assert f"  {key} " in text
+        assert key in {entry["key"] for entry in told}
+
+
+def test_the_schema_is_json_and_goes_into_a_file(cli: Any, tmp_path: Path) -> None:
+    text = cli("schema").out
+    assert "tonemap" in json.dumps(json.loads(text))
+    assert cli("schema", "-o", "s.json").out == "s.json\n"
+    assert json.loads((tmp_path / "s.json").read_text()) == json.loads(text)
+    assert cli("schema", "-o", "s.json", "--json").json == {"output": "s.json"}
+
+
+class Sample(Node):
+    """What every kind of port looks like.
+
+    More.
+    """
+
+    radiance = Input(Radiance, group="all", doc="In.")
+    shadows = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows.")
+    target = InOut(Radiance, optional=True, doc="Continued.")
+    color = Output(DisplayColor, format="rgba8", size=0.5, doc="Out.")
+    same = Output(like="radiance", doc="Same.")
+    lookup = Function(ShadowLookup, "s.glsl", needs=("radiance",), doc="Lookup.")
+    scratch = Internal(like="radiance")
+    gain: float = param(default=1.0, unit="EV", min=0, max=2, doc="Gain.")
+    tint: float | tuple[float, float, float] = param(default=(1.0, 1.0, 1.0), doc="Tint.")
+    mode: Literal["a", "b"] = param(default="a", doc="Mode.")
+
+
+def test_a_description_says_everything() -> None:
+    found = describe(Catalog.of(Sample).get("sample"))
+    inputs = {port["name"]: port for port in found["inputs"]}
+    outputs = {port["name"]: port for port in found["outputs"]}
+    parameters = {entry["name"]: entry for entry in found["parameters"]}
+    assert inputs["radiance"]["group"] == "all"
+    assert (
+        inputs["shadows"] | {"many": True, "optional": True, "kind": "function", "semantic": "shadow"}
+        == inputs["shadows"]
+    )
+    assert inputs["target"]["continues"]
+    assert outputs["color"]["size"] == "viewport × 0.5"
+    assert outputs["same"]["like"] == "radiance"
+    assert outputs["lookup"]["needs"] == ["radiance"]
+    assert "target" in outputs
+    assert [port["name"] for port in found["internal"]] == ["scratch"]
+    assert parameters["gain"] == {
+        "name": "gain", "type": "number", "default": 1.0, "role": "param", "unit": "EV", "doc": "Gain.",
+        "min": 0, "max": 2,
+    }  # fmt: skip
+    assert parameters["tint"]["type"] == "number | [number, number, number]"
+    assert parameters["mode"]["choices"] == ["a", "b"]
+    assert example(found) == "sample: {type: sample, inputs: {all: NODE}}"
+    json.dumps(found)
+
+
+def test_types_read_as_in_the_file() -> None:
+    assert type_words(int | None) == "whole number | null"
+    assert type_words(tuple[float, ...]) == "[number, …]"
+    assert type_words(str | list[str]) == "text | [text, …]"
+
+
+def test_tables_are_aligned() -> None:
+    assert table([("a", 1, "x"), ("bbb", 22, None)], ("n", "v", ""), right=(1,)) == "n     v\na     1  x\nbbb  22"
+    assert table([]) == ""
