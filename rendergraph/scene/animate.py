@@ -57,7 +57,9 @@ def key_light(scene: Scene, camera: Camera) -> Light:
     """The light of a scene without one: 3 lux over the viewer's left shoulder."""
     taken = {light.name for light in scene.lights}
     direction = unit(camera.transform[:3, :3] @ np.array([1.0, -1.0, -1.0]))
-    return Light("key" if "key" not in taken else "key_light", "directional", direction=vec3(direction), intensity=KEY_LUX)
+    return Light(
+        "key" if "key" not in taken else "key_light", "directional", direction=vec3(direction), intensity=KEY_LUX
+    )
 
 
 def complete(scene: Scene, camera_name: str | None = None) -> Scene:
@@ -148,7 +150,8 @@ def _mended(scene: Scene, section: str, name: str, make: Any, values: Mapping[st
 
 def _change_material(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
     materials = tuple(
-        scene_build.material(name, values, entry.textures) if entry.name == name else entry for entry in scene.materials)
+        scene_build.material(name, values, entry.textures) if entry.name == name else entry for entry in scene.materials
+    )
     return replace(scene, materials=materials)
 
 

@@ -22,7 +22,9 @@ def view_matrices(camera: Camera, size: tuple[int, int]) -> ViewMatrices:
     An off-centre `frustum` keeps its own left, right, bottom and top.
     """
     width, height = size
-    return ViewMatrices(inverse_rigid(camera.transform), projection(camera, width / height), size, camera.near, camera.far)
+    return ViewMatrices(
+        inverse_rigid(camera.transform), projection(camera, width / height), size, camera.near, camera.far
+    )
 
 
 def projection(camera: Camera, aspect: float) -> Matrix:

@@ -68,8 +68,10 @@ def shown(text: str, most: int = 80) -> str:
 
 def named(text: str) -> str:
     """A name from a file as text that can be printed and encoded."""
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace") if text.isascii() or _sane(text) else (
-        "".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in text)
+    return (
+        text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+        if text.isascii() or _sane(text)
+        else ("".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in text))
     )
 
 

@@ -29,7 +29,9 @@ def face_normals(positions: npt.ArrayLike, triangles: npt.NDArray[np.integer]) -
     return unit(np.cross(b - a, c - a))
 
 
-def mean_normals(normals: Doubles, corners: npt.NDArray[np.integer], faces: npt.NDArray[np.integer], count: int) -> Doubles:
+def mean_normals(
+    normals: Doubles, corners: npt.NDArray[np.integer], faces: npt.NDArray[np.integer], count: int
+) -> Doubles:
     """The mean of the adjacent face normals, `N = Σ Ni / n`, not weighted by area (techniques.md §1), unit length.
 
     Args:
@@ -88,7 +90,7 @@ def proper(triangles: Indices) -> Indices:
     return np.ascontiguousarray(triangles if keep.all() else triangles[keep], np.uint32)
 
 
-def translation(at: Sequence[float]) -> Matrix:
+def translation(at: npt.ArrayLike) -> Matrix:
     """Affine matrix that moves by `at`."""
     matrix = np.eye(4)
     matrix[:3, 3] = at

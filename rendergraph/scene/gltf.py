@@ -270,7 +270,9 @@ class _Reader:
         for index, node in enumerate(self._nodes):
             for child in node.children:
                 if child in parent:
-                    raise self._reading.error("RG309", f"nodes[{child}] has two parents, nodes[{parent[child]}] and nodes[{index}]")
+                    raise self._reading.error(
+                        "RG309", f"nodes[{child}] has two parents, nodes[{parent[child]}] and nodes[{index}]"
+                    )
                 parent[child] = index
         self._no_cycles(parent)
         scenes = [part.indices("nodes", len(self._nodes), "nodes") for part in self._top.parts("scenes")]

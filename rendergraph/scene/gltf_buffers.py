@@ -20,7 +20,15 @@ _COMPONENTS: dict[int, np.dtype[np.generic]] = {
     5120: np.dtype("<i1"), 5121: np.dtype("<u1"), 5122: np.dtype("<i2"), 5123: np.dtype("<u2"),
     5125: np.dtype("<u4"), 5126: np.dtype("<f4"),
 }  # fmt: skip
-_TYPES = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4), "MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4)}
+_TYPES = {
+    "SCALAR": (1, 1),
+    "VEC2": (1, 2),
+    "VEC3": (1, 3),
+    "VEC4": (1, 4),
+    "MAT2": (2, 2),
+    "MAT3": (3, 3),
+    "MAT4": (4, 4),
+}
 _UNSIGNED = (5121, 5123, 5125)
 
 
@@ -112,7 +120,9 @@ class Accessor:
         """Bytes of one element; columns of matrices start at multiples of four."""
         return _element_bytes(self.type, self.component)
 
-    def need(self, part: Part, use: str, types: Sequence[str], components: Sequence[int], normalized: bool = False) -> None:
+    def need(
+        self, part: Part, use: str, types: Sequence[str], components: Sequence[int], normalized: bool = False
+    ) -> None:
         """Check that the accessor has the type a use asks for.
 
         Raises:
@@ -247,7 +257,9 @@ class Buffers:
         if self._declared > 16 * self.total + (64 << 20):
             raise part.wrong(f"accessors overlap: together they read {self._declared:,} of {self.total:,} bytes")
 
-    def _sparse(self, part: Part, count: int, component: int, kind: str) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.generic]]:
+    def _sparse(
+        self, part: Part, count: int, component: int, kind: str
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.generic]]:
         number = part.integer("count", low=1, high=count)
         where, what = part.part("indices"), part.part("values")
         if where is None or what is None:
@@ -273,7 +285,9 @@ class Buffers:
         columns, rows = _TYPES[kind]
         shape, column = (count, columns, rows), size // columns
         strides = (view.stride or size, column, dtype.itemsize)
-        array: npt.NDArray[np.generic] = np.ndarray(shape, dtype, self.buffers[view.buffer], view.offset + offset, strides)
+        array: npt.NDArray[np.generic] = np.ndarray(
+            shape, dtype, self.buffers[view.buffer], view.offset + offset, strides
+        )
         return array.reshape(count, columns * rows)
 
     def _decode(self, accessor: Accessor) -> npt.NDArray[np.generic]:

@@ -77,8 +77,8 @@ class Materials:
         moved = part.extension("KHR_texture_transform")
         if moved is not None:
             uv = moved.integer("texCoord", uv)
-            angle, (sx, sy), (ox, oy) = moved.number("rotation", 0.0), moved.numbers("scale", 2, (1, 1)), moved.numbers(
-                "offset", 2, (0, 0))  # fmt: skip
+            angle, (sx, sy) = moved.number("rotation", 0.0), moved.numbers("scale", 2, (1, 1))
+            ox, oy = moved.numbers("offset", 2, (0, 0))
             c, s = math.cos(angle), math.sin(angle)
             transform = (c * sx, s * sy, ox, -s * sx, c * sy, oy)
             if transform == (1, 0, 0, 0, 1, 0):
@@ -88,16 +88,20 @@ class Materials:
             uv = 0
         if image is None:
             return part, None
-        wrap_s, wrap_t, mag, low = ("repeat", "repeat", "linear", "linear_mipmap_linear") if sampler is None else (
-            self._samplers[sampler])  # fmt: skip
-        return part, Texture(image, srgb, wrap_s, wrap_t, mag, low, uv, transform)
+        if sampler is None:
+            return part, Texture(image, srgb, uv=uv, transform=transform)
+        return part, Texture(image, srgb, *self._samplers[sampler], uv, transform)
 
     def _clamped(self, part: Part, key: str, value: float, high: float = 1.0) -> float:
         if not 0 <= value <= high:
-            self._reading.warn("RG332", "range", f"{part.path}: '{key}' is {value:g}, outside 0 to {high:g}; it is clamped")
+            self._reading.warn(
+                "RG332", "range", f"{part.path}: '{key}' is {value:g}, outside 0 to {high:g}; it is clamped"
+            )
         return min(max(value, 0.0), high)
 
-    def _colors(self, part: Part, key: str, count: int, default: tuple[float, ...], high: float = 1.0) -> tuple[float, ...]:
+    def _colors(
+        self, part: Part, key: str, count: int, default: tuple[float, ...], high: float = 1.0
+    ) -> tuple[float, ...]:
         return tuple(self._clamped(part, key, value, high) for value in part.numbers(key, count, default))
 
     def _factor(self, part: Part, key: str, default: float, high: float = 1.0) -> float:

@@ -58,7 +58,9 @@ class Primitives:
         self._grow(part, count * 48)
         corners = self._corners(part, indices, count)
         if mode < 4:
-            self._reading.warn("RG333", _MODES[mode], f"{part.path}: {_MODES[mode]} are left out; only triangles are drawn")
+            self._reading.warn(
+                "RG333", _MODES[mode], f"{part.path}: {_MODES[mode]} are left out; only triangles are drawn"
+            )
             return None
         if mode == 4:
             if len(corners) % 3:
@@ -86,7 +88,9 @@ class Primitives:
             return flat(Mesh(name, positions, triangles, positions, None, uv0, uv1, colors))
         fixed, missing = filled_normals(positions, triangles, normals.astype(np.float64))
         if missing:
-            self._reading.warn("RG332", "normals", f"{part.path}: {missing} normals of length zero are computed from faces")
+            self._reading.warn(
+                "RG332", "normals", f"{part.path}: {missing} normals of length zero are computed from faces"
+            )
         if tangents is not None:
             hand = np.where(tangents[:, 3:] < 0, -1.0, 1.0)
             tangents = np.concatenate([unit(tangents[:, :3]), hand], axis=1).astype(np.float32)
@@ -128,7 +132,9 @@ class Primitives:
         high = np.array(accessor.part.numbers("max", 3), np.float32)
         slack = 1e-4 * max(1e-30, float(np.abs(positions).max()))
         if (positions.min(axis=0) < low - slack).any() or (positions.max(axis=0) > high + slack).any():
-            self._reading.warn("RG332", "bounds", f"{accessor.part.path}: positions pass 'min' or 'max'; the data is used")
+            self._reading.warn(
+                "RG332", "bounds", f"{accessor.part.path}: positions pass 'min' or 'max'; the data is used"
+            )
 
     def _colors(self, part: Part, colors: Floats | None) -> Floats | None:
         if colors is None:

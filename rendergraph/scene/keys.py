@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-Kind: TypeAlias = Literal["number", "integer", "flag", "text", "choice", "vector", "scale", "color", "file", "link", "map"]
+Kind: TypeAlias = Literal[
+    "number", "integer", "flag", "text", "choice", "vector", "scale", "color", "file", "link", "map"
+]
 
 
 @dataclass(frozen=True)
@@ -15,9 +17,9 @@ class Key:
 
     Attributes:
         name: as written in the file.
-        kind: `number`, `integer`, `flag`, `text`, a `choice` of words, a `vector` of `size` numbers, a `scale` (one number
-            or three), a `color` (three numbers, or four where `size` is 4), the name of a `file`, a `link` to something
-            named elsewhere in the file, or a nested `map`.
+        kind: `number`, `integer`, `flag`, `text`, a `choice` of words, a `vector` of `size` numbers, a `scale` (one
+            number or three), a `color` (three numbers, or four where `size` is 4), the name of a `file`, a `link` to
+            something named elsewhere in the file, or a nested `map`.
         doc: one line.
         default: the value where the file has none; None where that means absent.
         unit: the unit's symbol, empty for a pure number.

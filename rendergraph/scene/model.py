@@ -224,7 +224,7 @@ class Environment:
 
 @dataclass(frozen=True)
 class Orbit:
-    """A camera that turns about its target, counter-clockwise seen from above; the default camera where it has no name."""
+    """A camera that turns about its target, counter-clockwise seen from above; the default one where unnamed."""
 
     camera: str
     degrees_per_second: float

@@ -23,8 +23,9 @@ _NUMBERS = {b"ns": "Ns", b"ni": "Ni", b"d": "d", b"tr": "Tr", b"illum": "illum",
             b"aniso": "aniso", b"anisor": "anisor"}  # fmt: skip
 _COLORS = {b"ka": "Ka", b"kd": "Kd", b"ks": "Ks", b"ke": "Ke"}
 _SILENT = (b"tf", b"ps", b"pc", b"pcr", b"sharpness", b"map_aat")
-_OPTIONS = {b"-bm": 1, b"-blendu": 1, b"-blendv": 1, b"-boost": 1, b"-cc": 1, b"-clamp": 1, b"-imfchan": 1, b"-texres": 1,
-            b"-type": 1, b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}  # fmt: skip
+_OPTIONS = {b"-bm": 1, b"-blendu": 1, b"-blendv": 1, b"-boost": 1, b"-cc": 1, b"-clamp": 1, b"-imfchan": 1,
+            b"-texres": 1, b"-type": 1, b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}  # fmt: skip
+_SWITCHES = {b"on": 1.0, b"off": 0.0}
 
 
 @dataclass
@@ -84,7 +85,7 @@ def _value(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, readin
     if key in _NUMBERS:
         entry.values[name] = numbers[0]
         return
-    color = (numbers * 3)[:3] if len(numbers) == 1 else (numbers + [numbers[-1]])[:3]
+    color = (numbers * 3)[:3] if len(numbers) == 1 else [*numbers, numbers[-1]][:3]
     high = math.inf if name == "Ke" else 1.0
     if any(not 0 <= value <= high for value in color):
         reading.warn("RG332", f"range {name}", f"'{name}' outside 0 to 1 is clamped", line=line, file=path)
@@ -110,7 +111,9 @@ def _map(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, reading:
         return
     if slot == "bump":
         if facts.channels < 3:
-            reading.warn("RG333", "height map", "height maps are left out; only normal maps are read", line=line, file=path)
+            reading.warn(
+                "RG333", "height map", "height maps are left out; only normal maps are read", line=line, file=path
+            )
             return
         slot = "normal"
     s, o = options.get(b"-s", [1.0, 1.0]), options.get(b"-o", [0.0, 0.0])
@@ -135,7 +138,7 @@ def _options(rest: bytes) -> tuple[dict[bytes, list[float]], bytes]:
             if len(head) < 2:
                 break
             try:
-                values.append({b"on": 1.0, b"off": 0.0}.get(head[0].lower()) if head[0].lower() in (b"on", b"off") else float(head[0]))  # type: ignore[arg-type]  # looked up only where it is there
+                values.append(_SWITCHES[head[0].lower()] if head[0].lower() in _SWITCHES else float(head[0]))
             except ValueError:
                 if values or _OPTIONS[key] > 1:
                     break
@@ -159,7 +162,9 @@ def _material(entry: _Entry, path: Path, reading: Reading) -> Material:
     values, maps = entry.values, entry.maps
     diffuse: Vec3 = values.get("Kd", (1.0, 1.0, 1.0) if "base_color" in maps else (0.8, 0.8, 0.8))
     alpha = min(max(values.get("d", 1.0 - values.get("Tr", 0.0)), 0.0), 1.0)
-    textures = {slot: maps[slot][0] for slot in ("base_color", "emissive", "normal", "specular_color") if slot in maps}
+    textures: dict[str, Texture] = {
+        slot: maps[slot][0] for slot in ("base_color", "emissive", "normal", "specular_color") if slot in maps
+    }
     mode = "blend" if alpha < 1 else "opaque"
     if "alpha" in maps:
         if "base_color" in maps and maps["alpha"][1] == maps["base_color"][1]:
@@ -193,7 +198,9 @@ def _material(entry: _Entry, path: Path, reading: Reading) -> Material:
     )  # fmt: skip
 
 
-def _combined_map(maps: dict[str, tuple[Texture, Path, float]], textures: dict[str, Texture], path: Path, reading: Reading) -> None:
+def _combined_map(
+    maps: dict[str, tuple[Texture, Path, float]], textures: dict[str, Texture], path: Path, reading: Reading
+) -> None:
     """One image for both map_Pr and map_Pm is read as glTF's (roughness in green, metallic in blue); two are not."""
     rough, metal = maps.get("roughness"), maps.get("metallic")
     if rough and metal and rough[1] == metal[1]:

@@ -96,7 +96,7 @@ def _normals(found: Statements, reading: Reading) -> tuple[Doubles, Ints]:
     corner_face = np.repeat(np.arange(len(found.sizes)), found.sizes)
     chosen = found.corners[:, 2].copy()
     used = chosen[chosen != ABSENT]
-    zero = ~normals.any(axis=1)
+    zero = np.asarray(~normals.any(axis=1))
     if used.size and zero[used].any():
         number = int(zero[np.unique(used)].sum())
         reading.warn("RG332", "normals", f"{number} normals of length zero are computed from the faces")
@@ -111,10 +111,10 @@ def _normals(found: Statements, reading: Reading) -> tuple[Doubles, Ints]:
     flat = (group == 0) & found.smoothed
     # Flat corners share one normal for each face; smooth ones one for each vertex, smoothing group and object.
     key = np.stack([np.where(flat, -1 - face, vertex), group, found.states[face, 0]], axis=1)
-    number = _numbered(key)
-    mean = mean_normals(faces, number, face, int(number.max()) + 1)
+    vertices = _numbered(key)
+    mean = mean_normals(faces, vertices, face, int(vertices.max()) + 1)
     mean[~mean.any(axis=1)] = (0.0, 0.0, 1.0)
-    chosen[corners] = len(normals) + number
+    chosen[corners] = len(normals) + vertices
     return np.concatenate([normals, mean]), chosen
 
 
@@ -219,7 +219,9 @@ def _material(word: str, library: dict[str, Material], found: Statements, readin
     if named(word) in library:
         return library[named(word)]
     if word and found.libraries:
-        reading.warn("RG330", f"usemtl {word}", f"material '{shown(word)}' is in no material library; it is the default one")
+        reading.warn(
+            "RG330", f"usemtl {word}", f"material '{shown(word)}' is in no material library; it is the default one"
+        )
     return Material(named(word) or _DEFAULT, base_color=(0.8, 0.8, 0.8, 1.0))
 
 
@@ -245,5 +247,9 @@ class _Columns:
     def mesh(self, name: str, a: int, b: int, indices: npt.NDArray[np.uint32]) -> Mesh:
         """The mesh of vertices a to b; corners without texture coordinates have (0, 0), without colour white."""
         uvs = None if self.uvs is None or np.isnan(self.uvs[a:b]).all() else np.nan_to_num(self.uvs[a:b])
-        colors = None if self.colors is None or np.isnan(self.colors[a:b, :3]).all() else np.nan_to_num(self.colors[a:b], nan=1.0)
+        colors = (
+            None
+            if self.colors is None or np.isnan(self.colors[a:b, :3]).all()
+            else np.nan_to_num(self.colors[a:b], nan=1.0)
+        )
         return Mesh(name, self.positions[a:b], indices, self.normals[a:b], None, uvs, colors=colors)

@@ -231,11 +231,11 @@ class _Block:
         """The arguments of some lines as one text, the first words blanked."""
         keep = np.zeros(len(self.starts), bool)
         keep[rows] = True
-        chosen = self.bytes.copy()
+        chosen: Bytes = self.bytes.copy()
         first = self.first_word[rows]
         chosen[self.words[first]] = 32
         chosen[self.word_ends[first] - 1] = 32  # vt and vn have a second letter
-        text = chosen[np.repeat(keep, self.lengths)].tobytes()
+        text: bytes = chosen[np.repeat(keep, self.lengths)].tobytes()
         if slashes:
             text = text.replace(b"//", b"/%d/" % ABSENT)
             for blank in (b" ", b"\n", b"\r", b"\t"):  # a trailing slash stands for nothing
@@ -243,7 +243,9 @@ class _Block:
             text = text.replace(b"/", b" ")
         return text
 
-    def _parse(self, text: bytes, kind: type[np.float64] | type[np.int64], count: int) -> npt.NDArray[np.generic] | None:
+    def _parse(
+        self, text: bytes, kind: type[np.float64] | type[np.int64], count: int
+    ) -> npt.NDArray[np.generic] | None:
         """The numbers in a text, or None where it holds something else or another number of them."""
         with warnings.catch_warnings():
             warnings.simplefilter("error", DeprecationWarning)
@@ -257,12 +259,17 @@ class _Block:
         """Arguments of lines as finite numbers, how many each line has, and where each line's first is."""
         counts = self.word_counts[rows] - 1
         for row in rows[(counts < least) | (counts > most)][:1]:
-            word = text_of(self.block[self.words[self.first_word[row]] : self.word_ends[self.first_word[row]]])
-            raise self._wrong(int(row), f"'{word}' takes {least} to {most} numbers, here are {self.word_counts[row] - 1}")
+            name = text_of(self.block[self.words[self.first_word[row]] : self.word_ends[self.first_word[row]]])
+            count = self.word_counts[row] - 1
+            raise self._wrong(int(row), f"'{name}' takes {least} to {most} numbers, here are {count}")
         values = self._parse(self._text(rows), np.float64, int(counts.sum()))
         if values is None:
             row = self._first_bad(
-                rows, lambda some: self._parse(self._text(some), np.float64, int((self.word_counts[some] - 1).sum())) is not None)
+                rows,
+                lambda some: (
+                    self._parse(self._text(some), np.float64, int((self.word_counts[some] - 1).sum())) is not None
+                ),
+            )
             for word in self._rest(row).split():
                 if self._parse(word, np.float64, 1) is None:
                     raise self._wrong(row, f"'{shown(text_of(word), 30)}' is no number")
@@ -271,7 +278,9 @@ class _Block:
         bad = ~np.isfinite(values.astype(np.float32))
         if bad.any():
             row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
-            raise self.reading.error("RG306", f"'{shown(text_of(self._rest(row)), 60)}' is not finite", line=self.line(row))
+            raise self.reading.error(
+                "RG306", f"'{shown(text_of(self._rest(row)), 60)}' is not finite", line=self.line(row)
+            )
         return values.astype(np.float64), counts, at
 
     def _first_bad(self, rows: Ints, good: Callable[[Ints], bool]) -> int:
@@ -338,6 +347,7 @@ class _Block:
                     table[has, column] = whole[at[has] + column]
                 table[:, 0] = np.where(table[:, 0] == ABSENT, 0, table[:, 0])
                 return table
+
         def good(some: Ints) -> bool:
             text = self._text(some, slashes=True)
             between = text.translate(None, b"+-0123456789 \t\v\f\r\n") == b""

@@ -1,7 +1,7 @@
 """A scene as arrays for the GPU, packed once: geometry streams, instance records, materials, lights and views.
 
-Layouts are those of the GLSL structs in `shaders/include/` (std140: everything is a vec4 or a mat4 by columns). Sizes in
-bytes: `View` 432, `Light` 64, `MaterialData` 128, an instance record 56.
+Layouts are those of the GLSL structs in `shaders/include/` (std140: everything is a vec4 or a mat4 by columns). Bytes:
+`View` 432, `Light` 64, `MaterialData` 128, an instance record 56.
 """
 
 from __future__ import annotations
@@ -22,7 +22,16 @@ Records: TypeAlias = npt.NDArray[np.void]
 Bools: TypeAlias = npt.NDArray[np.bool_]
 Ints: TypeAlias = npt.NDArray[np.int32]
 
-SLOTS = ("base_color", "metallic_roughness", "normal", "occlusion", "emissive", "anisotropy", "specular", "specular_color")
+SLOTS = (
+    "base_color",
+    "metallic_roughness",
+    "normal",
+    "occlusion",
+    "emissive",
+    "anisotropy",
+    "specular",
+    "specular_color",
+)
 """Texture slots in the order of a material's rows in `material_uvs`."""
 
 _VEC4 = ("<f4", (4,))
@@ -31,8 +40,8 @@ INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
 MESH = np.dtype([("first_index", "<u4"), ("count", "<u4"), ("base_vertex", "<i4"), ("vertices", "<u4"),
                  ("low", "<f4", (3,)), ("high", "<f4", (3,))])  # fmt: skip
 """Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
-MATERIAL = np.dtype([(name, *_VEC4) for name in ("base_color", "emissive", "surface", "specular", "extra", "phong_diffuse",
-                                                 "phong_specular", "phong_ambient")])  # fmt: skip
+MATERIAL = np.dtype([(name, *_VEC4) for name in ("base_color", "emissive", "surface", "specular", "extra",
+                                                 "phong_diffuse", "phong_specular", "phong_ambient")])  # fmt: skip
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
 VIEW = np.dtype([(name, "<f4", (4, 4)) for name in ("view", "projection", "view_projection", "inverse_view",
                                                     "inverse_projection", "inverse_view_projection")]
@@ -155,7 +164,9 @@ def _attributes(mesh: Mesh) -> frozenset[Attribute]:
     return frozenset(name for name, values in pairs if values is not None)
 
 
-def _stream(meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], name: str, width: int, fill: float) -> Floats | None:
+def _stream(
+    meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], name: str, width: int, fill: float
+) -> Floats | None:
     """One attribute of all meshes behind each other; None where no mesh has it (positions and normals always are)."""
     if name not in ("positions", "normals") and all(getattr(mesh, name) is None for mesh in meshes):
         return None

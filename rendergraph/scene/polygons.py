@@ -51,7 +51,8 @@ def triangulate(positions: Doubles, corners: Ints, sizes: Ints) -> tuple[Ints, I
 def newell(points: Doubles) -> Doubles:
     """Normals of polygons by Newell's sum, twice their area long; points (..., n, 3)."""
     ahead = np.roll(points, -1, axis=-2)
-    return np.cross(points, ahead).sum(axis=-2)
+    total: Doubles = np.cross(points, ahead).sum(axis=-2)
+    return total
 
 
 def _convex(points: Doubles) -> npt.NDArray[np.bool_]:
@@ -99,7 +100,9 @@ def _is_ear(flat: Doubles, ring: list[int], a: int, b: int, c: int) -> bool:
         return False
     others = flat[[v for v in ring if v not in (a, b, c)]]
     others = others[(others != pa).any(axis=1) & (others != pb).any(axis=1) & (others != pc).any(axis=1)]
-    inside = (_cross(pb - pa, others - pa) >= 0) & (_cross(pc - pb, others - pb) >= 0) & (_cross(pa - pc, others - pc) >= 0)
+    inside = (
+        (_cross(pb - pa, others - pa) >= 0) & (_cross(pc - pb, others - pb) >= 0) & (_cross(pa - pc, others - pc) >= 0)
+    )
     return not bool(inside.any())
 
 

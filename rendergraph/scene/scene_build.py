@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from rendergraph.scene.cameras import look_at
 from rendergraph.scene.geometry import euler_matrix, placement, unit, vec3
@@ -58,11 +58,14 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
         raise ValueError(f"has both '{given[0]}' and '{given[1]}'; one says how wide it sees")
     if "height" in values and math.isinf(far):
         raise ValueError("an orthographic camera needs a finite 'far'")
-    if "frustum" in values and not (values["frustum"][0] < values["frustum"][1] and values["frustum"][2] < values["frustum"][3]):
+    if "frustum" in values and not (
+        values["frustum"][0] < values["frustum"][1] and values["frustum"][2] < values["frustum"][3]
+    ):
         raise ValueError("'frustum' must be left < right, bottom < top")
     target = values.get("target", (0.0, 0.0, 0.0))
     transform = look_at(values.get("eye", (0.0, 0.0, 5.0)), target, values.get("up", (0.0, 1.0, 0.0)))
-    kind = "orthographic" if "height" in values else "frustum" if "frustum" in values else "perspective"
+    kind: Literal["perspective", "orthographic", "frustum"] = (
+        "orthographic" if "height" in values else "frustum" if "frustum" in values else "perspective")  # fmt: skip
     return Camera(
         name, transform, kind, math.radians(values.get("fov_y_degrees", 45.0)), values.get("height", 2.0),
         values.get("frustum"), near, far, target,

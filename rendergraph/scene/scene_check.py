@@ -36,7 +36,9 @@ class Checker:
                 result[name] = entry
         return result
 
-    def values(self, value: Value, keys: Sequence[Key], what: str, names: Mapping[str, Iterable[str]]) -> dict[str, Any]:
+    def values(
+        self, value: Value, keys: Sequence[Key], what: str, names: Mapping[str, Iterable[str]]
+    ) -> dict[str, Any]:
         """The values of one entry; what is not there, null or wrong is left out.
 
         Args:
@@ -84,8 +86,10 @@ class Checker:
         elif key.kind == "choice":
             if str(data) in key.choices:
                 return str(data)
-            self.say(value, "RG321", f"{what}: '{key.name}' is {_said(value)}, not one of {', '.join(key.choices)}"
-                     if len(key.choices) < 4 else f"{what}: there is no {key.name} '{shown(data)}'{suggestion(str(data), key.choices)}")  # fmt: skip
+            text = f"{what}: '{key.name}' is {_said(value)}, not one of {', '.join(key.choices)}"
+            if len(key.choices) > 3:
+                text = f"{what}: there is no {key.name} '{shown(data)}'{suggestion(str(data), key.choices)}"
+            self.say(value, "RG321", text)
         elif key.kind == "link":
             known = list(names.get(key.choices[0], ()))
             if isinstance(data, str) and data in known:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 from rendergraph.scene.keys import Key, positive
 from rendergraph.scene.shapes import SHAPES
 
@@ -13,7 +12,11 @@ TOP = (
     Key("description", "text", "What the scene shows."),
     Key("objects", "map", "Shapes and files, by name."),
     Key("materials", "map", "Surfaces, by name."),
-    Key("lights", "map", "Lights, by name; without any a directional key of 3 lux comes over the viewer's left shoulder."),
+    Key(
+        "lights",
+        "map",
+        "Lights, by name; without any a directional key of 3 lux comes over the viewer's left shoulder.",
+    ),
     Key("cameras", "map", "Cameras, by name, the first is the default; without any the scene is framed."),
     Key("environment", "map", "An equirectangular image around the scene."),
     Key("keyframes", "map", "Dotted path (`cameras.main.eye`) to seconds and values, linear between, held outside."),
@@ -26,7 +29,12 @@ OBJECT = (
     Key("at", "vector", "Where its origin stands.", (0.0, 0.0, 0.0), "m"),
     Key("rotate_degrees", "vector", "Turns about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
     Key("scale", "scale", "One factor, or one for each axis; applied before turning.", (1.0, 1.0, 1.0)),
-    Key("material", "link", "A name under `materials`; a file keeps its own materials without it.", choices=("materials",)),
+    Key(
+        "material",
+        "link",
+        "A name under `materials`; a file keeps its own materials without it.",
+        choices=("materials",),
+    ),
     Key("casts_shadow", "flag", "Whether shadow techniques draw it.", True),
     Key("hidden", "flag", "Not drawn at all.", False),
 )
@@ -34,11 +42,15 @@ OVERRIDES = Key("overrides", "map", "For a file: node name to material, hidden, 
 OVERRIDE = tuple(key for key in OBJECT if key.name in ("material", "hidden", "casts_shadow"))
 
 TEXTURES = (
-    ("base_color_texture", "Base colour (sRGB) with alpha."), ("metallic_roughness_texture", "Roughness in green, metallic in blue."),
-    ("normal_texture", "Tangent-space normals."), ("occlusion_texture", "Occlusion in red."),
-    ("emissive_texture", "Emitted colour (sRGB)."), ("anisotropy_texture", "Direction in red and green, strength in blue."),
-    ("specular_texture", "Specular factor in alpha."), ("specular_color_texture", "Specular colour (sRGB)."),
-)  # fmt: skip
+    ("base_color_texture", "Base colour (sRGB) with alpha."),
+    ("metallic_roughness_texture", "Roughness in green, metallic in blue."),
+    ("normal_texture", "Tangent-space normals."),
+    ("occlusion_texture", "Occlusion in red."),
+    ("emissive_texture", "Emitted colour (sRGB)."),
+    ("anisotropy_texture", "Direction in red and green, strength in blue."),
+    ("specular_texture", "Specular factor in alpha."),
+    ("specular_color_texture", "Specular colour (sRGB)."),
+)
 
 
 def _unit(name: str, doc: str, default: float) -> Key:
@@ -46,7 +58,15 @@ def _unit(name: str, doc: str, default: float) -> Key:
 
 
 MATERIAL = (
-    Key("base_color", "color", "Linear base colour, three numbers or four with alpha.", (1.0, 1.0, 1.0, 1.0), low=0, high=1, size=4),
+    Key(
+        "base_color",
+        "color",
+        "Linear base colour, three numbers or four with alpha.",
+        (1.0, 1.0, 1.0, 1.0),
+        low=0,
+        high=1,
+        size=4,
+    ),
     _unit("metallic", "0 dielectric, 1 metal.", 0.0),
     _unit("roughness", "Perceptual roughness; α is its square.", 1.0),
     Key("emissive", "color", "Emitted radiance.", (0.0, 0.0, 0.0), low=0),
@@ -75,7 +95,9 @@ LIGHT = (
     Key("direction", "vector", f"Where its light goes (directional, spot); {_DIRECTION}.", (0.0, -1.0, 0.0)),
     Key("color", "color", "Linear colour.", (1.0, 1.0, 1.0), low=0),
     Key("intensity", "number", "Lux for directional, candela for point and spot.", 1.0, "lx, cd", low=0),
-    Key("range", "number", "Where its light is faded out (point, spot); none by default.", None, "m", low=0, above=True),
+    Key(
+        "range", "number", "Where its light is faded out (point, spot); none by default.", None, "m", low=0, above=True
+    ),
     Key("inner_degrees", "number", "Half angle of the spot's full brightness.", 0.0, "°", low=0, high=90),
     Key("outer_degrees", "number", "Half angle where the spot ends.", 45.0, "°", low=0, high=90, above=True),
     Key("casts_shadow", "flag", "Whether `shadow_map.light: auto` may choose it.", True),
@@ -86,7 +108,15 @@ CAMERA = (
     Key("target", "vector", "What it looks at.", (0.0, 0.0, 0.0), "m"),
     Key("up", "vector", f"What is up in the picture; {_DIRECTION}.", (0.0, 1.0, 0.0)),
     Key("fov_y_degrees", "number", "Vertical angle of a perspective camera.", 45.0, "°", low=0.01, high=179.0),
-    Key("height", "number", "Height of what an orthographic camera sees; makes it orthographic.", None, "m", low=0, above=True),
+    Key(
+        "height",
+        "number",
+        "Height of what an orthographic camera sees; makes it orthographic.",
+        None,
+        "m",
+        low=0,
+        above=True,
+    ),
     Key("frustum", "vector", "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m", size=4),
     positive("near", "Near plane.", 0.05),
     Key("far", "number", "Far plane; `.inf` for none.", 100.0, "m", low=0, above=True, infinite=True),
@@ -107,7 +137,8 @@ ORBIT = (
 def keys() -> dict[str, tuple[Key, ...]]:
     """Every section of a scene file with its keys, for `explain scene` and the docs."""
     return {
-        "": TOP, "objects": (*OBJECT, OVERRIDES), **{f"objects (shape: {name})": shape.keys for name, shape in SHAPES.items()},
+        "": TOP, "objects": (*OBJECT, OVERRIDES),
+        **{f"objects (shape: {name})": shape.keys for name, shape in SHAPES.items()},
         "objects (overrides)": OVERRIDE, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA,
         "environment": ENVIRONMENT, "orbit": ORBIT,
     }  # fmt: skip
@@ -115,4 +146,3 @@ def keys() -> dict[str, tuple[Key, ...]]:
 
 ANIMATED = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}
 """Sections whose numbers, vectors and colours keyframes may change."""
-

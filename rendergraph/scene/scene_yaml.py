@@ -111,8 +111,9 @@ class _Reader:
             orbit = Orbit(found.get("camera", ""), found.get("degrees_per_second", 30.0))
         made = self.made
         return Scene(
-            self.path.stem, self.path, tuple(made.objects), tuple(made.meshes), tuple(made.materials), tuple(made.lights),
-            made.cameras, environment, keyframes, orbit, self.reading.warnings, self.recipe, made.placements,
+            self.path.stem, self.path, tuple(made.objects), tuple(made.meshes), tuple(made.materials),
+            tuple(made.lights), made.cameras, environment, keyframes, orbit, self.reading.warnings, self.recipe,
+            made.placements,
         )  # fmt: skip
 
     # Surfaces, lights, cameras ----------------------------------------------------------------------------------------
@@ -286,7 +287,9 @@ class _Reader:
         made.materials += [replace(material, name=f"{name}/{material.name}") for material in scene.materials]
         return made.files[path]
 
-    def _overrides(self, value: Value | None, name: str, scene: Scene, names: dict[str, tuple[str, ...]]) -> dict[str, dict[str, Any]]:
+    def _overrides(
+        self, value: Value | None, name: str, scene: Scene, names: dict[str, tuple[str, ...]]
+    ) -> dict[str, dict[str, Any]]:
         """Node or part name to what is changed."""
         if value is None:
             return {}
@@ -316,12 +319,16 @@ class _Reader:
                 continue
             if not isinstance(entry.data, dict) or not entry.data:
                 what = "empty" if entry.data == {} else entry.kind
-                self.check.say(entry, "RG321", f"keyframes of '{shown(path)}' are {what}, not a mapping of seconds to values")
+                self.check.say(
+                    entry, "RG321", f"keyframes of '{shown(path)}' are {what}, not a mapping of seconds to values"
+                )
                 continue
             frames = []
             for time, value in entry.items():
                 if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-                    self.check.say(value, "RG321", f"keyframes of '{shown(path)}': '{shown(time)}' is no time in seconds", key=True)
+                    self.check.say(
+                        value, "RG321", f"keyframes of '{shown(path)}': '{shown(time)}' is no time in seconds", key=True
+                    )
                     continue
                 found = self.check.value(value, key, f"keyframe {time:g} s", names)
                 if found is None and value.data is None:
@@ -343,7 +350,9 @@ class _Reader:
             hint = suggestion(name, known) or f"; there are no {section}"
             self.check.say(entry, "RG322", f"keyframes: there is no '{shown(name)}' under {section}{hint}", key=True)
             return None
-        moving = {key.name: key for key in scene_keys.ANIMATED[section] if key.kind in ("number", "vector", "color", "scale")}
+        moving = {
+            key.name: key for key in scene_keys.ANIMATED[section] if key.kind in ("number", "vector", "color", "scale")
+        }
         if word not in moving:
             text = f"keyframes: {section} have no moving key '{shown(word)}'{suggestion(word, moving)}"
             self.check.say(entry, "RG322", text, key=True)

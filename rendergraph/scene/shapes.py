@@ -1,7 +1,8 @@
 """Generated shapes, with exact normals, texture coordinates and tangents.
 
-All stand on their own centre with +Y up, sizes in metres. Seen from outside, u runs to the right and v downwards. Closed
-shapes are closed 2-manifolds once vertices are welded by position: seams and poles repeat their positions bit by bit.
+Each has its centre at the origin and +Y up, sizes in metres. Seen from outside, u runs to the right and v downwards.
+Closed shapes are closed 2-manifolds once vertices are welded by position: seams and poles repeat their positions bit by
+bit.
 """
 
 from __future__ import annotations
@@ -68,8 +69,9 @@ def _mesh(name: str, positions: npt.ArrayLike, triangles: npt.ArrayLike, normals
           along: npt.ArrayLike) -> Mesh:  # fmt: skip
     """A mesh from plain arrays; `along` is the direction of growing u, w is +1 for all shapes here."""
     tangents = np.concatenate([unit(along), np.ones((len(np.asarray(along)), 1))], axis=1)
-    return Mesh(name, np.asarray(positions, np.float32) + np.float32(0), np.asarray(triangles, np.uint32).reshape(-1, 3),
-                np.asarray(normals, np.float32), tangents.astype(np.float32), np.asarray(uv, np.float32))  # fmt: skip
+    points = np.asarray(positions, np.float32) + np.float32(0)  # no -0, so that equal positions have equal bits
+    return Mesh(name, points, np.asarray(triangles, np.uint32).reshape(-1, 3), np.asarray(normals, np.float32),
+                tangents.astype(np.float32), np.asarray(uv, np.float32))  # fmt: skip
 
 
 def _joined(name: str, meshes: Sequence[Mesh]) -> Mesh:
@@ -94,7 +96,9 @@ def _grid(columns: int, rows: int, degenerate: tuple[bool, bool] = (False, False
     return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
 
 
-def _lathe(name: str, profile: Sequence[tuple[float, float, float, float]], segments: int, v: Sequence[float] | None = None) -> Mesh:
+def _lathe(
+    name: str, profile: Sequence[tuple[float, float, float, float]], segments: int, v: Sequence[float] | None = None
+) -> Mesh:
     """A profile of (radius, height, normal's radial part, normal's height) from top to bottom, turned about Y."""
     r, y, nr, ny = np.array(profile, np.float64).T
     rows = len(r) - 1
@@ -176,7 +180,9 @@ def cone(radius: float, height: float, segments: int) -> Mesh:
     phi = 2 * np.pi * (np.arange(segments + 1) + 0.5) / segments  # the tip has no normal: each side's own stands there
     slope = unit([height, radius])
     normals = tip.normals.copy()
-    normals[: segments + 1] = np.stack([slope[0] * np.sin(phi), np.full(segments + 1, slope[1]), slope[0] * np.cos(phi)], axis=1)
+    normals[: segments + 1] = np.stack(
+        [slope[0] * np.sin(phi), np.full(segments + 1, slope[1]), slope[0] * np.cos(phi)], axis=1
+    )
     side = Mesh("side", tip.positions, tip.indices, normals, tip.tangents, tip.uv0)
     return _joined("cone", [side, _cap(radius, -half, False, segments)])
 
@@ -200,8 +206,13 @@ def torus_knot(radius: float, tube: float, p: int, q: int, segments: int, sides:
     out = np.stack([np.cos(q * s) * np.cos(p * s), np.sin(q * s), -np.cos(q * s) * np.sin(p * s)], axis=1)
     ring = np.stack([np.cos(p * s), np.zeros_like(s), -np.sin(p * s)], axis=1)
     center = radius * ring + minor * out
-    ahead = np.stack([-np.sin(p * s), np.zeros_like(s), -np.cos(p * s)], axis=1) * (p * (radius + minor * np.cos(q * s)))[:, None]
-    ahead += q * minor * np.stack([-np.sin(q * s) * np.cos(p * s), np.cos(q * s), np.sin(q * s) * np.sin(p * s)], axis=1)
+    ahead = (
+        np.stack([-np.sin(p * s), np.zeros_like(s), -np.cos(p * s)], axis=1)
+        * (p * (radius + minor * np.cos(q * s)))[:, None]
+    )
+    ahead += (
+        q * minor * np.stack([-np.sin(q * s) * np.cos(p * s), np.cos(q * s), np.sin(q * s) * np.sin(p * s)], axis=1)
+    )
     ahead = unit(ahead)
     side = np.cross(ahead, out)
     angle = 2 * np.pi * (np.arange(sides + 1) % sides) / sides
@@ -226,7 +237,9 @@ def stairs(size: Sequence[float], steps: int) -> Mesh:
     ears = clip_ears(left)
     count = len(left)
     parts = [
-        _mesh("left", left, ears, np.tile((-1, 0, 0), (count, 1)), uv * (-1, 1) + (1, 0), np.tile((0, 0, 1), (count, 1))),
+        _mesh(
+            "left", left, ears, np.tile((-1, 0, 0), (count, 1)), uv * (-1, 1) + (1, 0), np.tile((0, 0, 1), (count, 1))
+        ),
         _mesh("right", right, ears[:, ::-1], np.tile((1, 0, 0), (count, 1)), uv, np.tile((0, 0, -1), (count, 1))),
     ]
     for k in range(count):
@@ -243,8 +256,8 @@ def sphere_grid(radius: float, columns: int, rows: int, spacing: float, roughnes
     """Spheres in the XY plane: roughness grows from left to right, metallic from bottom to top."""
     ball = sphere(radius, segments, rings)
     parts = []
-    for row, metal in enumerate(np.linspace(*metallic, rows)):
-        for column, rough in enumerate(np.linspace(*roughness, columns)):
+    for row, metal in enumerate(np.linspace(metallic[0], metallic[1], rows)):
+        for column, rough in enumerate(np.linspace(roughness[0], roughness[1], columns)):
             at = ((column - (columns - 1) / 2) * spacing, (row - (rows - 1) / 2) * spacing, 0.0)
             changes = (("roughness", float(rough)), ("metallic", float(metal)))
             parts.append(Part(ball, translation(at), f"/{column}_{row}", changes))
@@ -274,19 +287,20 @@ SHAPES: dict[str, Shape] = {
         positive("radius", "Radius of the base.", 0.5), positive("height", "Extent along Y.", 1.0), _SEGMENTS,
     ), cone, lambda v: 3 * (v["segments"] + 1)),
     "torus": Shape("A ring around Y.", (
-        positive("radius", "From the centre to the middle of the tube.", 0.5), positive("tube", "Radius of the tube.", 0.2),
-        _SEGMENTS, whole("sides", "Sides around the tube.", 24, 3, 1024),
+        positive("radius", "From the centre to the middle of the tube.", 0.5),
+        positive("tube", "Radius of the tube.", 0.2), _SEGMENTS, whole("sides", "Sides around the tube.", 24, 3, 1024),
     ), torus, lambda v: (v["segments"] + 1) * (v["sides"] + 1)),
     "torus_knot": Shape("A tube along a torus knot around Y.", (
         positive("radius", "Radius of the torus the knot lies on.", 0.5), positive("tube", "Radius of the tube.", 0.1),
         whole("p", "Turns about the axis.", 2, 1, 32), whole("q", "Turns through the hole.", 3, 1, 32),
-        whole("segments", "Segments along the knot.", 192, 3, 8192), whole("sides", "Sides around the tube.", 24, 3, 1024),
+        whole("segments", "Segments along the knot.", 192, 3, 8192),
+        whole("sides", "Sides around the tube.", 24, 3, 1024),
     ), torus_knot, lambda v: (v["segments"] + 1) * (v["sides"] + 1)),
     "stairs": Shape("A solid flight of stairs that climbs towards -Z.", (
         Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
         whole("steps", "Number of steps.", 5, 1, 200),
     ), stairs, lambda v: 12 * v["steps"]),
-    "sphere_grid": Shape("Spheres in the XY plane, an object each, `name/column_row`: roughness to the right, metallic up.", (
+    "sphere_grid": Shape("Spheres in the XY plane, objects `name/column_row`: roughness to the right, metallic up.", (
         positive("radius", "Radius of one sphere.", 0.4), whole("columns", "Values of roughness.", 5, 1, 64),
         whole("rows", "Values of metallic.", 5, 1, 64), positive("spacing", "Between centres.", 1.0),
         _range("roughness", "At the left and at the right.", (0.1, 1.0)),

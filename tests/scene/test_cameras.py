@@ -1,0 +1,103 @@
+"""Camera matrices against independent vectors, and what pack makes of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rendergraph.scene import cameras, pack
+from rendergraph.scene.cameras import look_at, projection, view_matrices
+from rendergraph.scene.geometry import translation
+from rendergraph.scene.model import Camera
+
+EYE = np.eye(4)
+
+
+@pytest.fixture(scope="module")
+def vectors(shared: Path) -> dict[str, object]:
+    found: dict[str, object] = json.loads((shared / "reference/b6_math/vectors.json").read_text())
+    return found
+
+
+def test_projections(vectors: dict[str, object]) -> None:
+    for case in vectors["projections"]["cases"]:  # type: ignore[index]  # plain JSON
+        near, far, aspect = case["near"], case["far"], case["aspect"]
+        camera = Camera("c", EYE, fov_y=case["yfov"], near=near, far=far)
+        assert np.allclose(projection(camera, aspect), case["perspective"], rtol=1e-12, atol=1e-12)
+        endless = Camera("c", EYE, fov_y=case["yfov"], near=near, far=math.inf)
+        assert case["eps"] == cameras.INFINITE_EPSILON
+        assert np.allclose(projection(endless, aspect), case["infinite_eps"], rtol=1e-12, atol=1e-12)
+        assert np.allclose(projection(camera, aspect) @ case["point"], case["clip_perspective"], rtol=1e-12)
+        if "orthographic" in case:
+            height = 2 / case["orthographic"][1][1]
+            flat = Camera("c", EYE, "orthographic", height=height, near=near, far=far)
+            wide = projection(flat, case["orthographic"][1][1] / case["orthographic"][0][0])
+            assert np.allclose(wide, case["orthographic"], rtol=1e-12, atol=1e-12)
+
+
+def test_view(vectors: dict[str, object]) -> None:
+    for case in vectors["view"]:  # type: ignore[attr-defined]  # plain JSON
+        camera = Camera("c", look_at(case["eye"], case["target"], case["up"]))
+        assert np.allclose(view_matrices(camera, (4, 3)).view, case["matrix"], rtol=1e-12, atol=1e-12)
+
+
+def test_frustum_of_a_symmetric_camera_is_the_perspective_one() -> None:
+    straight = Camera("c", EYE, fov_y=1.0, near=0.5, far=9)
+    top = 0.5 * math.tan(0.5)
+    off = Camera("c", EYE, "frustum", frustum=(-top * 2, top * 2, -top, top), near=0.5, far=9)
+    assert np.allclose(projection(off, 1.0), projection(straight, 2.0))
+    shifted = Camera("c", EYE, "frustum", frustum=(0, 2, -1, 1), near=1, far=9)
+    corner = projection(shifted, 1.0) @ (0, -1, -1, 1)
+    assert np.allclose(corner / corner[3], (-1, -1, -1, 1))
+
+
+def test_orthographic_is_as_high_as_it_says() -> None:
+    camera = Camera("c", EYE, "orthographic", height=4, near=1, far=11)
+    clip = projection(camera, 2.0)
+    assert np.allclose(clip @ (4, 2, -1, 1), (1, 1, -1, 1))
+    assert np.allclose(clip @ (-4, -2, -11, 1), (-1, -1, 1, 1))
+
+
+def test_look_at_straight_down_has_a_frame() -> None:
+    matrix = look_at((0, 5, 0), (0, 0, 0))
+    assert np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3))
+    assert np.allclose(matrix[:3, 2], (0, 1, 0))
+    assert np.linalg.det(matrix) == pytest.approx(1)
+
+
+def test_look_at_nowhere_is_an_error() -> None:
+    with pytest.raises(ValueError, match="eye and target coincide"):
+        look_at((1, 2, 3), (1, 2, 3))
+
+
+def block(view: bytes) -> np.ndarray:
+    return np.frombuffer(view, pack.VIEW)[0]
+
+
+def test_view_block() -> None:
+    camera = Camera("c", look_at((1, 2, 3), (0, 0, 0)), near=0.1, far=50)
+    view = view_matrices(camera, (640, 360))
+    data = pack.pack_view(view)
+    assert len(data) == 432
+    found = block(data)
+    assert np.allclose(found["view"].T, view.view, atol=1e-6)  # columns behind each other
+    assert np.allclose(np.frombuffer(data, np.float32)[12:15], view.view[:3, 3], atol=1e-6)
+    assert np.allclose(found["view_projection"].T, view.projection @ view.view, atol=1e-6)
+    assert np.allclose(found["inverse_view_projection"].T @ found["view_projection"].T, np.eye(4), atol=1e-4)
+    assert np.allclose(found["eye"], (1, 2, 3, 1))
+    assert np.allclose(found["viewport"], (640, 360, 1 / 640, 1 / 360))
+    assert np.allclose(found["range"], (0.1, 50, 0, 0))
+
+
+def test_eye_of_an_orthographic_view_points_at_the_viewer() -> None:
+    camera = Camera("c", look_at((0, 0, 7), (0, 0, 0)), "orthographic")
+    assert np.allclose(block(pack.pack_view(view_matrices(camera, (8, 8))))["eye"], (0, 0, 1, 0))
+
+
+def test_inverse_rigid_is_the_inverse() -> None:
+    transform = translation((1, 2, 3)) @ look_at((3, 1, 2), (0, 1, 0))
+    assert np.allclose(cameras.inverse_rigid(transform) @ transform, np.eye(4), atol=1e-14)
