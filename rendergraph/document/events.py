@@ -217,6 +217,8 @@ def _syntax(source: Source, error: Any) -> Problem:
         what, mark = "the '[' that starts here has no ']' or lacks a comma", start or mark
     elif "flow mapping" in context:
         what, mark = "the '{' that starts here has no '}' or lacks a comma", start or mark
+    elif "flow node" in context:
+        what = "a value is expected here; close the '[' or '{' before it, or take a comma away"
     elif "expected ':'" in problem:
         what, mark = "this key has no ':'", start or mark
     elif "block" in context:
