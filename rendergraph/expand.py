@@ -50,7 +50,7 @@ class Expansion:
     Attributes:
         steps: in the order of the graph's nodes and of recording.
         resources: by id.
-        wanted: ids of the resources that must exist at the end of the frame (outputs and taps), with output names.
+        wanted: output name or tap to the id of the resource that must exist at the end of the frame.
         idle: nodes that recorded nothing, with the reason.
         views: view tables by id.
     """
@@ -505,13 +505,23 @@ class _Numbering:
     def _wanted(self) -> dict[str, str]:
         wanted: dict[str, str] = {}
         for name, end in self.wanted.items():
-            if end in self.at_end and end.node not in self.idle:
-                wanted[name] = self.at_end[end][0]
-            else:
+            if end not in self.at_end or end.node in self.idle:
                 reason = self.idle.get(end.node, "it makes no texture")
                 text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
                 raise InputError(Problem("RG204", text, self.graph[end.node].place))
+            resource, version = self.at_end[end]
+            wanted[name] = resource if version == self.version[resource] else self._keep(end, resource, version)
         return wanted
+
+    def _keep(self, end: Endpoint, resource: str, version: int) -> str:
+        """A copy of a version that somebody continues: what a tap in the middle of a chain shows."""
+        kept = f"{end} kept"
+        if kept not in self.resources:
+            index = 1 + max(step.index for step in self.steps if step.node == end.node)
+            self.resources[kept] = replace(self.resources[resource], id=kept, role="output")
+            read, write = Read("source", resource, version, "image"), Write("copy", kept, 1, "image")
+            self.steps.append(Step(end.node, index, "copy", reads=(read,), writes=(write,), label=f"{end} kept"))
+        return kept
 
     def _mark_roles(self, wanted: dict[str, str]) -> None:
         previous = {read.resource for step in self.steps for read in step.all_reads if read.previous}

@@ -189,7 +189,7 @@ class Step:
     Attributes:
         node: id of the node that recorded it.
         index: its number within the node.
-        kind: what it does.
+        kind: what it does; a `copy` is the framework's own, of a version that is wanted and then written over.
         shaders: stage to file name (`fragment`, `vertex`, `geometry`, `compute`), relative to the node's shaders, or
             `<name>` for one in `shaders/include/`.
         reads, writes: resources, with versions.
@@ -216,7 +216,7 @@ class Step:
 
     node: str
     index: int
-    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps"]
+    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "copy"]
     shaders: tuple[tuple[str, str], ...] = ()
     reads: tuple[Read, ...] = ()
     writes: tuple[Write, ...] = ()

@@ -112,7 +112,7 @@ class _Compiler:
         compiled = CompiledStep(step)
         {
             "fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw, "compute": self._compute,
-            "clear": self._clear, "mipmaps": self._mipmaps,
+            "clear": self._clear, "mipmaps": self._mipmaps, "copy": self._copy,
         }[step.kind](step, compiled, parity)  # fmt: skip
         if self.poison:
             compiled.after += self._poison(position, parity)
@@ -207,6 +207,18 @@ class _Compiler:
         for write in step.writes:
             texture = self.memory.texture(write.resource, parity)
             compiled.before.append(partial(self.device.raw.glGenerateTextureMipmap, texture.glo))
+
+    def _copy(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        source = self.memory.texture(step.reads[0].resource, parity)
+        target = self.memory.texture(step.writes[0].resource, parity)
+        for mip in range(source.desc.mips):
+            size = (*source.desc.mip_size(mip), source.desc.layers)
+            compiled.before.append(
+                partial(
+                    self.device.raw.glCopyImageSubData, source.glo, source.target, mip, 0, 0, 0, target.glo,
+                    target.target, mip, 0, 0, 0, *size,
+                )
+            )  # fmt: skip
 
     # Parts ----------------------------------------------------------------------------------------------------------
 

@@ -25,6 +25,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glTextureSubImage3D": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _P),
     "glGenerateTextureMipmap": (None, _U),
     "glGetTextureSubImage": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _I, _P),
+    "glCopyImageSubData": (None, _U, _U, _I, _I, _I, _I, _U, _U, _I, _I, _I, _I, _I, _I, _I),
     "glClearTexSubImage": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _P),
     "glClearNamedBufferData": (None, _U, _U, _U, _U, _P),
     "glBindTextureUnit": (None, _U, _U),

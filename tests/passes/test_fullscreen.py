@@ -208,3 +208,13 @@ def test_a_shader_error_names_the_authors_line(draw: Draw) -> None:
     shader = {"ramp.frag": "in vec2 v_uv;\nout vec4 color;\nvoid main() {\n  color = vec4(nothing, 1.0);\n}"}
     with pytest.raises(InputError, match=r"ramp\.frag:4:.*RG410 .*nothing"):
         draw("nodes: {a: {type: ramp}}\noutputs: {image: a.color}", Ramp, shaders=shader)
+
+
+def test_a_tap_in_the_middle_of_a_chain_shows_its_own_version(draw: Draw) -> None:
+    text = """nodes:
+  a: {type: accumulate, params: {amount: 3}}
+  b: {type: accumulate, inputs: {color: a.color}, params: {amount: 4}}
+  c: {type: accumulate, inputs: {color: b.color}, params: {amount: 5}}
+outputs: {image: c.color}"""
+    frame = draw(text, Accumulate, shaders=CONSTANT, taps=["a.color", "b.color"], poison=True)
+    assert [float(frame[name].mean()) for name in ("a.color", "b.color", "image")] == [3, 7, 12]
