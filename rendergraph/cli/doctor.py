@@ -63,11 +63,14 @@ def _probe(*arguments: str) -> dict[str, Any]:
     words = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
     try:
         done = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False)
-        found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-        return found
     except subprocess.TimeoutExpired:
         return {"problem": f"the driver did not answer within {_SECONDS} s"}
-    except (OSError, ValueError, IndexError):
+    except (OSError, ValueError) as error:
+        return {"problem": f"the probe cannot be started: {error}"}
+    try:
+        found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        return found
+    except (ValueError, IndexError):
         pass
     if done.returncode < 0:
         return {"problem": f"the driver crashed (signal {-done.returncode})"}

@@ -135,6 +135,8 @@ def _write_file(
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", _NO_DATE)
         spec.attribute("oiio:UnassociatedAlpha", 0)
+    elif path.suffix.lower() == ".png":
+        spec.attribute("png:compressionLevel", 4)  # half the time of the default, a tenth more bytes
     elif EXTENSIONS[path.suffix.lower()] == "jpeg":
         spec.attribute("Compression", "jpeg:95")
         spec.attribute("jpeg:subsampling", "4:4:4")

@@ -26,14 +26,17 @@ class Described(Protocol):
     @property
     def semantic(self) -> str:
         """Name of the semantic, `any` where unknown."""
+        ...
 
     @property
     def format(self) -> str:
         """The texture's format, a name in `textures.FORMATS`, empty where unknown."""
+        ...
 
     @property
     def encoding(self) -> str | None:
         """`display` for sRGB-encoded colours, `linear` for linear ones, else None."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -210,6 +210,7 @@ BROKEN: list[tuple[Any, str]] = [
     (("-c", "print('no json')"), "the probe failed: no answer"),
     (("-c", "import sys; sys.exit('libfoo is missing')"), "the probe failed: libfoo is missing"),
     (("-c", "import time; time.sleep(60)"), "the driver did not answer within 1 s"),
+    (("-c", "\0"), "the probe cannot be started: embedded null byte"),
 ]
 
 
