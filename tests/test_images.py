@@ -412,8 +412,7 @@ def test_broken_values_are_replaced_and_counted(tmp_path: Path) -> None:
     assert found[0, 0].tolist() == [0, 0, 0, 1]
     assert found[0, 1, :2].tolist() == [1, 65504]
     assert [str(problem) for problem in said] == [
-        "sky: warning: RG355 1 pixel is NaN or -inf, taken as 0; "
-        "4 pixels are infinite or beyond 65504, taken as 65504"
+        "sky: warning: RG355 1 pixel is NaN or -inf, taken as 0; 4 pixels are infinite or beyond 65504, taken as 65504"
     ]
 
 

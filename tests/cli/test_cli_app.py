@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -26,10 +27,11 @@ def test_help_imports_nothing_heavy_and_is_quick() -> None:
     assert done.stdout.splitlines()[-1] == "set()"
     taken = []
     for _ in range(5):
-        started = time.perf_counter()
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([*PROGRAM, "--help"], capture_output=True, check=True)
-        taken.append(time.perf_counter() - started)
-    assert min(taken) < 0.3
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    assert min(taken) < 0.3  # of the processor's time: the clock's depends on who else is at work
 
 
 @pytest.mark.parametrize("verb", VERBS)
