@@ -217,7 +217,7 @@ class Runner:
         """
         error = self.executable.device.raw.error()
         if error:
-            raise RenderError(Problem("RG604", f"the driver reported {error} while drawing"))
+            raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
     def read(self, resource: str, index: int) -> npt.NDArray[Any]:
         """A resource's texels after frame `index`: (height, width, channels), with layers before where it has them.

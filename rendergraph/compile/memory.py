@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,6 +11,7 @@ import moderngl
 import numpy as np
 
 from rendergraph.allocate import ResourcePlan
+from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.textures import GpuTexture
@@ -44,6 +46,7 @@ class Memory:
     _dummies: dict[tuple[int, bool], moderngl.Renderbuffer] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_size(sum(physical.bytes for physical in self.plan.physicals))
         try:
             for physical in self.plan.physicals:
                 if isinstance(physical.desc, BufferDesc):
@@ -185,6 +188,26 @@ class Memory:
         for table in (self._framebuffers, self._dummies, self._views, self._samplers):
             table.clear()
         self.physicals.clear()
+
+
+def check_size(needed: int) -> None:
+    """Refuse a plan before the driver is asked: some drivers end the process where others return an error.
+
+    Raises:
+        RenderError: it needs more than three quarters of the free memory, or than RENDERGRAPH_MEMORY_LIMIT MiB.
+    """
+    named = os.environ.get("RENDERGRAPH_MEMORY_LIMIT", "")
+    if named.isdigit():
+        limit = int(named) * 2**20
+    else:
+        try:
+            limit = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") * 3 // 4
+        except (ValueError, OSError):
+            return  # this system does not say
+    if needed > limit:
+        text = (f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used; a smaller "
+                "--size helps, RENDERGRAPH_MEMORY_LIMIT=MiB sets the limit")  # fmt: skip
+        raise RenderError(Problem("RG616", text))
 
 
 def _key(attachment: Attachment | None) -> tuple[object, ...] | None:

@@ -92,7 +92,7 @@ def open_device(index: int | None = None) -> Device:
         ctx = moderngl.create_context(context=context)
     except Exception as error:  # glcontext raises bare Exception, with a different text a cause
         text = f"no usable OpenGL 4.5 device: {error}; `rendergraph doctor` says what to install"
-        raise DeviceError(Problem("RG601", text)) from error
+        raise DeviceError(Problem("RG611", text)) from error
     return wrap(ctx, context.load, owned=True)
 
 
@@ -114,14 +114,14 @@ def _system_loader() -> Callable[[str], int]:
             continue
         function.argtypes, function.restype = [ctypes.c_char_p], ctypes.c_void_p
         return lambda wanted: function(wanted.encode()) or 0
-    raise DeviceError(Problem("RG601", "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more"))
+    raise DeviceError(Problem("RG611", "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more"))
 
 
 def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
     """A `Device` of a context, checked for what we need."""
     if ctx.version_code < REQUIRED_VERSION:
         text = f"{ctx.info['GL_RENDERER']} offers OpenGL {ctx.version_code / 100:.1f}; rendergraph needs 4.5"
-        raise DeviceError(Problem("RG601", text))
+        raise DeviceError(Problem("RG611", text))
     raw = RawGL(load)
     limits = {
         "units": raw.integer(0x8B4D),  # MAX_COMBINED_TEXTURE_IMAGE_UNITS

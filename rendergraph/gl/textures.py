@@ -64,7 +64,7 @@ def create(device: Device, desc: TextureDesc, label: str = "") -> GpuTexture:
         raw.delete("glDeleteTextures", glo)
         text = (f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
                 f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})")  # fmt: skip
-        raise RenderError(Problem("RG602", text))
+        raise RenderError(Problem("RG612", text))
     return GpuTexture(glo, target, desc)
 
 
@@ -90,7 +90,7 @@ def view(
     )
     error = raw.error()
     if error:
-        raise RenderError(Problem("RG602", f"the driver refused a texture view of {desc} as {shown} ({error})"))
+        raise RenderError(Problem("RG612", f"the driver refused a texture view of {desc} as {shown} ({error})"))
     return GpuTexture(glo, target, shown, view_of=texture.glo)
 
 
@@ -134,7 +134,7 @@ def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[An
     )
     error = device.raw.error()
     if error:
-        raise RenderError(Problem("RG603", f"reading back a {desc.format} texture failed ({error})"))
+        raise RenderError(Problem("RG613", f"reading back a {desc.format} texture failed ({error})"))
     if FORMATS[desc.format].family == "depth_stencil":
         texels = texels[..., :1]
     return texels[:, ::-1]

@@ -96,7 +96,7 @@ class Session:
         `warm_up` draws the first frame once more beforehand, unmeasured, and starts history afresh after it.
         """
         if threading.get_ident() != self._thread:
-            raise RenderError(Problem("RG605", "a session must be used by the thread that made it; make one a thread"))
+            raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
         wanted = pipeline.wanted(outputs, taps)
         with self.device.current():
             return self._render(pipeline, wanted, outputs, taps, frames or range(1, 2), alias, poison, shuffle, fps, on_frame, warm_up)
