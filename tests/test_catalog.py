@@ -1,0 +1,151 @@
+"""Finding node types."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import rendergraph.catalog
+from rendergraph.catalog import Catalog
+from rendergraph.errors import InputError
+
+GOOD = '''
+"""A node."""
+from rendergraph.api import Node, Output, Radiance
+from ._shared import SIZE
+
+
+class Good(Node):
+    """A good node."""
+
+    radiance = Output(Radiance, size=SIZE, doc="Light.")
+'''
+
+
+@pytest.fixture
+def plugin(tmp_path: Path) -> Path:
+    folder = tmp_path / "plugin"
+    for name, text in {
+        "lights/good.py": GOOD,
+        "lights/_shared.py": "SIZE = 0.5\n",
+        "_hidden/secret.py": "raise SystemExit\n",
+        "deep/er/deeper.py": GOOD.replace("from ._shared import SIZE", "SIZE = 1.0"),
+        "notes.txt": "",
+        "bad-name/odd.py": "",
+    }.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def test_a_folder_of_nodes_is_listed_without_importing(plugin: Path) -> None:
+    before = set(sys.modules)
+    catalog = Catalog.discover([plugin], installed=False)
+    assert catalog.names() == ["deeper", "good"]
+    assert catalog.families() == {"deep/er": ["deeper"], "lights": ["good"]}
+    assert "good" in catalog
+    assert not any(name.endswith("good") for name in set(sys.modules) - before)
+
+
+def test_a_type_knows_its_place(plugin: Path) -> None:
+    found = Catalog.discover([plugin], installed=False).get("good")
+    assert (found.name, found.family, found.cls.__name__, found.plugin) == ("good", "lights", "Good", "plugin")
+    assert found.file == plugin / "lights" / "good.py"
+    assert found.shaders == plugin / "lights"
+
+
+def test_shaders_lie_beside_the_nodes_folder(plugin: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    (whole / "shaders" / "lights").mkdir(parents=True)
+    plugin.rename(whole / "nodes")
+    found = Catalog.discover([whole], installed=False).get("good")
+    assert found.shaders == whole / "shaders" / "lights"
+    assert found.family == "lights"
+
+
+def test_one_file(plugin: Path) -> None:
+    catalog = Catalog.discover([plugin / "deep" / "er" / "deeper.py"], installed=False)
+    assert catalog.names() == ["deeper"]
+    assert catalog.get("deeper").shaders == plugin / "deep" / "er"
+
+
+def test_unknown_names_and_paths(plugin: Path) -> None:
+    catalog = Catalog.discover([plugin], installed=False)
+    with pytest.raises(InputError, match=r"RG102 there is no node type 'goood'; did you mean 'good'\?"):
+        catalog.get("goood")
+    with pytest.raises(InputError, match="RG011 there is no plugin"):
+        Catalog.discover([plugin / "nowhere"], installed=False)
+
+
+def test_two_of_one_name(plugin: Path, tmp_path: Path) -> None:
+    (tmp_path / "good.py").write_text(GOOD)
+    catalog = Catalog.discover([plugin, tmp_path / "good.py"], installed=False)
+    with pytest.raises(InputError, match=r"RG493 node type 'good' comes from 'plugin' .* and 'good' .*; rename one"):
+        catalog.get("good")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\nraise RuntimeError('not\\ntoday')\n", r"odd.py:2:1: RG491 .* imported: RuntimeError: not today"),
+        ("def f(:\n", r"odd.py:1:1: RG491 node type 'odd' cannot be imported: SyntaxError"),
+        ("import nonexistent_module\n", r"odd.py:1:1: RG491 .*ModuleNotFoundError"),
+        ("x = 1\n", r"odd.py: RG492 the module of node type 'odd' must define one Node class, it has none"),
+        (GOOD.replace("._shared import SIZE", "math import pi as SIZE") + "\nclass Other(Good):\n    '''More.'''\n",
+         r"odd.py: RG492 .* it has Good, Other"),
+        (GOOD.replace("._shared import SIZE", "math import pi as SIZE").replace("radiance =", "filter ="),
+         r"odd.py: RG490 node type 'odd': 'filter' is reserved"),
+    ],
+)  # fmt: skip
+def test_a_wrong_module_is_told_with_its_file(tmp_path: Path, text: str, message: str) -> None:
+    folder = tmp_path / "wrong"
+    folder.mkdir()
+    (folder / "odd.py").write_text(text)
+    with pytest.raises(InputError, match=message):
+        Catalog.discover([folder], installed=False).get("odd")
+
+
+def test_bases_do_not_count(tmp_path: Path) -> None:
+    text = GOOD.replace("._shared import SIZE", "math import pi as SIZE").replace("class Good(", "class _Base(")
+    (tmp_path / "made.py").write_text(text + "\nclass Made(_Base):\n    '''Made.'''\n")
+    assert Catalog.discover([tmp_path], installed=False).get("made").cls.__name__ == "Made"
+
+
+def test_installed_packages_come_by_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "someones_plugin"
+    for folder in ("nodes/sky", "shaders/sky"):
+        (package / folder).mkdir(parents=True)
+    (package / "__init__.py").touch()
+    (package / "nodes" / "__init__.py").write_text("raise RuntimeError('imported too early')\n")
+    (package / "nodes" / "sky" / "clouds.py").write_text(GOOD.replace("._shared import SIZE", "math import pi as SIZE"))
+    info = tmp_path / "someones_plugin-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: someones-plugin\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[rendergraph.nodes]\nsomeones = someones_plugin.nodes\ngone = no_such_package.nodes\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    catalog = Catalog.discover()
+    assert "clouds" in catalog
+    assert "tonemap" in catalog
+    (package / "nodes" / "__init__.py").write_text("")
+    found = catalog.get("clouds")
+    assert found.shaders == package / "shaders" / "sky"
+    assert (found.plugin, found.family) == ("someones", "sky")
+
+
+def test_the_standard_nodes_come_the_same_way() -> None:
+    catalog = Catalog.discover()
+    found = catalog.get("tonemap")
+    assert found.plugin == "builtin"
+    assert (found.shaders / "tonemap.frag").is_file()
+    assert found.cls.__module__ == "rendergraph.nodes.display.tonemap"
+
+
+def test_classes_at_hand(toy_catalog: Catalog) -> None:
+    assert toy_catalog.get("shadow_pcf").cls.__name__ == "ShadowPcf"
+    assert toy_catalog.get("shadow_map").cls.__name__ == "LightDepth"
+    assert toy_catalog.get("tonemap").file.name == "toys.py"
+    assert rendergraph.catalog.GROUP == "rendergraph.nodes"

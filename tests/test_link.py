@@ -1,0 +1,365 @@
+"""Names, types at ports, and what textures turn out to be. Most messages are in `wrong_files/`."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rendergraph.api import Facts, Input, Node, Output, Radiance, SceneRef, Views, structural
+from rendergraph.catalog import Catalog
+from rendergraph.declare import LightFacts
+from rendergraph.document import parse
+from rendergraph.errors import InputError
+from rendergraph.link import Endpoint, Graph, endpoint, link
+from rendergraph.read import read
+from rendergraph.resolve import resolve
+
+SUN = LightFacts("sun", "directional")
+LAMP = LightFacts("lamp", "spot")
+FORWARD = """
+size: [64, 32]
+nodes:
+  sun: {type: shadow_map, params: {resolution: 512}}
+  prepass: {type: depth_prepass}
+  shadows: {type: shadow_pcf, inputs: {shadow_map: sun.shadow_map, depth: prepass}}
+  light: {type: forward_lighting, inputs: {visibility: shadows.visibility, depth: prepass.depth}, params: {ambient: 1}}
+  display: {type: tonemap, inputs: {radiance: light.radiance}}
+outputs: {image: display.color, radiance: light.radiance}
+"""
+
+
+def linked(text: str, catalog: Catalog, lights: Sequence[LightFacts] = (SUN,), sets: Sequence[str] = ()) -> Graph:
+    return link(resolve(read(None, text, keep_going=True), catalog=catalog, sets=sets), catalog, lights)
+
+
+def problems(text: str, catalog: Catalog, lights: Sequence[LightFacts] = (SUN,)) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        linked(text, catalog, lights)
+    return [f"{problem.code} {problem.text}" for problem in caught.value.problems]
+
+
+def info(graph: Graph, text: str) -> Any:
+    node, _, port = text.rpartition(".")
+    return graph.textures[Endpoint(node, port)]
+
+
+# --- the graph -------------------------------------------------------------------------------------------------------
+
+
+def test_a_graph_of_typed_nodes(toy_catalog: Catalog) -> None:
+    graph = linked(FORWARD, toy_catalog)
+    assert [node.id for node in graph.nodes] == ["sun", "prepass", "shadows", "light", "display"]
+    assert graph["light"].inputs == {
+        "visibility": (Endpoint("shadows", "visibility"),), "depth": (Endpoint("prepass", "depth"),),
+    }  # fmt: skip
+    assert graph["shadows"].inputs["depth"] == (Endpoint("prepass", "depth"),)
+    assert graph["light"].node.model_dump()["ambient"] == 1
+    assert graph["sun"].type.name == "shadow_map"
+    assert graph.outputs == {"image": Endpoint("display", "color"), "radiance": Endpoint("light", "radiance")}
+    assert str(graph["light"].place) == "<text>:7:3"
+    edges = [(a, b, data["source_port"], data["target_port"]) for a, b, data in graph.dag.edges(data=True)]
+    assert ("prepass", "light", "depth", "depth") in edges
+    assert len(edges) == 5
+    with pytest.raises(Exception, match="Frozen graph"):
+        graph.dag.add_node("other")
+
+
+def test_many_and_one(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace("visibility: shadows.visibility", "lookup: [shadows.lookup, shadows.lookup]")
+    assert linked(text, toy_catalog)["light"].inputs["lookup"] == (Endpoint("shadows", "lookup"),) * 2
+    text = FORWARD.replace("visibility: shadows.visibility", "lookup: shadows")
+    assert linked(text, toy_catalog)["light"].inputs["lookup"] == (Endpoint("shadows", "lookup"),)
+    text = FORWARD.replace("visibility: shadows.visibility", "lookup: []")
+    assert "lookup" not in linked(text, toy_catalog)["light"].inputs
+
+
+DEFERRED = """
+nodes:
+  g: {type: gbuffer}
+  b: {type: blur, inputs: {source: g.albedo}}
+  light: {type: deferred_lighting, inputs: {gbuffer: g, albedo: b.blurred}}
+outputs: {radiance: light.radiance}
+"""
+
+
+def test_a_group_takes_a_node_and_an_explicit_port_wins(toy_catalog: Catalog) -> None:
+    assert linked(DEFERRED, toy_catalog)["light"].inputs == {
+        "albedo": (Endpoint("b", "blurred"),), "normal": (Endpoint("g", "normal"),), "depth": (Endpoint("g", "depth"),),
+    }  # fmt: skip
+
+
+def test_null_beside_a_group_leaves_one_out(toy_catalog: Catalog) -> None:
+    found = problems(DEFERRED.replace("albedo: b.blurred", "albedo: null"), toy_catalog)
+    assert found == ["RG114 input 'albedo' of node 'light' (deferred_lighting) is not connected; 'g.albedo' would fit"]
+
+
+def test_a_group_of_last_frame(toy_catalog: Catalog) -> None:
+    graph = linked(DEFERRED.replace("gbuffer: g,", "gbuffer: g@previous,"), toy_catalog)
+    assert graph["light"].inputs["normal"] == (Endpoint("g", "normal", previous=True),)
+
+
+def test_unused_nodes_and_null_parameters_are_fine(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace(
+        "outputs:", "  lonely: {type: ssao, inputs: {depth: prepass}, params: {samples: null}}\noutputs:"
+    )
+    assert linked(text, toy_catalog)["lonely"].node.model_dump()["samples"] == 16
+
+
+def test_last_frame_may_go_round(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace("radiance: light.radiance}}", "radiance: t.stable}}").replace(
+        "outputs:", "  t: {type: temporal, inputs: {radiance: light.radiance, last: t.stable@previous}}\noutputs:"
+    )
+    graph = linked(text, toy_catalog)
+    assert graph["t"].inputs["last"] == (Endpoint("t", "stable", previous=True),)
+    assert [edge for edge in graph.dag.edges(data="previous") if edge[2]] == [("t", "t", True)]
+
+
+def test_a_chain_of_writers_and_a_reader_before(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace("radiance: light.radiance}}", "radiance: fog.radiance}}").replace(
+        "outputs: {image: display.color, radiance: light.radiance}",
+        "  sky: {type: sky, inputs: {radiance: light.radiance}}\n  fog: {type: fog, inputs: {radiance: sky.radiance}}\n"
+        "  early: {type: tonemap, inputs: {radiance: light.radiance}}\noutputs: {image: display.color, e: early.color}",
+    )
+    graph = linked(text, toy_catalog)
+    assert info(graph, "fog.radiance") is info(graph, "light.radiance")
+
+
+def test_a_writer_nobody_needs_does_not_disturb_an_output(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace("outputs:", "  sky: {type: sky, inputs: {radiance: light.radiance}}\noutputs:")
+    assert "radiance" in linked(text, toy_catalog).outputs
+
+
+def test_an_optional_inout_makes_its_own(toy_catalog: Catalog) -> None:
+    graph = linked("size: [8, 4]\nnodes: {sky: {type: sky}}\noutputs: {o: sky.radiance}", toy_catalog)
+    assert info(graph, "sky.radiance").desc.size == (8, 4)
+
+
+# --- textures --------------------------------------------------------------------------------------------------------
+
+
+def test_views_and_lights_are_carried(toy_catalog: Catalog) -> None:
+    graph = linked(FORWARD, toy_catalog, (LAMP, SUN))
+    shadow_map = info(graph, "sun.shadow_map")
+    assert (shadow_map.desc.kind, shadow_map.desc.size, shadow_map.desc.layers) == ("texture2d_array", (512, 512), 1)
+    assert (shadow_map.view, shadow_map.lights) == ("sun.views", (0,))
+    assert info(graph, "prepass.depth").view == "camera"
+    assert info(graph, "shadows.visibility").lights == (0,)
+    assert info(graph, "shadows.visibility").desc.size == (64, 32)
+    assert info(graph, "light.scratch").view == "camera"
+    assert info(graph, "display.color").view is None
+
+
+def test_no_light_is_no_layer(toy_catalog: Catalog) -> None:
+    assert info(linked(FORWARD, toy_catalog, ()), "sun.shadow_map").desc.layers == 0
+
+
+def test_a_connected_view_is_carried_instead_of_the_camera(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace(
+        "prepass: {type: depth_prepass}", "prepass: {type: depth_prepass, inputs: {view: sun.views}}"
+    )
+    found = info(linked(text, toy_catalog), "prepass.depth")
+    assert (found.view, found.lights) == ("sun.views", (0,))
+
+
+def test_like_takes_everything_over(toy_catalog: Catalog) -> None:
+    text = "nodes: {g: {type: gbuffer}, b: {type: blur, inputs: {source: g.depth}}}\noutputs: {o: b.blurred}"
+    graph = linked(text, toy_catalog)
+    for port in ("b.blurred", "b.across"):
+        assert info(graph, port) == info(graph, "g.depth")
+    assert info(graph, "b.blurred").view == "camera"
+
+
+@pytest.mark.parametrize(("size", "half"), [((64, 32), (32, 16)), ((65, 33), (33, 17)), ((1, 1), (1, 1))])
+def test_factors_round_up(toy_catalog: Catalog, size: tuple[int, int], half: tuple[int, int]) -> None:
+    text = f"size: {list(size)}\nnodes: {{s: {{type: sky}}, h: {{type: half, inputs: {{source: s.radiance}}}}}}\n"
+    assert info(linked(text + "outputs: {o: h.radiance}", toy_catalog), "h.radiance").desc.size == half
+
+
+def test_full_chains_cubes_and_buffers(toy_catalog: Catalog) -> None:
+    text = "nodes: {c: {type: cube}, s: {type: sky}, h: {type: histogram, inputs: {radiance: s.radiance}}}\n"
+    graph = linked(text + "outputs: {o: s.radiance}", toy_catalog)
+    assert (info(graph, "c.radiance").desc.layers, info(graph, "c.radiance").desc.mips) == (6, 7)
+    assert (info(graph, "h.counts").desc, info(graph, "h.counts").bytes) == (None, 1024)
+
+
+def test_rules_may_ask_what_is_connected_without_asking_for_more(toy_catalog: Catalog) -> None:
+    class Asking(Node):
+        """Asks about an input that comes from its own last frame."""
+
+        last = Input(Radiance, size="any", optional=True, doc="Then.")
+        radiance = Output(
+            Radiance, size=lambda node, facts: (4, 4) if facts.connected("last") else (2, 2), doc="Now."
+        )  # fmt: skip
+
+    catalog = Catalog.of(Asking)
+    text = (
+        "nodes: {a: {type: asking, inputs: {last: a.radiance@previous}}, b: {type: asking}}\noutputs: {o: a.radiance}"
+    )
+    graph = linked(text, catalog)
+    assert info(graph, "a.radiance").desc.size == (4, 4)
+    assert info(graph, "b.radiance").desc.size == (2, 2)
+
+
+def test_a_failing_count_of_views_is_the_authors_mistake() -> None:
+    def count(node: Node, facts: Facts) -> int:
+        raise RuntimeError("no views today")
+
+    class Viewing(Node):
+        """Views that fail."""
+
+        views = Views(count=count, doc="Views.")
+        scene = Input(SceneRef, kind="scene", optional=True, doc="Scene.")
+        radiance = Output(Radiance, doc="Light.")
+        size: int = structural(default=1, doc="Nothing.")
+
+    (found,) = problems("nodes: {a: {type: viewing}}\noutputs: {o: a.radiance}", Catalog.of(Viewing))
+    assert found == "RG209 'a.views' (viewing): the rule for its count fails: RuntimeError: no views today"
+
+
+# --- sub-pipelines ---------------------------------------------------------------------------------------------------
+
+GLOW = """
+inputs: {radiance: {semantic: radiance}, mask: {semantic: depth, optional: true}}
+nodes:
+  sky: {type: sky, inputs: {radiance: inputs.radiance, depth: inputs.mask}}
+  blur: {type: blur, inputs: {source: sky}}
+outputs: {radiance: blur.blurred, through: inputs.radiance}
+"""
+GLOWING = """
+nodes:
+  sky: {type: sky}
+  glow: {type: ./glow.yaml, inputs: {radiance: sky}}
+  display: {type: tonemap, inputs: {radiance: glow}}
+  other: {type: tonemap, inputs: {radiance: glow.radiance@previous}}
+outputs: {image: display.color, glow: glow.radiance, other: other.color}
+"""
+
+
+@pytest.fixture
+def glowing(tmp_path: Path) -> Path:
+    (tmp_path / "glow.yaml").write_text(GLOW.replace("source: sky}", "source: sky.radiance}"))
+    (tmp_path / "glowing.yaml").write_text(GLOWING.replace("radiance: glow}", "radiance: glow.radiance}"))
+    return tmp_path / "glowing.yaml"
+
+
+def test_a_sub_pipeline_is_unfolded(glowing: Path, toy_catalog: Catalog) -> None:
+    graph = link(resolve(glowing, catalog=toy_catalog), toy_catalog)
+    assert graph["glow/sky"].inputs == {"radiance": (Endpoint("sky", "radiance"),)}
+    assert graph["display"].inputs == {"radiance": (Endpoint("glow/blur", "blurred"),)}
+    assert graph["other"].inputs == {"radiance": (Endpoint("glow/blur", "blurred", previous=True),)}
+    assert graph.outputs["glow"] == Endpoint("glow/blur", "blurred")
+    assert graph.aliases == {
+        "glow.radiance": Endpoint("glow/blur", "blurred"), "glow.through": Endpoint("sky", "radiance"),
+    }  # fmt: skip
+
+
+def test_a_resolved_file_links_to_the_same(glowing: Path, toy_catalog: Catalog) -> None:
+    spec = resolve(glowing, catalog=toy_catalog)
+    again = resolve(parse(spec.to_yaml()), catalog=toy_catalog)
+    one, other = (link(found, toy_catalog) for found in (spec, again))
+    assert {node.id: node.inputs for node in one.nodes} == {node.id: node.inputs for node in other.nodes}
+    assert one.textures == other.textures
+
+
+def test_mistakes_inside_are_told_where_they_stand(glowing: Path, toy_catalog: Catalog) -> None:
+    (glowing.parent / "glow.yaml").write_text(GLOW.replace("type: blur", "type: tonemap"))
+    with pytest.raises(InputError, match=r"glow.yaml:5:\d+: RG111 node type 'tonemap' has no input 'source'"):
+        link(resolve(glowing, catalog=toy_catalog), toy_catalog)
+
+
+# --- taps ------------------------------------------------------------------------------------------------------------
+
+
+def test_endpoints_by_name(glowing: Path, toy_catalog: Catalog) -> None:
+    graph = link(resolve(glowing, catalog=toy_catalog), toy_catalog)
+    assert endpoint(graph, "display.color") == Endpoint("display", "color")
+    assert endpoint(graph, "glow.radiance") == Endpoint("glow/blur", "blurred")
+    assert endpoint(graph, "glow/blur.across") == Endpoint("glow/blur", "across")
+    for wrong, message in (
+        ("dispaly.color", "RG109 there is no node 'dispaly'; did you mean 'display'"),
+        ("display", "RG109 there is no node 'display'; write NODE.PORT"),
+        ("display.colour", "RG112 node 'display' has no output 'colour'; did you mean 'color'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            endpoint(graph, wrong)
+    graph = linked(FORWARD, toy_catalog)
+    with pytest.raises(InputError, match=r"RG129 'shadows.lookup' holds no texture"):
+        endpoint(graph, "shadows.lookup")
+
+
+# --- all at once -----------------------------------------------------------------------------------------------------
+
+
+def test_mistakes_of_every_stage_come_together(toy_catalog: Catalog) -> None:
+    text = """
+sise: [1, 2]
+scene: nowhere
+nodes:
+  a: {type: gbuffer, type: gbuffer}
+  b: {type: tonmap}
+  c: {type: ssao, inputs: {depth: a.normal}, params: {samples: 0, radios: 1}}
+  d: {type: tonemap, inputs: {radiance: $x}}
+outputs: {image: e.color}
+"""
+    found = problems(text, toy_catalog)
+    assert [message[:5] for message in found] == [
+        "RG101", "RG015", "RG002", "RG102", "RG110", "RG104", "RG103", "RG113", "RG109",
+    ]  # fmt: skip
+
+
+def test_a_broken_plugin_is_told_once(tmp_path: Path) -> None:
+    (tmp_path / "broken.py").write_text("raise RuntimeError('no')\n")
+    catalog = Catalog.discover([tmp_path], installed=False)
+    found = problems("nodes: {a: {type: broken}, b: {type: broken}}\noutputs: {o: a.x}", catalog)
+    assert len(found) == 1
+    assert "RG491 node type 'broken' cannot be imported: RuntimeError: no" in found[0]
+
+
+LINES = FORWARD.strip().splitlines()
+
+
+@given(st.permutations(LINES[2:7]))
+@settings(max_examples=40, deadline=None)
+def test_the_order_of_keys_changes_nothing_but_the_order(toy_catalog: Catalog, nodes: list[str]) -> None:
+    text = "\n".join([*LINES[:2], *nodes, *LINES[7:]])
+    one, other = linked(FORWARD, toy_catalog), linked(text, toy_catalog)
+    assert sorted(node.id for node in one.nodes) == sorted(node.id for node in other.nodes)
+    assert [node.id for node in other.nodes] == [line.split(":")[0].strip() for line in nodes]
+    assert dict(one.textures) == dict(other.textures)
+    assert {node.id: dict(node.inputs) for node in one.nodes} == {node.id: dict(node.inputs) for node in other.nodes}
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_any_wiring_is_linked_or_refused(toy_catalog: Catalog, data: st.DataObject) -> None:
+    types = data.draw(st.lists(st.sampled_from(toy_catalog.names()), min_size=1, max_size=6))
+    lines = []
+    for number, name in enumerate(types):
+        inputs = toy_catalog.get(name).cls.inputs()
+        links = {
+            port: f"n{data.draw(st.integers(0, len(types) - 1))}.{data.draw(st.sampled_from(ports))}"
+            + data.draw(st.sampled_from(["", "", "@previous"]))
+            for port in inputs
+            if (ports := list(itertools.chain(*(toy_catalog.get(other).cls.outputs() for other in types))))
+            and data.draw(st.booleans())
+        }
+        wired = ", ".join(f"{port}: {end}" for port, end in links.items())
+        lines.append(f"  n{number}: {{type: {name}, inputs: {{{wired}}}}}")
+    text = "size: [8, 8]\nnodes:\n" + "\n".join(lines) + "\noutputs: {o: n0.radiance}\n"
+    try:
+        graph = linked(text, toy_catalog)
+    except InputError as error:
+        assert all(problem.place and problem.place.line for problem in error.problems)  # noqa: PT017  # others fail
+    else:
+        for node in graph.nodes:
+            assert all(replaced(end) in graph.textures for ends in node.inputs.values() for end in ends)
+
+
+def replaced(end: Endpoint) -> Endpoint:
+    return Endpoint(end.node, end.port)

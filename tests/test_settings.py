@@ -1,0 +1,62 @@
+"""The project's settings file. What roots mean for pipelines is in `test_resolve.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rendergraph.errors import InputError, Place
+from rendergraph.settings import Roots, load, nearest
+
+
+def test_the_nearest_above(tmp_path: Path) -> None:
+    inner = tmp_path / "a" / "b"
+    inner.mkdir(parents=True)
+    assert nearest(inner) is None
+    (tmp_path / "rendergraph.toml").write_text('asset_roots = ["../assets", "/data"]\nplugins = ["nodes"]\n')
+    found = nearest(inner)
+    assert found is not None
+    assert found.folder == tmp_path
+    assert found.asset_roots == (tmp_path / "../assets", Path("/data"))
+    assert found.plugins == (tmp_path / "nodes",)
+    (tmp_path / "a" / "rendergraph.toml").touch()
+    nearer = nearest(inner)
+    assert nearer is not None
+    assert nearer.folder == tmp_path / "a"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("asset_roots = [", "RG017 not a valid settings file"),
+        ("asset_root = []", r"RG017 no setting 'asset_root'; did you mean 'asset_roots'\?"),
+        ('plugins = "nodes"', "RG017 'plugins' is a list of paths, as in plugins ="),
+        ("plugins = [1]", "RG017 'plugins' is a list of paths"),
+        ('plugins = ["a\\u0000b"]', "RG017 'plugins' is a list of paths"),
+    ],
+)
+def test_wrong_settings(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "rendergraph.toml").write_text(text)
+    with pytest.raises(InputError, match=message):
+        load(tmp_path / "rendergraph.toml")
+    (tmp_path / "rendergraph.toml").write_bytes(b"\xff")
+    with pytest.raises(InputError, match="RG017"):
+        load(tmp_path / "rendergraph.toml")
+
+
+def test_roots_say_where_a_path_stands(tmp_path: Path) -> None:
+    roots = Roots.around(tmp_path / "pipeline.yaml")
+    (tmp_path / "texture.png").touch()
+    assert roots.check(tmp_path / "." / "texture.png") == (tmp_path / "texture.png").resolve()
+    place = Place("scene.yaml", 3, 5)
+    for path, message in (
+        (tmp_path / "textures.png", r"scene.yaml:3:5: RG011 .*; did you mean 'texture.png'\?"),
+        (tmp_path, "scene.yaml:3:5: RG011 .* is a folder"),
+        (tmp_path / ".." / "x.png", "scene.yaml:3:5: RG012"),
+        (Path("/dev/zero"), "scene.yaml:3:5: RG012"),
+    ):
+        with pytest.raises(InputError, match=message):
+            roots.check(path, place)
+    with pytest.raises(InputError, match=r"RG011 there is no file 'a/b.png'"):
+        roots.check(tmp_path / "b.png", place, written="a/b.png")
