@@ -548,16 +548,21 @@ class FrameScene(Protocol):
 
 
 class Frame(Protocol):
-    """What `update` may ask and do."""
+    """What `update` may ask and do.
+
+    Attributes:
+        index: frame number, from 1.
+        time: seconds since frame 1.
+        camera: the pipeline's camera in this frame.
+        scene: the scene in this frame.
+    """
 
     index: int
-    """Frame number, from 1."""
     time: float
-    """Seconds since frame 1."""
     camera: ViewMatrices
-    """The pipeline's camera in this frame."""
-    scene: FrameScene
-    """The scene in this frame."""
+
+    @property
+    def scene(self) -> FrameScene: ...
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""

@@ -1,237 +1,32 @@
-"""Graph to Expansion: what each node records, with resources and versions in place of ports.
-
-Nodes are recorded from the end of the graph to its beginning, so that a node already knows which of its outputs
-anybody reads; then versions are counted from the beginning to the end.
-"""
+"""Second pass: resources and versions in place of the ports that nodes recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, get_args
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any
 
-from rendergraph.declare import (
-    Facts,
-    Function,
-    History,
-    InOut,
-    Input,
-    Internal,
-    Made,
-    Node,
-    Part,
-    Port,
-    TextureInfo,
-    Views,
-)  # fmt: skip
+from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Part, Port, Views
 from rendergraph.errors import InputError, Problem
-from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.steps import (
-    FunctionBinding, Read, Request, Resource, Role, Step, Steps, UniformValue, Write, define_text,
-)  # fmt: skip
+from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
+from rendergraph.expand.parameters import define_parameters, param_uniforms
+from rendergraph.expand.recording import Recorder, now
+from rendergraph.link import Endpoint, Graph
+from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
-CAMERA = "camera"
-"""Id of the view table every pipeline has."""
 
-
-@dataclass(frozen=True)
-class ViewTable:
-    """A table of views: how many, and the scene's light index of each (empty where views are not lights')."""
-
-    count: int = 1
-    lights: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class Expansion:
-    """All steps of a graph with the resources they touch.
+class Numbering:
+    """Second pass: resources and versions for what was recorded.
 
     Attributes:
-        steps: in the order of the graph's nodes and of recording.
-        resources: by id.
-        wanted: output name or tap to the id of the resource that must exist at the end of the frame.
-        idle: nodes that recorded nothing, with the reason.
-        views: view tables by id.
+        version: resource id to its newest version so far.
+        at_end: port to its resource and the version it has when its node is done.
+        written: resource id to the parts (mip, layer) written so far.
     """
-
-    steps: tuple[Step, ...]
-    resources: Mapping[str, Resource]
-    wanted: Mapping[str, str]
-    idle: Mapping[str, str] = field(default_factory=dict)
-    views: Mapping[str, ViewTable] = field(default_factory=dict)
-
-
-def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
-    """Record every node that `wanted` needs.
-
-    Args:
-        graph: a checked graph.
-        wanted: name to port for everything that must exist at the end of the frame; the file's outputs by default.
-
-    Raises:
-        InputError: a node recorded something that its declaration does not allow.
-    """
-    outputs = dict(graph.outputs if wanted is None else wanted)
-    order = _topological(graph)
-    recorders, idle = _record_all(graph, order, outputs)
-    return _Numbering(graph, recorders, idle, outputs).expansion()
-
-
-def is_empty(info: TextureInfo | None) -> bool:
-    """Whether a texture has no layers: no light casts, nothing is drawn, and readers do without."""
-    return info is not None and info.desc is not None and info.desc.layers == 0
-
-
-def _topological(graph: Graph) -> list[str]:
-    import networkx as nx
-
-    dag: nx.DiGraph[str] = nx.DiGraph()
-    dag.add_nodes_from(graph.dag.nodes)
-    dag.add_edges_from((a, b) for a, b, data in graph.dag.edges(data=True) if not data["previous"])
-    place = {name: number for number, name in enumerate(dag)}
-    return list(nx.lexicographical_topological_sort(dag, key=place.__getitem__))
-
-
-# --- recording -------------------------------------------------------------------------------------------------------
-
-
-class _Recorder:
-    """The `steps.Recorder` of one node: keeps requests, answers what is known."""
-
-    def __init__(self, graph: Graph, node: GraphNode, used: set[str]) -> None:
-        self.graph = graph
-        self.node = node
-        self.used_ports = used
-        self.requests: list[Request] = []
-        self.links = {
-            name: tuple(end for end in ends if not is_empty(graph.textures.get(_now(end))))
-            for name, ends in node.inputs.items()
-        }
-        self.facts = Facts(
-            viewport=graph.size,
-            lights=graph.lights,
-            inputs={
-                name: tuple(graph.textures[_now(end)] for end in ends if _now(end) in graph.textures)
-                for name, ends in self.links.items()
-                if ends
-            },
-        )
-
-    def desc(self, port: Port) -> TextureDesc | BufferDesc:
-        if isinstance(port, Input):
-            found = self.facts.input(port.name).desc
-            return found if found is not None else BufferDesc(self.facts.input(port.name).bytes)
-        info = self.graph.textures[Endpoint(self.node.id, port.name)]
-        return info.desc if info.desc is not None else BufferDesc(info.bytes)
-
-    def used(self, port: Port) -> bool:
-        return port.name in self.used_ports
-
-    def add(self, request: Request) -> None:
-        self.requests.append(request)
-
-    def reads_of(self, request: Request) -> Iterator[tuple[str, Port | Part]]:
-        """Names and ports a request reads, with the default inputs filled in."""
-        if not request.default_inputs:
-            yield from request.bindings.items()
-            return
-        for name, port in self.node.node.inputs().items():
-            if isinstance(port, Input) and self.links.get(name):
-                yield name, port
-
-    def demands(self) -> Iterator[Endpoint]:
-        """The ports of other nodes that the recorded steps and the used functions read."""
-        ports = self.node.node.ports()
-        names: set[str] = set()
-        for request in self.requests:
-            for _, target in self.reads_of(request):
-                port = target.port if isinstance(target, Part) else target
-                names |= {port.name, *(port.reads if isinstance(port, Function) else ())}
-            names |= {part.port.name for _, part in request.out if isinstance(part.port, InOut)}
-            view = request.options.get("view")
-            names |= {view.name} if isinstance(view, Input) else set()
-            if "view" in self.links:
-                names.add("view")
-        for name in self.used_ports:
-            used = ports.get(name)
-            if isinstance(used, Function):
-                names.update(used.reads)
-        for name in names:
-            yield from self.links.get(name, ())
-
-
-def _now(end: Endpoint) -> Endpoint:
-    return replace(end, previous=False) if end.previous else end
-
-
-def _record_all(
-    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint]
-) -> tuple[dict[str, _Recorder], dict[str, str]]:
-    demanded: dict[str, set[str]] = {name: set() for name in order}
-    for end in wanted.values():
-        demanded[end.node].add(end.port)
-    for node in graph.nodes:  # last frame's readers may come earlier in the order, so all of them count
-        for ends in node.inputs.values():
-            for end in ends:
-                if end.previous:
-                    demanded[end.node].add(end.port)
-    recorders: dict[str, _Recorder] = {}
-    idle: dict[str, str] = {}
-    for name in reversed(order):
-        node = graph[name]
-        used = demanded[name]
-        if not used:
-            idle[name] = "nothing that is wanted reads its outputs"
-            continue
-        reason = _nothing_to_do(graph, node, used)
-        if reason:
-            idle[name] = reason
-            continue
-        recorder = _Recorder(graph, node, used)
-        steps = Steps(node.node, name, node.type.name, recorder)
-        try:
-            node.node.record(steps)
-        except (InputError, AssertionError, KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(_author_problem(node, error)) from error
-        recorders[name] = recorder
-        for end in recorder.demands():
-            demanded[end.node].add(end.port)
-    return {name: recorders[name] for name in order if name in recorders}, idle
-
-
-def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
-    """Why a node has nothing to record: what it would draw, or what it must read, has no layers."""
-    made = [graph.textures.get(Endpoint(node.id, name)) for name in used]
-    if made and all(is_empty(info) for info in made):
-        return f"{node.id}.{min(used)} has no layers: there is nothing to draw"
-    for name, port in node.node.inputs().items():
-        ends = node.inputs.get(name, ())
-        required = isinstance(port, Input) and not port.optional
-        if required and ends and all(is_empty(graph.textures.get(_now(end))) for end in ends):
-            return f"{ends[0]} has no layers: there is nothing to read"
-    return None
-
-
-def _author_problem(node: GraphNode, error: Exception) -> Problem:
-    import traceback
-
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(node.type.file)]
-    where = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
-    text = f"node '{node.id}' ({node.type.name}) failed while recording: {where}{type(error).__name__}: {error}"
-    return Problem("RG420", text, node.place)
-
-
-# --- numbering -------------------------------------------------------------------------------------------------------
-
-
-class _Numbering:
-    """Second pass: resources and versions for what was recorded."""
 
     def __init__(
-        self, graph: Graph, recorders: dict[str, _Recorder], idle: dict[str, str], wanted: dict[str, Endpoint]
+        self, graph: Graph, recorders: dict[str, Recorder], idle: dict[str, str], wanted: dict[str, Endpoint]
     ) -> None:
         self.graph = graph
         self.recorders = recorders
@@ -245,6 +40,7 @@ class _Numbering:
         self.steps: list[Step] = []
 
     def expansion(self) -> Expansion:
+        """Number everything that was recorded."""
         for name, recorder in self.recorders.items():
             self._declare(recorder)
             before = len(self.steps)
@@ -262,7 +58,7 @@ class _Numbering:
         self._mark_roles(wanted)
         return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
 
-    def _declare(self, recorder: _Recorder) -> None:
+    def _declare(self, recorder: Recorder) -> None:
         """Give every texture the node may write a resource; an `InOut` continues somebody's."""
         node = recorder.node
         for port in node.node.ports().values():
@@ -274,7 +70,7 @@ class _Numbering:
             if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recorder.links.get(port.name):
-                self.at_end[end] = self.at_end[_now(recorder.links[port.name][0])]
+                self.at_end[end] = self.at_end[now(recorder.links[port.name][0])]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -287,13 +83,13 @@ class _Numbering:
             self.written[resource.id] = set()
             self.at_end[end] = (resource.id, 0)
 
-    def _finish(self, recorder: _Recorder, port: Made) -> None:
+    def _finish(self, recorder: Recorder, port: Made) -> None:
         end = Endpoint(recorder.node.id, port.name)
         if end in self.at_end:
             resource, _ = self.at_end[end]
             self.at_end[end] = (resource, self.version[resource])
 
-    def _step(self, recorder: _Recorder, request: Request, index: int) -> Step:
+    def _step(self, recorder: Recorder, request: Request, index: int) -> Step:
         node = recorder.node
         options = dict(request.options)
         reads: list[Read] = []
@@ -342,10 +138,10 @@ class _Numbering:
             **{key: options[key] for key in keep if key in options},
         )
 
-    def _own(self, recorder: _Recorder, port: Port) -> str:
+    def _own(self, recorder: Recorder, port: Port) -> str:
         return self.at_end[Endpoint(recorder.node.id, port.name)][0]
 
-    def _reads(self, recorder: _Recorder, name: str, part: Part) -> list[Read]:
+    def _reads(self, recorder: Recorder, name: str, part: Part) -> list[Read]:
         port = part.port
         if isinstance(port, Input):
             ends = recorder.links.get(port.name, ())
@@ -358,14 +154,14 @@ class _Numbering:
                 for number, end in enumerate(ends)
             ]
         own = Endpoint(recorder.node.id, port.name, part.previous)
-        resource, _ = self.at_end[_now(own)]
+        resource, _ = self.at_end[now(own)]
         use = "buffer" if isinstance(self.resources[resource].desc, BufferDesc) else "sample"
         return [self._read(name, own, part, part.sampler or Sampler(), use, self.version[resource])]
 
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: str, version: int | None = None
     ) -> Read:
-        resource, at_end = self.at_end[_now(end)] if _now(end) in self.at_end else (str(_now(end)), 0)
+        resource, at_end = self.at_end[now(end)] if now(end) in self.at_end else (str(now(end)), 0)
         desc = self._desc_of(end, resource)
         if isinstance(desc, BufferDesc):
             use = "buffer"
@@ -379,11 +175,11 @@ class _Numbering:
     def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
         if resource in self.resources:
             return self.resources[resource].desc
-        info = self.graph.textures[_now(end)]  # last frame's value of a node further down
+        info = self.graph.textures[now(end)]  # last frame's value of a node further down
         return info.desc if info.desc is not None else BufferDesc(info.bytes)
 
     def _write(
-        self, recorder: _Recorder, request: Request, name: str, part: Part, value: Any
+        self, recorder: Recorder, request: Request, name: str, part: Part, value: Any
     ) -> tuple[list[Read], Write]:
         port = part.port
         if not isinstance(port, Made):
@@ -415,7 +211,7 @@ class _Numbering:
             use = "buffer"
         elif request.kind == "compute":
             use = "image"
-        elif self.is_depth(desc):
+        elif isinstance(desc, TextureDesc) and FORMATS[desc.format].is_depth:
             use = "depth"
         read = []
         if load == "load" and (continued or old > 0):
@@ -427,11 +223,7 @@ class _Numbering:
         write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
 
-    @staticmethod
-    def is_depth(desc: TextureDesc | BufferDesc) -> bool:
-        return isinstance(desc, TextureDesc) and FORMATS[desc.format].is_depth
-
-    def _view(self, recorder: _Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
+    def _view(self, recorder: Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
         port = options.pop("view", None)
         index = options.pop("view_index", 0)
         if request.kind not in ("geometry", "draw"):
@@ -457,7 +249,7 @@ class _Numbering:
         return (1, 1), 1
 
     def _defines(
-        self, recorder: _Recorder, reads: list[Read], functions: list[FunctionBinding]
+        self, recorder: Recorder, reads: list[Read], functions: list[FunctionBinding]
     ) -> Iterator[tuple[str, str]]:
         node = recorder.node.node
         read_names = {read.name for read in reads}
@@ -470,7 +262,7 @@ class _Numbering:
 
     # Functions ------------------------------------------------------------------------------------------------------
 
-    def _own_function(self, recorder: _Recorder, port: Function) -> list[FunctionBinding]:
+    def _own_function(self, recorder: Recorder, port: Function) -> list[FunctionBinding]:
         return self._binding(recorder, port)
 
     def _function(self, end: Endpoint) -> list[FunctionBinding]:
@@ -481,7 +273,7 @@ class _Numbering:
         assert isinstance(port, Function)
         return self._binding(recorder, port)
 
-    def _binding(self, recorder: _Recorder, port: Function) -> list[FunctionBinding]:
+    def _binding(self, recorder: Recorder, port: Function) -> list[FunctionBinding]:
         node = recorder.node
         reads = []
         ports = node.node.ports()
@@ -529,39 +321,3 @@ class _Numbering:
             resource = self.resources[name]
             role: Role = "history" if name in previous or resource.role == "history" else "output"
             self.resources[name] = replace(resource, role=role)
-
-
-# --- parameters as program text and uniforms -------------------------------------------------------------------------
-
-
-def define_parameters(node: Node) -> Iterator[tuple[str, str]]:
-    """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers."""
-    for name, info in type(node).parameters().items():
-        if type(node).role_of(name) != "define":
-            continue
-        value = getattr(node, name)
-        if isinstance(value, str):
-            choices = [choice for choice in get_args(info.annotation) if isinstance(choice, str)]
-            for number, choice in enumerate(choices):
-                yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
-            yield name.upper(), f"{name}_{value}".upper().replace("-", "_")
-        else:
-            yield name.upper(), define_text(value)
-
-
-def param_uniforms(node: Node) -> Iterator[tuple[str, UniformValue]]:
-    """Names and values of a node's `param` parameters; a number given for a vector fills it."""
-    for name, info in type(node).parameters().items():
-        if type(node).role_of(name) != "param":
-            continue
-        value = getattr(node, name)
-        extra = info.json_schema_extra
-        glsl = str(extra.get("glsl", "")) if isinstance(extra, Mapping) else ""
-        if glsl.startswith("vec") and not isinstance(value, tuple):
-            value = (float(value),) * int(glsl[3])
-        yield name, value
-
-
-__all__ = [
-    "CAMERA", "Expansion", "ViewTable", "define_parameters", "expand", "is_empty", "param_uniforms",
-]  # fmt: skip

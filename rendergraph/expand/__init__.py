@@ -1,0 +1,35 @@
+"""Graph to Expansion: what each node records, with resources and versions in place of ports.
+
+Nodes are recorded from the end of the graph to its beginning, so that a node already knows which of its outputs
+anybody reads; then versions are counted from the beginning to the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
+from rendergraph.expand.numbering import Numbering
+from rendergraph.expand.parameters import define_parameters, param_uniforms
+from rendergraph.expand.recording import record_all, topological
+from rendergraph.link import Endpoint, Graph
+
+__all__ = [
+    "CAMERA", "Expansion", "ViewTable", "define_parameters", "expand", "is_empty", "param_uniforms",
+]  # fmt: skip
+
+
+def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
+    """Record every node that `wanted` needs.
+
+    Args:
+        graph: a checked graph.
+        wanted: name to port for everything that must exist at the end of the frame; the file's outputs by default.
+
+    Raises:
+        InputError: a node recorded something that its declaration does not allow.
+    """
+    outputs = dict(graph.outputs if wanted is None else wanted)
+    order = topological(graph)
+    recorders, idle = record_all(graph, order, outputs)
+    return Numbering(graph, recorders, idle, outputs).expansion()

@@ -1,0 +1,37 @@
+"""Parameters as program text and as uniforms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import get_args
+
+from rendergraph.declare import Node
+from rendergraph.steps import UniformValue, define_text
+
+
+def define_parameters(node: Node) -> Iterator[tuple[str, str]]:
+    """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers."""
+    for name, info in type(node).parameters().items():
+        if type(node).role_of(name) != "define":
+            continue
+        value = getattr(node, name)
+        if isinstance(value, str):
+            choices = [choice for choice in get_args(info.annotation) if isinstance(choice, str)]
+            for number, choice in enumerate(choices):
+                yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
+            yield name.upper(), f"{name}_{value}".upper().replace("-", "_")
+        else:
+            yield name.upper(), define_text(value)
+
+
+def param_uniforms(node: Node) -> Iterator[tuple[str, UniformValue]]:
+    """Names and values of a node's `param` parameters; a number given for a vector fills it."""
+    for name, info in type(node).parameters().items():
+        if type(node).role_of(name) != "param":
+            continue
+        value = getattr(node, name)
+        extra = info.json_schema_extra
+        glsl = str(extra.get("glsl", "")) if isinstance(extra, Mapping) else ""
+        if glsl.startswith("vec") and not isinstance(value, tuple):
+            value = (float(value),) * int(glsl[3])
+        yield name, value
