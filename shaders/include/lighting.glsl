@@ -9,7 +9,7 @@ Reflected reflected_lights(Surface s) {
     for (int i = 0; i < LIGHT_COUNT; ++i) {
         vec3 to_light;
         vec3 irradiance = irradiance_from(lights[i], s.position, to_light);
-        irradiance *= shadow(i, s.position, s.geometric_normal);
+        if (dot(s.normal, to_light) > 0.0) irradiance *= shadow(i, s.position, s.geometric_normal);
         Reflected one = reflected(s, to_light);
         sum.diffuse += one.diffuse * irradiance;
         sum.specular += one.specular * irradiance;

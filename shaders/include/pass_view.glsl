@@ -1,4 +1,4 @@
-// The view this pass is drawn with: the camera, or a light's, or another's.
+// The view this pass is drawn with, PASS_VIEW: the camera, or a light's, or another's.
 #ifndef PASS_VIEW_COUNT
 #define PASS_VIEW_COUNT 1
 #endif
@@ -6,4 +6,10 @@
 layout(std140) uniform pass_view_block {
     View pass_views[PASS_VIEW_COUNT];
 };
+
+#if PASS_VIEW_COUNT == 1
+#define PASS_VIEW pass_views[0]
+#else
 uniform int view_index;
+#define PASS_VIEW pass_views[view_index]
+#endif

@@ -34,9 +34,14 @@ struct Surface {
 // Fills in what the models of this program look at. Empirical models take the material's own kd, ks and n where no texture
 // changes what they are derived from, else: kd = base (1 - metallic), ks = f0, 4 n = 2 / alpha^2 - 2.
 void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
+#ifdef DEFAULT_SPECULAR  // no material of the scene has another index of refraction or specular colour
+    s.f0 = mix(vec3(0.04), s.base_color, s.metallic);
+    s.f90 = 1.0;
+#else
     vec3 dielectric = min(m.extra.x * specular.rgb, 1.0) * specular.a;
     s.f0 = mix(dielectric, s.base_color, s.metallic);
     s.f90 = mix(specular.a, 1.0, s.metallic);
+#endif
     s.diffuse = s.base_color * (1.0 - s.metallic);
     s.ambient = s.base_color;
 #if SHADING == SHADING_PHONG || SHADING == SHADING_BLINN_PHONG

@@ -127,7 +127,11 @@ Surface surface_here(View view) {
     float open = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;
     s.occlusion += m.surface.z * (open - 1.0);
 #endif
+#ifdef NO_EMISSIVE  // no material of the scene glows
+    s.emissive = vec3(0.0);
+#else
     s.emissive = m.emissive.rgb;
+#endif
 #ifdef HAS_EMISSIVE_TEXTURE
     s.emissive *= texture(emissive_texture, slot_uv(v_material, EMISSIVE_SLOT, UV_SET(EMISSIVE_UV))).rgb;
 #endif

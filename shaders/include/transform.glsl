@@ -37,5 +37,5 @@ vec3 normal_to_world(vec3 n) {
 }
 
 vec4 world_to_clip(vec3 position) {
-    return pass_views[view_index].view_projection * vec4(position, 1.0);
+    return PASS_VIEW.view_projection * vec4(position, 1.0);
 }

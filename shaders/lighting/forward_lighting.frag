@@ -10,7 +10,7 @@ uniform sampler2D occlusion;
 out vec4 radiance;  // scene-linear, premultiplied; alpha is coverage
 
 void main() {
-    Surface s = surface_here(pass_views[view_index]);
+    Surface s = surface_here(PASS_VIEW);
 #ifdef HAS_OCCLUSION
     s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
 #endif

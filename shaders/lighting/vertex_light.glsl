@@ -17,7 +17,7 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     s.position = position;
     s.normal = normal;
     s.geometric_normal = normal;
-    s.to_viewer = to_viewer(pass_views[view_index], position);
+    s.to_viewer = to_viewer(PASS_VIEW, position);
 #ifdef DOUBLE_SIDED
     if (dot(s.normal, s.to_viewer) < 0.0) s.normal = -s.normal;
 #endif
