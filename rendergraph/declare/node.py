@@ -1,0 +1,108 @@
+"""The base of every node."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
+
+from rendergraph.declare.ports import PORT_TYPES, Function, InOut, Input, Output, Port, Views
+
+if TYPE_CHECKING:
+    from rendergraph.steps import Frame, Steps
+
+
+@cache
+def _ports_of(cls: type[Node]) -> dict[str, Port]:
+    # Every stage asks for ports of every node, and pydantic's base classes hold hundreds of attributes.
+    found: dict[str, Port] = {}
+    for base in reversed(cls.__mro__):
+        if issubclass(base, Node):
+            for name, value in vars(base).items():
+                if isinstance(value, Port):
+                    found[name] = value
+                elif name in found:
+                    del found[name]  # a subclass may drop a port by setting it to None
+    return found
+
+
+class Node(BaseModel):
+    """Base of every node: ports and parameters as class attributes, nothing more for a plain full-screen pass.
+
+    Instances are frozen: they hold parameter values only. The type's name is the stem of its module.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, strict=True, extra="forbid", ignored_types=PORT_TYPES, protected_namespaces=(),
+    )  # fmt: skip
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _within_limits(cls, value: Any, info: ValidationInfo) -> Any:
+        # Not pydantic's ge and le: a parameter may be a number or a colour, and the limits hold for each component.
+        extra = cls.model_fields[str(info.field_name)].json_schema_extra
+        limits = extra if isinstance(extra, Mapping) else {}
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                continue
+            if not math.isfinite(number):
+                raise ValueError("must be finite")
+            low, high = limits.get("minimum"), limits.get("maximum")
+            if isinstance(low, int | float) and number < low:
+                raise ValueError(f"must be at least {low}")
+            if isinstance(high, int | float) and number > high:
+                raise ValueError(f"must be at most {high}")
+        return value
+
+    shader: ClassVar[str | None] = None
+    """Fragment shader of the default `record`; the type's name with `.frag` where None."""
+
+    def record(self, steps: Steps) -> None:
+        """Append the steps of this pass; called before the schedule and without GL. One full-screen step by default."""
+        steps.fullscreen(self.shader or f"{steps.type_name}.frag")
+
+    def update(self, frame: Frame) -> None:
+        """Compute what changes each frame on the CPU: views, buffers. Called once a frame, before any step runs."""
+
+    @classmethod
+    def ports(cls) -> dict[str, Port]:
+        """Every port by name, in the order of declaration, bases first."""
+        return dict(_ports_of(cls))
+
+    @classmethod
+    def inputs(cls) -> dict[str, Input | InOut]:
+        """Ports that take links."""
+        return {name: port for name, port in cls.ports().items() if isinstance(port, Input | InOut)}
+
+    @classmethod
+    def outputs(cls) -> dict[str, Output | InOut | Function | Views]:
+        """Ports that others may read."""
+        return {
+            name: port
+            for name, port in cls.ports().items()
+            if isinstance(port, Output | InOut | Function) or (isinstance(port, Views) and port.public)
+        }
+
+    @classmethod
+    def groups(cls) -> dict[str, tuple[str, ...]]:
+        """Group name to the inputs it stands for."""
+        table: dict[str, tuple[str, ...]] = {}
+        for name, port in cls.inputs().items():
+            if isinstance(port, Input) and port.group:
+                table[port.group] = (*table.get(port.group, ()), name)
+        return table
+
+    @classmethod
+    def parameters(cls) -> dict[str, FieldInfo]:
+        """Parameter name to its pydantic field; `role_of` tells uniform, define and structural apart."""
+        return cls.model_fields
+
+    @classmethod
+    def role_of(cls, parameter: str) -> Literal["param", "define", "structural"]:
+        """How a parameter reaches the program."""
+        extra = cls.model_fields[parameter].json_schema_extra
+        return extra["role"] if isinstance(extra, Mapping) and "role" in extra else "structural"  # type: ignore[return-value]

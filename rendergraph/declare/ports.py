@@ -1,0 +1,210 @@
+"""Ports: named connection points and textures of a node.
+
+Sizes, formats and counts may be constants or functions `(node, facts)`; `Facts` is all such a function may ask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeAlias, TypeVar
+
+from rendergraph.declare.facts import Facts
+from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wrap
+
+T = TypeVar("T")
+Ruled: TypeAlias = "T | Callable[[Any, Facts], T]"
+"""A constant, or a function of the node and the facts known before the schedule."""
+
+SizeRule: TypeAlias = "float | tuple[int, int] | str | tuple[str, float] | Callable[[Any, Facts], tuple[int, int]]"
+"""A factor of the viewport; width and height; an input's name; an input's name with a factor; a function."""
+
+
+@dataclass(frozen=True, eq=False)
+class Port:
+    """One named connection point or texture of a node; its name is the class attribute's."""
+
+    name: str = field(init=False, default="")
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        object.__setattr__(self, "name", name)
+
+    def mip(self, level: int) -> Part:
+        """One level of the mip chain as an ordinary 2D texture."""
+        return Part(self, mip=level)
+
+    def layer(self, index: int) -> Part:
+        """One array layer or cube face as an ordinary 2D texture."""
+        return Part(self, layer=index)
+
+    def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
+        """The whole texture, read with this sampler; inputs have theirs declared."""
+        return Part(self, sampler=Sampler(filter, wrap, compare))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A port's texture, or one mip or layer of it; `previous` is last frame's value of a history texture."""
+
+    port: Port
+    mip: int | None = None
+    layer: int | None = None
+    previous: bool = False
+    sampler: Sampler | None = None
+
+    def at_mip(self, level: int) -> Part:
+        """The same layer's level."""
+        return replace(self, mip=level)
+
+    def at_layer(self, index: int) -> Part:
+        """The same level's layer."""
+        return replace(self, layer=index)
+
+    def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
+        """The same part, read with this sampler."""
+        return replace(self, sampler=Sampler(filter, wrap, compare))
+
+
+@dataclass(frozen=True, eq=False)
+class Input(Port):
+    """Something read.
+
+    Attributes:
+        semantic: what it must mean; `Any` takes everything.
+        kind: kind of port; `function` takes a `Signature` as its semantic.
+        size: `same` as the pass's target, or `any`.
+        filter, wrap, compare, anisotropy: the sampler, `filter` also as a function of the node's parameters.
+        samples: `single`, `multi` (a multisampled texture) or `any`.
+        optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
+        many: it takes a list.
+        use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
+        group: the name of the group it belongs to.
+        doc: one line.
+    """
+
+    semantic: Semantic | Signature
+    kind: Kind = "texture2d"
+    size: Literal["same", "any"] = "same"
+    filter: Filter | Callable[[Any], Filter] = "nearest"
+    wrap: Wrap = "clamp"
+    compare: bool = False
+    anisotropy: int = 1
+    samples: Literal["single", "multi", "any"] = "single"
+    optional: bool = False
+    many: bool = False
+    use: Literal["sample", "depth_test", "image"] = "sample"
+    group: str | None = None
+    doc: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Made(Port):
+    """A texture or buffer that the node makes: the shared part of `Output`, `InOut`, `Internal` and `History`.
+
+    Attributes:
+        semantic: what it means; None with `like`.
+        like: name of an input whose format, size, semantic, view and lights it takes over.
+        kind: kind of texture, or `buffer`.
+        format: a name in `textures.FORMATS`.
+        size: see `SizeRule`; the viewport by default.
+        mips: levels; 0 means the full chain.
+        layers: array layers; a cube always has 6.
+        samples: samples per texel.
+        bytes: size of a `buffer`.
+        clear: what it first holds; None discards, which is right where every texel is written.
+        first: value of every channel in the first frame, where somebody reads `@previous`.
+        view: name of a `Views` port, a `view` input or a texture input: the view it is drawn with. By default
+            textures that a geometry step draws carry the view the step was drawn with.
+        lights: name of an input whose layer-to-light table it carries, or the table itself.
+        doc: one line.
+    """
+
+    semantic: Semantic | None = None
+    like: str | None = None
+    kind: Kind = "texture2d"
+    format: Ruled[str] = "rgba16f"
+    size: SizeRule = 1.0
+    mips: Ruled[int] = 1
+    layers: Ruled[int] = 1
+    samples: Ruled[int] = 1
+    bytes: Ruled[int] = 0
+    clear: float | tuple[float, ...] | Callable[[Any], float | tuple[float, ...]] | None = None
+    first: float = 0.0
+    view: str | None = None
+    lights: str | Callable[[Any, Facts], tuple[int, ...]] | None = None
+    doc: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Output(Made):
+    """Something made for others.
+
+    Attributes:
+        needs: inputs that must be connected for this output to be used.
+    """
+
+    needs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class InOut(Made):
+    """A texture somebody else made, continued: each write is a new version, and readers of the old one run before.
+
+    Attributes:
+        optional: not connected, the node makes the texture itself from the `Made` fields.
+    """
+
+    optional: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Internal(Made):
+    """A scratch texture or buffer of the node's own, aliased like any other."""
+
+
+@dataclass(frozen=True, eq=False)
+class History(Made):
+    """A texture of the node's own that outlives the frame: write `self.x`, read last frame's `self.x.previous`."""
+
+    @property
+    def previous(self) -> Part:
+        """Last frame's value, `first` in the first frame."""
+        return Part(self, previous=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Views(Port):
+    """A table of views that the node computes in `update`, one a layer of what it draws.
+
+    Attributes:
+        count: number of views.
+        lights: the scene's light index of each view, empty where views are not lights'.
+        public: whether others may connect it (it is then an output of kind `view`).
+        doc: one line.
+    """
+
+    count: Ruled[int] = 1
+    lights: Callable[[Any, Facts], tuple[int, ...]] | None = None
+    public: bool = True
+    doc: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Function(Port):
+    """A GLSL function that another node calls inside its own shader.
+
+    Attributes:
+        signature: the function it provides.
+        shader: the file with the function's text, beside the node's shaders.
+        reads: names of the inputs and internals its text samples.
+        doc: one line.
+    """
+
+    signature: Signature
+    shader: str
+    reads: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    doc: str = ""
+
+
+PORT_TYPES = (Port, Input, Made, Output, InOut, Internal, History, Views, Function)

@@ -1,0 +1,30 @@
+"""What a node records: steps with what they read and write, and the fixed-function state they need.
+
+A node's `record` fills a `Steps` without GL, so what a pass does can be read, tested and scheduled with no driver.
+`Frame` is the other side: what `update` may do each frame on the CPU.
+"""
+
+from __future__ import annotations
+
+from rendergraph.steps.frame import Frame, FrameScene, ViewMatrices
+from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, UniformValue, Write
+from rendergraph.steps.recorder import Recorder, Request, Steps, Target, define_text
+from rendergraph.steps.state import (
+    ADD,
+    ALPHA,
+    MULTIPLY,
+    PREMULTIPLIED,
+    Blend,
+    BlendFactor,
+    Compare,
+    State,
+    Stencil,
+    StencilFace,
+    StencilOp,
+)  # fmt: skip
+
+__all__ = [
+    "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Blend", "BlendFactor", "Compare", "Frame", "FrameScene",
+    "FunctionBinding", "Read", "Recorder", "Request", "Resource", "Role", "State", "Stencil", "StencilFace",
+    "StencilOp", "Step", "Steps", "Target", "UniformValue", "ViewMatrices", "Write", "define_text",
+]  # fmt: skip

@@ -1,0 +1,182 @@
+"""A step: one draw, dispatch or clear with what it reads and writes; and the resources it touches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from rendergraph.steps.state import State
+from rendergraph.textures import BufferDesc, Sampler, TextureDesc
+
+Topology = Literal["points", "lines", "line_strip", "triangles", "triangle_strip", "triangles_adjacency"]
+UniformValue: TypeAlias = "float | int | bool | Sequence[float] | Sequence[int]"
+
+
+@dataclass(frozen=True)
+class Read:
+    """A resource a step reads, and how.
+
+    Attributes:
+        name: the name in the shader.
+        resource: id of the resource, `node.port`.
+        version: which version of it; versions order readers and writers of one texture.
+        use: `sample`, `depth_test` (attached read-only), `image`, `buffer` or `attach` (the target of an `InOut`
+            whose old content stays).
+        sampler: how it is sampled.
+        mip, layer: the part read, None for all.
+        previous: last frame's value; orders nothing in this frame.
+        kind: the GLSL view of it, `texture2d` where a single mip or layer is read.
+    """
+
+    name: str
+    resource: str
+    version: int
+    use: Literal["sample", "depth_test", "image", "buffer", "attach"] = "sample"
+    sampler: Sampler = Sampler()
+    mip: int | None = None
+    layer: int | None = None
+    previous: bool = False
+    kind: str = "texture2d"
+
+
+@dataclass(frozen=True)
+class Write:
+    """A resource a step writes: version `version` comes into being.
+
+    Attributes:
+        name: the name in the shader, or the port's name.
+        resource: id of the resource.
+        version: the version that this write makes; it continues `version - 1` where that is at least 1.
+        use: `color`, `depth`, `image`, `buffer`.
+        load: `clear` first, `load` what is there, or `discard`.
+        clear: value of every channel, or one a channel.
+        mip, layer: the part written, None for mip 0 and all layers (layered).
+    """
+
+    name: str
+    resource: str
+    version: int
+    use: Literal["color", "depth", "image", "buffer"] = "color"
+    load: Literal["clear", "load", "discard"] = "discard"
+    clear: float | tuple[float, ...] = 0.0
+    mip: int | None = None
+    layer: int | None = None
+
+
+@dataclass(frozen=True)
+class FunctionBinding:
+    """One provider of a function a step's shader calls; its text's names get the provider node's prefix.
+
+    Attributes:
+        signature: the function's name.
+        node: the providing node's id.
+        shader: the file of its text, relative to the providing node's shaders.
+        reads: what the text samples, by the names in its text.
+        defines: the provider's own defines.
+        uniforms: the provider's parameters that are uniforms.
+    """
+
+    signature: str
+    node: str
+    shader: str
+    reads: tuple[Read, ...]
+    defines: tuple[tuple[str, str], ...] = ()
+    uniforms: tuple[tuple[str, UniformValue], ...] = ()
+
+
+@dataclass(frozen=True)
+class Step:
+    """One draw, dispatch, clear or mip chain.
+
+    Attributes:
+        node: id of the node that recorded it.
+        index: its number within the node.
+        kind: what it does; a `copy` is the framework's own, of a version that is wanted and then written over.
+        shaders: stage to file name (`fragment`, `vertex`, `geometry`, `compute`), relative to the node's shaders, or
+            `<name>` for one in `shaders/include/`.
+        reads, writes: resources, with versions.
+        functions: providers of functions its shader calls.
+        defines: names and program text.
+        uniforms: names and values that belong to this step alone.
+        state: fixed function.
+        size: width and height of the target in texels.
+        samples: samples of the target.
+        view: id of the view table a geometry step is drawn with.
+        view_index: which view of it; None where the shader chooses by `gl_Layer`.
+        objects: which objects a geometry step draws: `all`, `opaque`, `masked_or_opaque`, `transparent`, `casters`, or
+            names.
+        materials: what of the material its shader looks at: `full`, `alpha` (only what an alpha mask needs) or `none`.
+        order: `front_to_back` (free to regroup), `back_to_front` or `scene` (kept as given).
+        per_light: a light's index where the step draws for one light alone.
+        vertices: vertex count of a `draw` step, or the name of the buffer that holds the indirect command.
+        topology: primitives of a `draw` step.
+        instances: instance count of a `draw` step.
+        attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
+        groups: work groups of a compute step.
+        label: shown in plans and GL debug groups.
+    """
+
+    node: str
+    index: int
+    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "copy"]
+    shaders: tuple[tuple[str, str], ...] = ()
+    reads: tuple[Read, ...] = ()
+    writes: tuple[Write, ...] = ()
+    functions: tuple[FunctionBinding, ...] = ()
+    defines: tuple[tuple[str, str], ...] = ()
+    uniforms: tuple[tuple[str, UniformValue], ...] = ()
+    state: State = State()
+    size: tuple[int, int] = (1, 1)
+    samples: int = 1
+    view: str | None = None
+    view_index: int | None = 0
+    objects: str | tuple[str, ...] = "all"
+    materials: Literal["full", "alpha", "none"] = "full"
+    order: Literal["front_to_back", "back_to_front", "scene"] = "front_to_back"
+    per_light: int | None = None
+    vertices: int | str = 3
+    topology: Topology = "triangles"
+    instances: int = 1
+    attributes: tuple[tuple[str, str], ...] = ()
+    groups: tuple[int, int, int] = (1, 1, 1)
+    label: str = ""
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Node id and number: unique within a pipeline."""
+        return self.node, self.index
+
+    @property
+    def all_reads(self) -> tuple[Read, ...]:
+        """Reads of the step and of the functions it calls."""
+        return self.reads + tuple(read for function in self.functions for read in function.reads)
+
+
+Role = Literal["transient", "internal", "output", "history"]
+
+
+@dataclass(frozen=True)
+class Resource:
+    """A texture or buffer of the pipeline before it has memory.
+
+    Attributes:
+        id: `node.port` of whoever made it first; an `InOut` continues the id.
+        desc: what it is allocated from.
+        role: `transient` and `internal` may be aliased; `output` and `history` live the whole frame.
+        first: every channel's value before the first frame, for history.
+        view: id of the view table it is drawn with.
+        lights: the scene's light index of each layer.
+    """
+
+    id: str
+    desc: TextureDesc | BufferDesc
+    role: Role = "transient"
+    first: float = 0.0
+    view: str | None = None
+    lights: tuple[int, ...] = ()
+
+    @property
+    def bytes(self) -> int:
+        """Bytes by formula; a history texture has two copies."""
+        return self.desc.bytes * (2 if self.role == "history" else 1)
