@@ -130,7 +130,7 @@ def test_a_chain_of_writers_and_a_reader_before(toy_catalog: Catalog) -> None:
     assert info(graph, "fog.radiance") is info(graph, "light.radiance")
 
 
-def test_a_writer_nobody_needs_does_not_disturb_an_output(toy_catalog: Catalog) -> None:
+def test_an_output_may_show_what_somebody_continues(toy_catalog: Catalog) -> None:
     text = FORWARD.replace("outputs:", "  sky: {type: sky, inputs: {radiance: light.radiance}}\noutputs:")
     assert "radiance" in linked(text, toy_catalog).outputs
 

@@ -93,14 +93,16 @@ class _Builder:
                     items.append(self.build(parser, following, depth + 1))
             else:
                 while not isinstance(following := parser.get_event(), yaml.MappingEndEvent):
-                    self.entry(parser, following, depth + 1, items)
+                    whole = self.entry(parser, following, depth + 1, items)
+                    value.data = value.data if whole else BROKEN
         if event.tag:
             value.data = BROKEN
         if event.anchor:
             self.anchors[event.anchor] = (value, self.nodes - before)
         return value
 
-    def entry(self, parser: Any, event: Any, depth: int, into: dict[Any, Value]) -> None:
+    def entry(self, parser: Any, event: Any, depth: int, into: dict[Any, Value]) -> bool:
+        """Add one key with its value; false where nobody can say what the mapping would hold."""
         mark = event.start_mark
         merge = getattr(event, "value", None) == "<<" and event.implicit[0]
         name = self.build(parser, event, depth).data
@@ -116,6 +118,7 @@ class _Builder:
             self.say("RG002", f"the key '{shown(name)}' stands here twice, first in line {first}; remove one", mark)
         else:
             into[name] = value
+        return not merge
 
     def alias(self, event: Any, key: tuple[int, int] | None) -> Value:
         mark = event.start_mark

@@ -78,7 +78,7 @@ class _Linker:
         if knots:
             self.problems += knots
         else:
-            self.problems += needs(nodes, outputs) + versions(nodes, outputs)
+            self.problems += needs(nodes, outputs) + versions(nodes)
             self._crossings(nodes, infer)
             textures = self._textures(nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()

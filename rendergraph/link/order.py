@@ -59,8 +59,11 @@ def needs(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Probl
     return problems
 
 
-def versions(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Problem]:
-    """Mistakes about `InOut`s: each version has one writer, and its readers come before that."""
+def versions(nodes: Mapping[str, Bound]) -> list[Problem]:
+    """Mistakes about `InOut`s: each version has one writer, and its readers come before that.
+
+    An output may show a version that somebody continues: it is kept as it was.
+    """
     writers: dict[Endpoint, tuple[Bound, Link]] = {}
     problems: list[Problem] = []
     for bound in nodes.values():
@@ -79,7 +82,7 @@ def versions(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Pr
                 else:
                     writers[link.source] = bound, link
     if writers and not problems:
-        problems += _readers(nodes, outputs, writers)
+        problems += _readers(nodes, writers)
     return problems
 
 
@@ -87,13 +90,9 @@ def _port(bound: Bound, link: Link) -> str:
     return next(name for name, links in bound.links.items() if link in links)
 
 
-def _readers(
-    nodes: Mapping[str, Bound], outputs: Mapping[str, Link], writers: Mapping[Endpoint, tuple[Bound, Link]]
-) -> list[Problem]:
+def _readers(nodes: Mapping[str, Bound], writers: Mapping[Endpoint, tuple[Bound, Link]]) -> list[Problem]:
     problems = []
     before = _Ancestors(nodes)
-    live = {link.source.node for link in outputs.values()}
-    live |= {name for node in live for name in before[node]}
     for bound in nodes.values():
         for name, links in bound.links.items():
             for link in links:
@@ -111,13 +110,6 @@ def _readers(
                 elif writer.spec.id in before[bound.spec.id]:
                     text = f"'{bound.spec.id}.{name}' reads '{now}', but '{bound.spec.id}' also needs {newer} ({where})"
                     problems.append(link.value.problem("RG128", f"{text}, which overwrites it; read {newer}"))
-    for output, link in outputs.items():
-        found = writers.get(link.source)
-        if found is not None and found[0].spec.id in live:
-            newer = f"'{found[0].spec.id}.{_port(*found)}'"
-            where = line_of(found[1].value.place, link.value.place)
-            text = f"output '{output}' shows '{link.source}', but {newer} ({where}) overwrites it; show {newer}"
-            problems.append(link.value.problem("RG128", text))
     return problems
 
 
