@@ -106,7 +106,7 @@ class Reading:
     check_path: CheckPath
     limits: Limits = Limits()
     _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
-    _images: dict[Path, ImageSource] = field(default_factory=dict)
+    _images: dict[Path, tuple[ImageSource, image_header.Header]] = field(default_factory=dict)
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
@@ -188,6 +188,10 @@ class Reading:
         Raises:
             InputError: it is missing, no image, or beyond the limits.
         """
+        return self.image_with_header(path, what, line=line)[0]
+
+    def image_with_header(self, path: Path, what: str, *, line: int = 0) -> tuple[ImageSource, image_header.Header]:
+        """The same with what the header says; a file is looked into once."""
         if path in self._images:
             return self._images[path]
         self.exists(path, what, line=line, code="RG350")
@@ -198,8 +202,8 @@ class Reading:
         except OSError as problem:
             raise self.error("RG350", f"{what} '{self.named(path)}' cannot be read: {reason(problem)}") from None
         label = shown(path.name)
-        self._check_header(head, size, f"{what} '{label}'", path.suffix, line)
-        self._images[path] = ImageSource(path, None, label)
+        header = self._check_header(head, size, f"{what} '{label}'", path.suffix, line)
+        self._images[path] = ImageSource(path, None, label), header
         return self._images[path]
 
     def embedded_image(self, data: bytes, what: str) -> ImageSource:
@@ -211,7 +215,7 @@ class Reading:
         self._check_header(data[: image_header.HEAD_BYTES], len(data), what, "", 0)
         return ImageSource(self.path, data, f"{what} in {shown(self.path.name)}")
 
-    def _check_header(self, head: bytes, size: int, what: str, suffix: str, line: int) -> None:
+    def _check_header(self, head: bytes, size: int, what: str, suffix: str, line: int) -> image_header.Header:
         try:
             facts = image_header.read(head, suffix)
         except image_header.NoImageError as problem:
@@ -219,7 +223,7 @@ class Reading:
         except ValueError as problem:
             raise self.error("RG352", f"{what} {problem}", line=line) from None
         if facts.width is None or facts.height is None:
-            return
+            return facts
         if facts.width < 1 or facts.height < 1:
             raise self.error("RG352", f"{what} is {facts.width}×{facts.height} texels", line=line)
         if max(facts.width, facts.height) > self.limits.image_side:
@@ -229,6 +233,7 @@ class Reading:
             raise self.over(f"{what} decodes to {decoded:,} bytes", "image_bytes", "RG353")
         if decoded > 64 << 20 and decoded > self.limits.image_ratio * size:
             raise self.over(f"{what} decodes to {decoded:,} bytes from {size:,}", "image_ratio", "RG353")
+        return facts
 
 
 _NOT = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}

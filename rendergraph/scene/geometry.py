@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -103,10 +104,10 @@ def quaternion_matrix(x: float, y: float, z: float, w: float) -> Matrix:
     Raises:
         ValueError: all of it is zero.
     """
-    q = unit([x, y, z, w])
-    if not q.any():
+    length = math.hypot(x, y, z, w)
+    if not length:
         raise ValueError("a rotation of zero length")
-    x, y, z, w = (float(v) for v in q)
+    x, y, z, w = x / length, y / length, z / length, w / length
     return np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],

@@ -43,6 +43,9 @@ def read_gltf(path: Path, reading: Reading) -> Scene:
     return _Reader(top, binary, path, reading).scene()
 
 
+_IDENTITY: Matrix = np.eye(4)
+
+
 @dataclass(frozen=True)
 class _Node:
     part: Part
@@ -178,6 +181,8 @@ class _Reader:
                 raise part.wrong("'matrix' is not affine: its last row is not 0 0 0 1")
             matrix[3] = (0, 0, 0, 1)
             return matrix
+        if not (part.has("translation") or part.has("rotation") or part.has("scale")):
+            return _IDENTITY
         x, y, z, w = part.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0))
         try:
             rotation = quaternion_matrix(x, y, z, w)
@@ -221,6 +226,9 @@ class _Reader:
     def scene(self) -> Scene:
         """The default scene with world transforms."""
         roots = self._roots()
+        count = sum(self._parts_of(node) for node in self._nodes)
+        if count > self._reading.limits.objects:
+            raise self._reading.over(f"its nodes place {count:,} objects", "objects")
         objects: list[Object] = []
         lights: list[Light] = []
         cameras: dict[str, Camera] = {}
@@ -231,10 +239,13 @@ class _Reader:
         while stack:
             index, above = stack.pop()
             node = self._nodes[index]
-            with np.errstate(over="ignore", invalid="ignore"):
-                world = above @ node.local
-            if not np.isfinite(world).all():
-                raise self._reading.error("RG306", f"{node.part.path}: its place in the world is not finite")
+            world = above
+            if node.local is not _IDENTITY:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    world = above @ node.local
+                    finite = np.isfinite(world.astype(np.float32)).all()
+                if not finite:
+                    raise self._reading.error("RG306", f"{node.part.path}: its place in the world is not finite")
             stack += [(child, world) for child in reversed(node.children)]
             if node.mesh is not None:
                 default = self._place(node, world, objects, names, materials, default)
@@ -246,13 +257,17 @@ class _Reader:
         return Scene(self._path.stem, self._path, tuple(objects), meshes, tuple(materials), tuple(lights), cameras,
                      warnings=self._reading.warnings)  # fmt: skip
 
+    def _parts_of(self, node: _Node) -> int:
+        """How many objects a node becomes."""
+        if node.mesh is None:
+            return 0
+        return len(self._meshes[node.mesh]) * (1 if node.instances is None else len(node.instances))
+
     def _place(self, node: _Node, world: Matrix, objects: list[Object], names: Names, materials: list[Material],
                default: int) -> int:  # fmt: skip
         assert node.mesh is not None  # the caller asked
         primitives = self._meshes[node.mesh]
         places = [world] if node.instances is None else [world @ instance for instance in node.instances]
-        if len(objects) + len(places) * len(primitives) > self._reading.limits.objects:
-            raise self._reading.over(f"{node.part.path}: too many objects", "objects")
         for number, place in enumerate(places):
             instance = node.name if node.instances is None else f"{node.name}[{number}]"
             for k, (mesh, material) in enumerate(primitives):

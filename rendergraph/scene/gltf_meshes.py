@@ -55,7 +55,7 @@ class Primitives:
             self._reading.warn("RG333", "no-position", f"{part.path}: primitives without POSITION are left out")
             return None
         count = accessors["POSITION"].count
-        self._grow(part, count * 48)
+        self._grow(part, count * 96)
         corners = self._corners(part, indices, count)
         if mode < 4:
             self._reading.warn(
@@ -150,5 +150,5 @@ class Primitives:
         self._bytes += size
         if self._bytes > 64 * self._buffers.total + self._reading.limits.memory_bytes:
             raise self._reading.over(f"{part.path}: meshes need {self._bytes:,} bytes", "memory_bytes")
-        if size // 48 > self._reading.limits.vertices:
-            raise self._reading.over(f"{part.path} has {size // 48:,} vertices", "vertices")
+        if size // 96 > self._reading.limits.vertices:
+            raise self._reading.over(f"{part.path} has {size // 96:,} vertices", "vertices")

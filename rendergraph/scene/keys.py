@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 Kind: TypeAlias = Literal[
     "number", "integer", "flag", "text", "choice", "vector", "scale", "color", "file", "link", "map"
 ]
+
+
+MOST = 1e12
+"""Beyond this no number of a scene makes sense, and products of a few would leave single precision."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,8 @@ class Key:
     doc: str
     default: Any = None
     unit: str = ""
-    low: float = -math.inf
-    high: float = math.inf
+    low: float = -MOST
+    high: float = MOST
     above: bool = False
     choices: tuple[str, ...] = ()
     size: int = 3

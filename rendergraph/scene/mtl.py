@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.errors import InputError
-from rendergraph.scene import image_header
 from rendergraph.scene.files import Reading, file_kind, named, shown
 from rendergraph.scene.model import Material, Texture, Vec3
 from rendergraph.scene.phong import dielectric_f0, roughness_of
@@ -102,8 +101,7 @@ def _map(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, reading:
     if file is None:
         return
     try:
-        image = reading.image(file, "map", line=line)
-        facts = image_header.read(file.open("rb").read(image_header.HEAD_BYTES), file.suffix)
+        image, facts = reading.image_with_header(file, "map", line=line)
     except InputError as problem:
         if problem.problems[0].code in ("RG302", "RG353"):
             raise

@@ -275,7 +275,8 @@ class _Block:
                     raise self._wrong(row, f"'{shown(text_of(word), 30)}' is no number")
             raise self._wrong(row, "its numbers cannot be told apart")
         at = np.cumsum(counts) - counts
-        bad = ~np.isfinite(values.astype(np.float32))
+        with np.errstate(over="ignore"):
+            bad = ~np.isfinite(values.astype(np.float32))
         if bad.any():
             row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
             raise self.reading.error(

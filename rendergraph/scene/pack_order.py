@@ -72,8 +72,11 @@ def fifo_acmr(triangles: Indices, size: int = 16) -> float:
 
 def morton(points: Floats) -> npt.NDArray[np.uint64]:
     """30-bit Morton code of each point within the box of all."""
-    low = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - low).max()), 1e-30)
+    low, high = points.min(axis=0), points.max(axis=0)
+    with np.errstate(over="ignore"):
+        extent = max(float((high - low).max()), 1e-30)
+    if not np.isfinite(extent):  # a box beyond single precision has no curve
+        return np.zeros(len(points), np.uint64)
     code = np.zeros(len(points), np.uint32)
     for axis in range(3):
         bits = ((points[:, axis] - low[axis]) * np.float32(1023 / extent)).astype(np.uint32)

@@ -8,7 +8,7 @@ from typing import Any
 
 from rendergraph.document import Value, shown
 from rendergraph.errors import Problem, suggestion
-from rendergraph.scene.keys import Key
+from rendergraph.scene.keys import MOST, Key
 
 
 class Checker:
@@ -114,7 +114,7 @@ def _number(value: Value, key: Key) -> tuple[Any, str | None]:
     if isinstance(data, bool) or not isinstance(data, int | float):
         return None, wanted + _limits(key)
     if key.kind == "integer" and not isinstance(data, int):
-        return None, wanted
+        return None, wanted + _limits(key)
     if not _within(float(data), key):
         return None, wanted + _limits(key)
     return (int(data) if key.kind == "integer" else float(data)), None
@@ -126,7 +126,7 @@ def _numbers(value: Value, key: Key) -> tuple[Any, str | None]:
     data = value.data
     if key.kind == "scale":
         wanted = "one number or 3 numbers"
-        if isinstance(data, int | float) and not isinstance(data, bool) and math.isfinite(data):
+        if isinstance(data, int | float) and not isinstance(data, bool) and _within(float(data), key):
             return (float(data),) * 3, None
     if not isinstance(data, list) or len(data) not in sizes:
         return None, wanted
@@ -141,14 +141,14 @@ def _numbers(value: Value, key: Key) -> tuple[Any, str | None]:
 
 
 def _within(number: float, key: Key) -> bool:
-    if math.isnan(number) or (math.isinf(number) and not (key.infinite and number > 0)):
-        return False
+    if key.infinite and number == math.inf:
+        return True
     return key.low <= number <= key.high and not (key.above and number == key.low)
 
 
 def _limits(key: Key) -> str:
-    low = f"above {key.low:g}" if key.above else f"of at least {key.low:g}" if key.low > -math.inf else ""
-    high = f"at most {key.high:g}" if key.high < math.inf else ""
+    low = f"above {key.low:g}" if key.above else f"of at least {key.low:g}" if key.low > -MOST else ""
+    high = f"at most {key.high:g}" if key.high < MOST else ""
     if not low and not high:
-        return "" if key.infinite else ", finite"
+        return ""
     return " " + " and ".join(filter(None, (low, high)))

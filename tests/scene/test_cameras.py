@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_look_at_nowhere_is_an_error() -> None:
         look_at((1, 2, 3), (1, 2, 3))
 
 
-def block(view: bytes) -> np.ndarray:
+def block(view: bytes) -> Any:
     return np.frombuffer(view, pack.VIEW)[0]
 
 
