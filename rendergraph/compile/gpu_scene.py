@@ -18,7 +18,7 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.scene import pack
-from rendergraph.scene.model import ImageSource, Scene, Texture
+from rendergraph.scene.model import ImageSource, Material, Scene, Texture
 from rendergraph.scene.pack import PackedScene
 from rendergraph.textures import TextureDesc, full_mip_count
 
@@ -86,8 +86,19 @@ class GpuScene:
 
     @property
     def defines(self) -> dict[str, str]:
-        """Macros about the materials, for geometry steps."""
+        """Macros about objects and materials, for geometry steps: what none of them needs is not compiled."""
         macros = {"MATERIAL_COUNT": str(max(1, len(self.scene.materials)))}
+        moving = {path.partition(".")[0] for path in self.scene.keyframes}
+        if "objects" not in moving and _evenly_scaled(self.packed.instances["rows"]):
+            macros["UNIFORM_SCALE"] = "1"
+        if "materials" not in moving:
+            textured = {slot for material in self.scene.materials for slot in material.textures}
+            table, default = self.packed.materials, pack.pack_materials([Material("default")])
+            if not table["emissive"][:, :3].any():
+                macros["NO_EMISSIVE"] = "1"
+            same = (table["specular"] == default["specular"]).all() and (table["extra"] == default["extra"])[:, 0].all()
+            if same and not textured & {"specular", "specular_color"}:
+                macros["DEFAULT_SPECULAR"] = "1"
         if self._blocks.get("material_block", (None, False))[1]:
             macros["MATERIAL_STORAGE"] = "1"
         if self._blocks.get("material_uv_block", (None, False))[1]:
@@ -173,3 +184,11 @@ class GpuScene:
             textures.delete(self.device, image)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)
+
+
+def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
+    """Whether every object, given by the rows of its matrix (n, 3, 4), is only turned, moved and scaled evenly."""
+    linear = rows[:, :, :3].astype(np.float64)
+    products = np.einsum("nij,nkj->nik", linear, linear)
+    size = np.trace(products, axis1=1, axis2=2)[:, None, None] / 3
+    return bool((np.abs(products - size * np.eye(3)) <= 1e-5 * size).all())
