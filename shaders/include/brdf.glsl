@@ -34,7 +34,8 @@ float distribution_ggx_anisotropic(float n_h, float t_h, float b_h, float alpha_
     return a2 * w2 * w2 / PI;
 }
 
+// Directions as (along the tangent, along the bitangent, along the normal).
 float visibility_smith_anisotropic(vec3 light, vec3 viewer, float alpha_t, float alpha_b) {
-    vec3 alpha = vec3(alpha_t, alpha_b, 1.0);  // directions are (along the tangent, along the bitangent, along the normal)
+    vec3 alpha = vec3(alpha_t, alpha_b, 1.0);
     return 0.5 / (light.z * length(alpha * viewer) + viewer.z * length(alpha * light));
 }

@@ -31,8 +31,8 @@ struct Surface {
     float anisotropy;  // strength
 };
 
-// Fills in what the models of this program look at. Empirical models take the material's own kd, ks and n where no texture
-// changes what they are derived from, else: kd = base (1 - metallic), ks = f0, 4 n = 2 / alpha^2 - 2.
+// Fills in what the models of this program look at. Empirical models take the material's own kd, ks and n where no
+// texture changes what they are derived from, else: kd = base (1 - metallic), ks = f0, 4 n = 2 / alpha^2 - 2.
 void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
 #ifdef DEFAULT_SPECULAR  // no material of the scene has another index of refraction or specular colour
     s.f0 = mix(vec3(0.04), s.base_color, s.metallic);

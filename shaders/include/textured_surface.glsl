@@ -81,10 +81,10 @@ Surface surface_here(View view) {
     s.metallic = m.surface.x;
     s.roughness = m.surface.y;
 #ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
-    vec2 blue_green =
-        texture(metallic_roughness_texture, slot_uv(v_material, METALLIC_ROUGHNESS_SLOT, UV_SET(METALLIC_ROUGHNESS_UV))).bg;
-    s.metallic *= blue_green.x;
-    s.roughness *= blue_green.y;
+    vec2 uv = slot_uv(v_material, METALLIC_ROUGHNESS_SLOT, UV_SET(METALLIC_ROUGHNESS_UV));
+    vec3 texel = texture(metallic_roughness_texture, uv).rgb;
+    s.metallic *= texel.b;
+    s.roughness *= texel.g;
 #endif
 
     vec4 specular = m.specular;
@@ -109,10 +109,9 @@ Surface surface_here(View view) {
     s.anisotropy = m.extra.y;
     vec2 grain = vec2(cos(m.extra.z), sin(m.extra.z));
 #ifdef HAS_ANISOTROPY_TEXTURE
-    vec3 texel = texture(anisotropy_texture, slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV))).rgb;
-    vec2 turned = texel.rg * 2.0 - 1.0;
-    grain = mat2(grain.x, grain.y, -grain.y, grain.x) * turned;
-    s.anisotropy *= texel.b;
+    vec3 combed = texture(anisotropy_texture, slot_uv(v_material, ANISOTROPY_SLOT, UV_SET(ANISOTROPY_UV))).rgb;
+    grain = mat2(grain.x, grain.y, -grain.y, grain.x) * (combed.rg * 2.0 - 1.0);
+    s.anisotropy *= combed.b;
 #endif
     s.tangent = normalize(s.tangent) * grain.x + normalize(s.bitangent) * grain.y;
     s.tangent = normalize(s.tangent - s.normal * dot(s.normal, s.tangent));

@@ -1,5 +1,5 @@
-// Light computed once for a vertex or a face, from the material's factors alone. The diffuse part is light on white, for
-// the fragment to multiply with its texture; lights that cast shadows are kept apart, for it to look those up.
+// Light computed once for a vertex or a face, from the material's factors alone. The diffuse part is light on white,
+// for the fragment to multiply with its texture; lights that cast shadows are kept apart, for it to look those up.
 #include <pass_view.glsl>
 #include <lights.glsl>
 #include <shading.glsl>

@@ -5,8 +5,8 @@
 //     MAP_HALF_WIDTH                                 // half the width in texels of what it looks at
 //
 // The offset: a receiver at the angle a to the light's plane is deeper by w tan(a) at the distance w in the map. Moving
-// the point by w sin(a) along its normal lifts it by just that much, so the offset vanishes where light falls straight on.
-// A face turned away from the light is moved away from it, and so lies behind what it belongs to.
+// the point by w sin(a) along its normal lifts it by just that much, so the offset vanishes where light falls straight
+// on. A face turned away from the light is moved away from it, and so lies behind what it belongs to.
 #ifndef MAP_VIEWS
 #define MAP_VIEWS shadow_map_views
 #define MAP_LIGHTS shadow_map_lights

@@ -1,6 +1,6 @@
 // Percentage-closer filtering (Reeves, Salesin and Cook 1987): TAPS x TAPS depth tests one texel apart, each weighted
-// bilinearly, which is (TAPS + 1) x (TAPS + 1) texels with the outer ones counted by the part that is covered. Four tests
-// come with one gather. One tap is the plain test of one texel.
+// bilinearly, which is (TAPS + 1) x (TAPS + 1) texels with the outer ones counted by the part that is covered. Four
+// tests come with one gather. One tap is the plain test of one texel.
 uniform sampler2DArrayShadow shadow_map;
 
 #define MAP_HALF_WIDTH (0.5 * float(TAPS) + (TAPS > 1 ? 0.5 : 0.25))
@@ -24,7 +24,8 @@ float map_visibility(int layer, vec3 place) {
     for (int y = 0; y <= TAPS; y += 2) {
         for (int x = 0; x <= TAPS; x += 2) {
             vec2 middle = (first + vec2(x + 1, y + 1)) / size;
-            vec4 lit = textureGather(shadow_map, vec3(middle, float(layer)), place.z);  // upper left, right, lower right, left
+            // Upper left, upper right, lower right, lower left.
+            vec4 lit = textureGather(shadow_map, vec3(middle, float(layer)), place.z);
             vec2 columns = vec2(covered(x, start.x), covered(x + 1, start.x));
             vec2 rows = vec2(covered(y, start.y), covered(y + 1, start.y));
             sum += dot(lit, vec4(columns.xyyx) * rows.yyxx);

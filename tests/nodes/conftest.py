@@ -31,10 +31,10 @@ def gl() -> Iterator[Any]:
 
 @pytest.fixture
 def evaluate(gl: Any) -> Evaluate:
-    """`evaluate(includes, columns, statements, defines)`: run statements once a row in a compute shader.
+    """Run statements once a row in a compute shader: `evaluate(includes, columns, statements, defines)`.
 
-    Columns are arrays of shape (n,) or (n, k), k up to 4, named as the variables the statements read; the statements set
-    `vec4 result`. Returns float64 of shape (n, 4).
+    Columns are arrays of shape (n,) or (n, k), k up to 4, named as the variables the statements read; the statements
+    set `vec4 result`. Returns float64 of shape (n, 4).
     """
 
     def run(
@@ -67,17 +67,18 @@ void main() {{
     made[row] = result;
 }}
 """
-        program = gl.compute_shader(source)
-        given, made = gl.buffer(data.tobytes()), gl.buffer(reserve=rows * 16)
-        program["given_block"].binding, program["made_block"].binding = 0, 1
-        given.bind_to_storage_buffer(0)
-        made.bind_to_storage_buffer(1)
-        program.run((rows + 63) // 64)
-        gl.finish()
-        found = np.frombuffer(made.read(), np.float32).reshape(rows, 4).astype(np.float64)
-        for thing in (program, given, made):
-            thing.release()
-        assert gl.error == "GL_NO_ERROR"
+        with gl:  # a session may have made its own context current
+            program = gl.compute_shader(source)
+            given, made = gl.buffer(data.tobytes()), gl.buffer(reserve=rows * 16)
+            program["given_block"].binding, program["made_block"].binding = 0, 1
+            given.bind_to_storage_buffer(0)
+            made.bind_to_storage_buffer(1)
+            program.run((rows + 63) // 64)
+            gl.finish()
+            found = np.frombuffer(made.read(), np.float32).reshape(rows, 4).astype(np.float64)
+            for thing in (program, given, made):
+                thing.release()
+            assert gl.error == "GL_NO_ERROR"
         return found
 
     return run

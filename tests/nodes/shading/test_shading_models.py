@@ -12,9 +12,10 @@ import numpy.typing as npt
 import pytest
 
 Floats = npt.NDArray[np.float64]
-SET = """Surface s; s.normal = n; s.to_viewer = v; s.tangent = t; s.bitangent = b; s.base_color = base; s.metallic = surface.x;
-s.roughness = surface.y; s.anisotropy = surface.z; s.diffuse = base * (1.0 - s.metallic); s.f0 = mix(vec3(0.04), base, s.metallic);
-s.f90 = 1.0; s.exponent = surface.w; Reflected r = reflected(s, l);"""
+SET = """Surface s; s.normal = n; s.to_viewer = v; s.tangent = t; s.bitangent = b; s.base_color = base;
+s.metallic = surface.x; s.roughness = surface.y; s.anisotropy = surface.z; s.exponent = surface.w;
+s.diffuse = base * (1.0 - s.metallic); s.f0 = mix(vec3(0.04), base, s.metallic); s.f90 = 1.0;
+Reflected r = reflected(s, l);"""
 DIFFUSE = SET + "result.rgb = r.diffuse;"
 SPECULAR = SET + "result.rgb = r.specular;"
 
@@ -27,9 +28,9 @@ def directions(count: int, seed: int) -> Floats:
 def columns(count: int = 4000, seed: int = 1, low: float = 0.1) -> dict[str, Floats]:
     """Random frames and directions above the surface, random materials."""
     rng = np.random.default_rng(seed)
-    n, v, l, t = (directions(count, seed + k) for k in range(4))
+    n, v, light, t = (directions(count, seed + k) for k in range(4))
     v *= np.sign((n * v).sum(1, keepdims=True))
-    l *= np.sign((n * l).sum(1, keepdims=True))
+    light *= np.sign((n * light).sum(1, keepdims=True))
     t -= n * (n * t).sum(1, keepdims=True)
     t /= np.linalg.norm(t, axis=1, keepdims=True)
     surface = np.stack(
@@ -38,7 +39,7 @@ def columns(count: int = 4000, seed: int = 1, low: float = 0.1) -> dict[str, Flo
     return {
         "n": n,
         "v": v,
-        "l": l,
+        "l": light,
         "t": t,
         "b": np.cross(n, t),
         "base": rng.uniform(0, 1, (count, 3)),
@@ -99,13 +100,14 @@ def test_no_white_surface_reflects_more_than_it_gets(
     cells = 256
     u, w = (np.stack(np.meshgrid(*[(np.arange(cells) + 0.5) / cells] * 2), -1).reshape(-1, 2)).T
     z, phi = u, 2 * np.pi * w  # uniform over the hemisphere
-    l = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], 1)
+    light = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], 1)
     for roughness in (0.4, 0.7, 1.0):
         for cosine in (0.2, 0.6, 1.0):
-            ones = np.ones((len(l), 1))
+            ones = np.ones((len(light), 1))
             given = {
-                "n": ones * [0.0, 0, 1], "v": ones * [np.sqrt(1 - cosine**2), 0, cosine], "l": l, "t": ones * [1.0, 0, 0],
-                "b": ones * [0.0, 1, 0], "base": ones * [1.0, 1, 1], "surface": ones * [1.0, roughness, 0.7, 1],
+                "n": ones * [0.0, 0, 1], "v": ones * [np.sqrt(1 - cosine**2), 0, cosine], "l": light,
+                "t": ones * [1.0, 0, 0], "b": ones * [0.0, 1, 0], "base": ones * [1.0, 1, 1],
+                "surface": ones * [1.0, roughness, 0.7, 1],
             }  # fmt: skip
             found = evaluate("shading.glsl", given, SPECULAR, shading_defines(shading))[:, 0]
             assert found.mean() * 2 * np.pi < 1.002
