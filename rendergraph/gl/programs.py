@@ -90,8 +90,9 @@ class Program:
         arguments: tuple[int, ...] = (self.glo, uniform.location, min(count, uniform.size))
         if "Matrix" in function:
             arguments = (*arguments, 0)  # not transposed
-        # The array travels with the call, so that its address stays good.
-        return partial(_call_with, getattr(self.device.raw, function), arguments, data)
+        write = partial(getattr(self.device.raw, function), *arguments, data.ctypes.data)
+        write.data = data  # type: ignore[attr-defined]  # the array travels with the call: its address stays good
+        return write
 
     def bind_block(self, name: str, binding: int) -> None:
         """Give a uniform or storage block its binding point."""
@@ -103,10 +104,6 @@ class Program:
     def release(self) -> None:
         """Free it."""
         self.object.release()
-
-
-def _call_with(function: Any, arguments: tuple[int, ...], data: np.ndarray[Any, Any]) -> None:
-    function(*arguments, data.ctypes.data)
 
 
 def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) -> Program:
