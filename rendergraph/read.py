@@ -24,8 +24,11 @@ TOP_KEYS = (
     "rendergraph", "description", "extends", "size", "scene", "parameters", "inputs", "nodes", "outputs",
 )  # fmt: skip
 
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*\Z")
-"""Node ids, output names, parameter names."""
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")
+"""Node ids, output names, parameter names; long ones make messages and the search for the nearest name long."""
+
+MOST_PROBLEMS = 100
+"""Mistakes after which nobody reads on; finding the nearest name for each of a million takes hours."""
 
 
 def read(
@@ -89,6 +92,8 @@ class _Grammar:
 
     def say(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
         self.problems.append(value.problem(code, text, key=key))
+        if len(self.problems) >= MOST_PROBLEMS:
+            raise InputError(self.problems)
 
     def enter(self, key: str, child: Value, shape: Shape, kept: dict[str, Value]) -> None:
         """Keep a child as far as it is right; remember where something was left out."""

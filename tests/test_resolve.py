@@ -131,7 +131,7 @@ def test_every_value_knows_where_it_comes_from(folder: Path, toy_catalog: Catalo
 
 def test_patches_come_in_order(folder: Path, toy_catalog: Catalog) -> None:
     (folder / "patch.yaml").write_text("nodes: {shadows: {params: {bias: 5}}, sun: {params: {resolution: 64}}}")
-    patches = [folder / "patch.yaml", {"nodes": {"shadows": {"params": {"bias": 6}}}}]
+    patches: list[Path | dict[str, Any]] = [folder / "patch.yaml", {"nodes": {"shadows": {"params": {"bias": 6}}}}]
     spec = resolve(folder / "forward.yaml", catalog=toy_catalog, patches=patches)
     assert nodes_of(spec)["shadows"]["params"]["bias"] == 6
     assert nodes_of(spec)["sun"]["params"] == {"resolution": 64}

@@ -26,6 +26,7 @@ from rendergraph.api import (
     ShadowMap,
     Signature,
     Steps,
+    TextureInfo,
     View,
     Views,
     Visibility,
@@ -291,7 +292,12 @@ class TooManyMips(Node):
 class FailingRule(Node):
     """A rule with a mistake in it."""
 
-    radiance = Output(Radiance, format=lambda node, facts: facts.nonsense, doc="Never.")
+    radiance = Output(Radiance, format=lambda node, facts: vars(facts)["nonsense"], doc="Never.")
+
+
+def _size(found: TextureInfo) -> tuple[int, int]:
+    assert found.desc is not None
+    return found.desc.size
 
 
 class Growing(Node):
@@ -299,7 +305,7 @@ class Growing(Node):
 
     source = Input(Radiance, size="any", optional=True, doc="What.")
     radiance = Output(Radiance, size="source", doc="The same.")
-    halved = Output(Radiance, size=lambda node, facts: facts.input("source").desc.size, doc="Needs it.")
+    halved = Output(Radiance, size=lambda node, facts: _size(facts.input("source")), doc="Needs it.")
 
     def record(self, steps: Steps) -> None:
         """Nothing."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import InOut, Input, LightFacts, TextureInfo
-from rendergraph.document import Value
+from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
@@ -15,6 +15,7 @@ from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import instance
+from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import TEXTURE_KINDS, Signature
 
@@ -97,6 +98,11 @@ class _Linker:
             aliases=self._aliases(names),
         )
 
+    def _say(self, problem: Problem) -> None:
+        self.problems.append(problem)
+        if len(self.problems) >= MOST_PROBLEMS:
+            raise InputError(_in_order([*self.spec.problems, *self.problems]))
+
     def _types(self) -> dict[str, NodeType]:
         found: dict[str, NodeType] = {}
         failed: set[str] = set()
@@ -105,8 +111,8 @@ class _Linker:
             if not node.type or value is None:
                 continue  # said by resolve
             if node.type not in self.catalog:
-                text = f"there is no node type '{node.type}'{suggestion(node.type, self.catalog.names())}"
-                self.problems.append(value.problem("RG102", text))
+                text = f"there is no node type '{shown(node.type)}'{suggestion(node.type, self.catalog.names())}"
+                self._say(value.problem("RG102", text))
                 continue
             try:
                 found[node.id] = self.catalog.get(node.type)
@@ -118,7 +124,8 @@ class _Linker:
 
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
         node, problems = instance(spec, node_type)
-        self.problems += problems
+        for problem in problems:
+            self._say(problem)
         ports = node_type.cls.ports()
         inputs = {name: port for name, port in ports.items() if isinstance(port, Input | InOut)}
         return Bound(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set())
@@ -139,7 +146,7 @@ class _Linker:
                 if name in cls.parameters():
                     hint = f"; '{name}' is a param, move it to `params`"
                 text = f"node type '{bound.type.name}' has no input '{name}'{hint}"
-                self.problems.append(value.problem("RG111", text, key=True))
+                self._say(value.problem("RG111", text, key=True))
         for name, port in inputs.items():
             if (
                 not bound.links[name]
@@ -148,7 +155,7 @@ class _Linker:
                 and not self._dropped(bound, name)
             ):
                 text = f"input '{name}' of node '{bound.spec.id}' ({bound.type.name}) is not connected"
-                self.problems.append(bound.spec.value.problem("RG114", text + self._source_for(bound, port), key=True))
+                self._say(bound.spec.value.problem("RG114", text + self._source_for(bound, port), key=True))
 
     def _dropped(self, bound: Bound, name: str) -> bool:
         """Whether a link was left out for a mistake that has been said."""
@@ -159,7 +166,7 @@ class _Linker:
         if isinstance(value.data, list):
             if not (isinstance(port, Input) and port.many):
                 text = f"'{bound.spec.id}.{name}' takes one link, not a list; write one as in node.port"
-                self.problems.append(value.problem("RG115", text))
+                self._say(value.problem("RG115", text))
                 bound.failed.add(name)
                 return
             for part in value.data:
@@ -173,7 +180,7 @@ class _Linker:
         except Wrong as wrong:
             bound.failed.add(name)
             if wrong.problem is not None:
-                self.problems.append(wrong.problem)
+                self._say(wrong.problem)
         else:
             if found is not None:
                 bound.links[name].append(found)
@@ -187,10 +194,10 @@ class _Linker:
         scope = bound.spec.scope
         if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
             text = f"'{bound.spec.id}.{group}' is a group, it takes a node's id and no port"
-            self.problems.append(value.problem("RG113", text))
+            self._say(value.problem("RG113", text))
         elif not names.is_known(scope, node):
             text = f"there is no node '{node}'{suggestion(node, names.nodes_of(scope))}"
-            self.problems.append(value.problem("RG109", text))
+            self._say(value.problem("RG109", text))
         else:
             offered = names.outputs_of(scope, node)
             lacking = []
@@ -203,7 +210,7 @@ class _Linker:
             if lacking:
                 listed = ", ".join(f"'{name}'" for name in lacking)
                 text = f"'{bound.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
-                self.problems.append(value.problem("RG112", f"{text}; link {listed} beside the group"))
+                self._say(value.problem("RG112", f"{text}; link {listed} beside the group"))
             if offered and not lacking:
                 return
         bound.failed.update(missing)
@@ -232,7 +239,7 @@ class _Linker:
                 followed = names.follow("", value, name)
             except Wrong as wrong:
                 if wrong.problem is not None:
-                    self.problems.append(wrong.problem)
+                    self._say(wrong.problem)
                 continue
             if followed is not None:
                 found[name] = followed
@@ -257,7 +264,7 @@ class _Linker:
                     info = infer.info(found.source)
                     problem = self._crossing(nodes, found, info.semantic.name) if info is not None else None
                     if problem is not None:
-                        self.problems.append(problem)
+                        self._say(problem)
                         links.remove(found)
                         bound.failed.add(name)
 
@@ -276,12 +283,12 @@ class _Linker:
             info = infer.info(found.source)
             if found.source.previous:
                 text = f"output '{name}' shows this frame; leave '@previous' out"
-                self.problems.append(found.value.problem("RG127", text))
+                self._say(found.value.problem("RG127", text))
             elif info is not None:
                 kind = kind_of(nodes[found.source.node].ports[found.source.port], info)
                 if kind not in TEXTURE_KINDS:
                     text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
-                    self.problems.append(found.value.problem("RG129", text))
+                    self._say(found.value.problem("RG129", text))
 
     def _aliases(self, names: Names) -> dict[str, Endpoint]:
         found: dict[str, Endpoint] = {}

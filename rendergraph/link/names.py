@@ -11,10 +11,10 @@ from rendergraph.declare import InOut, Input, Node, Port
 from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
-from rendergraph.read import word
+from rendergraph.read import NAME, word
 from rendergraph.resolve import NodeSpec, PipelineSpec
 
-_ID = "[A-Za-z_][A-Za-z0-9_-]*"
+_ID = NAME.pattern.removesuffix(r"\Z")
 _LINK = re.compile(rf"({_ID}(?:/{_ID})*)(?:\.({_ID}))?(@previous)?\Z")
 
 
@@ -124,10 +124,10 @@ class Names:
         return f"{scope}{name}" in self.spec.nodes or f"{scope}{name}/" in self.spec.scopes
 
     def nodes_of(self, scope: str) -> list[str]:
-        """Names that can be linked to in a scope."""
+        """Names that can be linked to in a scope, not all of very many: the nearest is searched among them."""
         names = [node.id for node in self.spec.nodes.values() if node.scope == scope]
         names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
-        return [name.removeprefix(scope) for name in names] + (["inputs"] if scope else [])
+        return [name.removeprefix(scope) for name in names[:500]] + (["inputs"] if scope else [])
 
     def _follow(
         self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int

@@ -37,6 +37,8 @@ def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
         steps = [(path[number], path[(number + 1) % len(path)]) for number in range(len(path))]
         ends = [str(links[step][1].source) for step in steps]
         value = links[steps[-1]][1].value
+        if len(ends) > 8:
+            ends[3:-3] = [f"{len(ends) - 6} more"]
         text = (
             f"the nodes form a cycle, {' → '.join([*ends, ends[0]])}; '@previous' behind one reads last frame's value"
         )

@@ -13,6 +13,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.declare import Node
 from rendergraph.document import Value, kind_of, shown
 from rendergraph.errors import Problem, suggestion
+from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec
 
 
@@ -27,7 +28,8 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
     problems: list[Problem] = []
     for name in [name for name in values if name not in cls.parameters()]:
         del values[name]
-        problems.append(_unknown(spec.params[name], name, node_type))
+        if len(problems) < MOST_PROBLEMS:
+            problems.append(_unknown(spec.params[name], name, node_type))
     try:
         return cls.model_validate_json(json.dumps(values)), problems
     except ValidationError as error:

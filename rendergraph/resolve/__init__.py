@@ -127,12 +127,12 @@ def _complete(tree: Value, files: Files) -> None:
     for part, example in (("nodes", "{display: {type: tonemap, …}}"), ("outputs", "{image: display.color}")):
         if not entries(tree, part) and not files.problems:
             text = f"the pipeline has no {part}; add {part}: {example}"
-            files.problems.append(tree.problem("RG125", text))
+            files.say(tree.problem("RG125", text))
     for name, declared in entries(tree, "inputs").items():
         optional = declared.get("optional")
         if not (optional and optional.data):
             text = f"input '{name}' comes from outside: this file is the type of a node, no pipeline to run"
-            files.problems.append(declared.problem("RG124", text, key=True))
+            files.say(declared.problem("RG124", text, key=True))
 
 
 def _size(tree: Value, files: Files) -> tuple[int, int]:
@@ -142,7 +142,7 @@ def _size(tree: Value, files: Files) -> tuple[int, int]:
     width, height = (int(side.data) for side in value.data)  # type: ignore[arg-type]  # read() saw two whole numbers
     if min(width, height) < 1 or max(width, height) > MOST_SIDE:
         text = f"the size is {width}×{height}, width and height go from 1 to {MOST_SIDE}"
-        files.problems.append(value.problem("RG207", text))
+        files.say(value.problem("RG207", text))
         return DEFAULT_SIZE
     return width, height
 
@@ -158,7 +158,7 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
         found: tuple[Path, Roots] | None = (path, roots)
         resolved = Roots((*roots.folders, path.resolve().parent)).mistake(path, str(typed))
         if resolved:
-            files.problems.append(value.problem(*resolved))
+            files.say(value.problem(*resolved))
             found = None
     else:
         found = files.locate(value, shipped_scenes(), "scene")

@@ -10,11 +10,12 @@ from pathlib import Path
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Limits, Source, Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.read import checked, entries, read, word
+from rendergraph.read import MOST_PROBLEMS, checked, entries, read, word
 from rendergraph.resolve.merge import TypeNames, merge_pipeline
 from rendergraph.resources import shipped_pipelines
 from rendergraph.settings import Roots
 
+_MOST_EXTENDED = 32
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
 
 
@@ -37,6 +38,16 @@ class Files:
         self._open: list[Path] = []
         self._trees: dict[Path, Value | None] = {}
         self._names: dict[str, TypeNames | None] = {}
+
+    def say(self, problem: Problem) -> None:
+        """Note a mistake.
+
+        Raises:
+            InputError: there are so many that nobody reads on.
+        """
+        self.problems.append(problem)
+        if len(self.problems) >= MOST_PROBLEMS:
+            raise InputError(self.problems)
 
     # Roots and paths ------------------------------------------------------------------------------------------------
 
@@ -64,12 +75,12 @@ class Files:
             hint = suggestion(text, shipped)
             if next(self.beside(value).parent.glob(f"{text}.*"), None):
                 hint = "; a file beside this one is named with its extension"
-            self.problems.append(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
+            self.say(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
             return None
         roots = self.roots_of(value)
         mistake = roots.mistake(path := self.beside(value), text)
         if mistake:
-            self.problems.append(value.problem(*mistake))
+            self.say(value.problem(*mistake))
             return None
         return path, roots
 
@@ -95,6 +106,9 @@ class Files:
         if key in self._open or key == here:
             names = " → ".join(file.name for file in (*self._open, here, key))
             raise InputError([*self.problems, base.problem("RG118", f"the file extends itself: {names}")])
+        if len(self._open) >= _MOST_EXTENDED:
+            text = f"the chain of files that extend each other is longer than {_MOST_EXTENDED}"
+            raise InputError([*self.problems, base.problem("RG118", text)])
         self._open.append(here)
         try:
             below = self._read(path, roots, base)

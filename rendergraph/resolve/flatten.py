@@ -8,14 +8,14 @@ from pathlib import Path
 
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.read import entries, word
+from rendergraph.read import NAME, entries, word
 from rendergraph.resolve.files import Files, display
 from rendergraph.resolve.sets import Setting, patch_of
 from rendergraph.resolve.spec import NodeSpec, Parameter, Scope
 
 MOST_NODES = 10_000
 MOST_NESTED = 32
-_REFERENCE = re.compile(r"\$([A-Za-z_][A-Za-z0-9_-]*)\Z")
+_REFERENCE = re.compile(rf"\$({NAME.pattern})")
 
 
 class Flattener:
@@ -48,7 +48,7 @@ class Flattener:
         for name, lost in inner.items():
             for setting in lost:
                 text = f"there is no sub-pipeline '{scope}{name}'{suggestion(name, nodes)}"
-                self.files.problems.append(setting.problem("RG109", text))
+                self.files.say(setting.problem("RG109", text))
         for name, value in declared.items():
             if name not in used:
                 self._warn(value.problem("RG151", f"the parameter '{name}' is used nowhere", key=True))
@@ -77,10 +77,11 @@ class Flattener:
         if sub is None or node_type is None:
             if sets:
                 text = f"node '{node_id}' is no sub-pipeline; there is nothing inside it to set"
-                self.files.problems += [setting.problem("RG109", text) for setting in sets]
+                for setting in sets:
+                    self.files.say(setting.problem("RG109", text))
             problem = self.files.missing(node_type) if node_type is not None and node_type.data is not None else None
             if problem:
-                self.files.problems.append(problem)
+                self.files.say(problem)
             self._add(NodeSpec(node_id, "" if problem else word(node, "type") or "", scope, inputs, params, node))
             said = ("nodes", name, "type") in self.files.dropped
             if (node_type is None or node_type.data is None) and not said:
@@ -96,7 +97,7 @@ class Flattener:
         path = self.files.path_of(node_type)
         if path in self._open or len(self._open) >= MOST_NESTED:
             text = f"the sub-pipeline '{display(node_type.data)}' contains itself"
-            self.files.problems.append(node_type.problem("RG123", text))
+            self.files.say(node_type.problem("RG123", text))
             self.files.dropped.add(("nodes", name))
             return node
         sub = self._set_inside(sub, sets)
@@ -104,18 +105,18 @@ class Flattener:
         for key, value in params.items():
             if key not in parameters:
                 text = f"sub-pipeline '{display(node_type.data)}' has no param '{key}'{suggestion(key, parameters)}"
-                self.files.problems.append(value.problem("RG103", text, key=True))
+                self.files.say(value.problem("RG103", text, key=True))
         for key, link in inputs.items():
             if key not in declared_inputs:
                 text = (
                     f"sub-pipeline '{display(node_type.data)}' has no input '{key}'{suggestion(key, declared_inputs)}"
                 )
-                self.files.problems.append(link.problem("RG111", text, key=True))
+                self.files.say(link.problem("RG111", text, key=True))
         for key, declared in declared_inputs.items():
             optional = declared.get("optional")
             if (key not in inputs or inputs[key].data is None) and not (optional and optional.data):
                 text = f"input '{key}' of node '{scope}{name}' is not connected; link it to a node's port"
-                self.files.problems.append(node.problem("RG114", text, key=True))
+                self.files.say(node.problem("RG114", text, key=True))
         self.scopes[inside] = Scope(scope, declared_inputs, inputs, entries(sub, "outputs"), node)
         self._open.append(path or Path())
         if path is None:
@@ -145,7 +146,7 @@ class Flattener:
     def _without_type(self, name: str, node: Value) -> None:
         others = [other.id for other in self.nodes.values() if other.type]
         hint = suggestion(name, others, most=0) or "; add `type:`"
-        self.files.problems.append(node.problem("RG108", f"node '{name}' has no type{hint}", key=True))
+        self.files.say(node.problem("RG108", f"node '{name}' has no type{hint}", key=True))
 
     # Parameters -----------------------------------------------------------------------------------------------------
 
@@ -154,12 +155,12 @@ class Flattener:
         value = given if given is not None else declared.get("default")
         if value is None or value.data is None:
             text = f"the parameter '{name}' has no default; write {name}: {{default: VALUE}}"
-            self.files.problems.append(declared.problem("RG121", text, key=True))
+            self.files.say(declared.problem("RG121", text, key=True))
             return None
         low, high = _number(declared, "min"), _number(declared, "max")
         if low is not None and high is not None and low > high:
             text = f"the parameter '{name}' has a min of {low:g} above its max of {high:g}"
-            self.files.problems.append(declared.problem("RG121", text, key=True))
+            self.files.say(declared.problem("RG121", text, key=True))
             return None
         for part in value.data if isinstance(value.data, list) else [value]:
             number = part.data
@@ -171,7 +172,7 @@ class Flattener:
                 text = f"the parameter '{name}' takes {_range(low, high)}, this is {shown(number)}"
             else:
                 continue
-            self.files.problems.append(value.problem("RG122", text))
+            self.files.say(value.problem("RG122", text))
             return None
         return value
 
@@ -189,7 +190,7 @@ class Flattener:
                 if ("parameters", match[1]) not in self.files.dropped:
                     hint = suggestion(match[1], values) or "; declare it under `parameters`, or write '$$' for a dollar"
                     text = f"the pipeline has no parameter '{match[1]}'{hint}"
-                    self.files.problems.append(value.problem("RG119", text))
+                    self.files.say(value.problem("RG119", text))
                 return None
             found = values[match[1]]
             return None if found is None else value.with_data(found.data)
