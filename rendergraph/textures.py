@@ -11,7 +11,7 @@ from typing import Literal
 Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "scene", "function"]
 TEXTURE_KINDS: frozenset[str] = frozenset({"texture2d", "texture2d_array", "texture_cube"})
 
-Family = Literal["float", "unorm", "uint", "int", "depth", "depth_stencil"]
+Family = Literal["float", "unorm", "snorm", "uint", "int", "depth", "depth_stencil"]
 Filter = Literal["nearest", "linear", "trilinear"]
 Wrap = Literal["clamp", "repeat", "mirror", "border"]
 
@@ -55,6 +55,7 @@ def _formats() -> dict[str, Format]:
         ("rg16", 0x822C, 2, 4, "unorm"),
         ("rgba16", 0x805B, 4, 8, "unorm"),
         ("rgb10_a2", 0x8059, 4, 4, "unorm"),
+        ("rgba16_snorm", 0x8F9B, 4, 8, "snorm"),
         ("r16f", 0x822D, 1, 2, "float"),
         ("rg16f", 0x822F, 2, 4, "float"),
         ("rgba16f", 0x881A, 4, 8, "float"),

@@ -260,3 +260,14 @@ def test_scissor_mask_and_blend(draw: Draw) -> None:
     np.testing.assert_array_equal(image[0, 0], [1, 10, 3, 4])
     np.testing.assert_array_equal(image[-1, 0], [10, 100, 30, 40])
     np.testing.assert_array_equal(image[-1, 7], [1, 10, 3, 4])
+
+
+def test_signed_normalised_texels_keep_their_sign_and_16_bits(draw: Draw) -> None:
+    class Signed(Node):
+        """Values between -1 and 1."""
+
+        color = Output(AnyTexel, format="rgba16_snorm", doc="Four numbers.")
+
+    shaders = {"signed.frag": "out vec4 color; void main() { color = vec4(-1.0, -0.3, 0.7, 2.0); }"}
+    image = draw("nodes: {s: {type: signed}}\noutputs: {image: s.color}", Signed, shaders=shaders)["image"]
+    np.testing.assert_allclose(image[0, 0], [-1, -0.3, 0.7, 1], atol=0.5 / 32767 + 1e-7)
