@@ -6,17 +6,27 @@ from typing import Literal
 
 from rendergraph.api import DisplayColor, Input, Node, Output, Radiance, define, param
 
+from ._exposure import ExposureGain
+
 
 class Tonemap(Node):
     """Map scene-linear radiance to display values.
 
-    Exposure first, then the shoulder, then the sRGB curve. `neutral` is the Khronos PBR Neutral tone mapper (2024):
-    base colours under 0.8 come out as they are; `aces` is Narkowicz's fit (2015); `reinhard` is x/(1+x) per channel
-    (2002); `none` clips.
+    Exposure first, then the shoulder, then the sRGB curve. Shoulders that keep hues by working on luminance:
+    `reinhard_luminance` is x/(1+x) and `reinhard_extended` the same with a white point (Reinhard et al. 2002);
+    `neutral` (Khronos PBR Neutral, 2024) leaves base colours under 0.8 as they are. Shoulders per channel, where bright
+    colours fade to white: `reinhard` is x/(1+x), `aces` is Narkowicz's fit (2015), `hable` is Hable's filmic curve
+    (2010). `none` clips.
     """
 
     radiance = Input(Radiance, doc="Scene-linear radiance.")
+    gain = Input(ExposureGain, size="any", optional=True, doc="Factor beside `exposure`, as automatic exposure makes it.")
     color = Output(DisplayColor, format="rgba8", doc="Display-referred colour, sRGB encoded; alpha is 1.")
 
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
-    curve: Literal["neutral", "aces", "reinhard", "none"] = define(default="neutral", doc="Shoulder after exposure.")
+    curve: Literal[
+        "neutral", "aces", "reinhard", "reinhard_luminance", "reinhard_extended", "hable", "none"
+    ] = define(default="neutral", doc="Shoulder after exposure.")  # fmt: skip
+    white: float = param(
+        default=4.0, min=0.01, doc="Luminance after exposure that `reinhard_extended` maps to white; more clips."
+    )

@@ -78,11 +78,16 @@ class ForwardLighting(Node):
             "face": ("forward_face.vert", "forward_lighting.geom", "forward_interpolated.frag"),
         }[self.evaluate]
         out: dict[str, Port] = {"radiance": self.radiance}
+        nearer = None
         if not steps.connected(self.depth):
             out["surface_depth"] = self.surface_depth
-        blended = State(blend=PREMULTIPLIED, depth_write=False)
-        steps.geometry(fragment, vertex=vertex, geometry=geometry, out=out, objects="opaque")
+        elif geometry is not None:
+            # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
+            nearer = (0.0, -8.0)
+        steps.geometry(
+            fragment, vertex=vertex, geometry=geometry, out=out, objects="opaque", state=State(polygon_offset=nearer)
+        )
         steps.geometry(
             fragment, vertex=vertex, geometry=geometry, out=out, objects="transparent", order="back_to_front",
-            state=blended,
+            state=State(blend=PREMULTIPLIED, depth_write=False),
         )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 
 import rendergraph as rg
-from rendergraph.scene import load
+from rendergraph.scene.load import load
 
 Floats = npt.NDArray[np.float64]
 BARE = ("light.lookup=null", "light.ambient=0")
