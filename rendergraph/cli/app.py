@@ -17,7 +17,9 @@ from rendergraph.cli.output import print_error, say
 from rendergraph.cli.words import click
 from rendergraph.errors import Problem, RendergraphError, suggestion
 
-VERBS = ("run", "check", "plan", "graph", "config", "bench", "nodes", "explain", "schema", "doctor")
+VERBS = (
+    "run", "check", "plan", "graph", "config", "diff", "bench", "nodes", "explain", "schema", "doctor",
+)  # fmt: skip
 """In the order of `--help`; verb `x` is the function `command` in `rendergraph.cli.x`."""
 
 INTERRUPTED, TERMINATED = 130, 143

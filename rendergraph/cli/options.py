@@ -114,9 +114,13 @@ device_option = click.option("--device", metavar="NUMBER", type=int, help="GL de
 
 def pipeline_options(function: F) -> F:
     """The pipeline, and everything that changes it before anything looks at it."""
+    return click.argument("pipeline")(selection_options(function))
+
+
+def selection_options(function: F) -> F:
+    """Everything that changes a pipeline before anything looks at it."""
     for decorate in reversed(
         [
-            click.argument("pipeline"),
             click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb."),
             click.option("--camera", metavar="NAME", help="See it through this camera of the scene."),
             click.option("--environment", metavar="FILE", help="Light it by this picture of the sky (.hdr, .exr)."),
@@ -174,6 +178,20 @@ def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
     if output is None:
         emit(text.rstrip("\n"))
         return
+    write(text, output)
+    if as_json:
+        emit_json({"output": str(output)})
+    else:
+        emit(str(output))
+
+
+def write(text: str, output: Path) -> None:
+    """Text to a file, whole or not at all.
+
+    Raises:
+        InputError: the file cannot be written there.
+        RenderError: writing failed.
+    """
     from rendergraph.images import check_target
     from rendergraph.images.files import failed, staged
 
@@ -183,7 +201,3 @@ def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
             part.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
         except OSError as error:
             raise failed(output, error.strerror or str(error)) from error
-    if as_json:
-        emit_json({"output": str(output)})
-    else:
-        emit(str(output))

@@ -38,12 +38,14 @@ class Card:
         type: its type's name.
         inputs: connected inputs.
         outputs: everything it offers.
+        notes: lines beneath the ports.
     """
 
     id: str
     type: str
     inputs: tuple[Socket, ...]
     outputs: tuple[Socket, ...]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from html import escape
 
 from rendergraph.link import Graph
@@ -29,14 +30,36 @@ GREY = "#7d8590"
 STYLE = """
 .card{fill:#ffffff;stroke:#7d8590}.head{fill:#e6eaef}.name{fill:#1f2328;font-weight:600;font-size:13px}
 .type{fill:#57606a}.port{fill:#1f2328}.fact{fill:#57606a}.unused{opacity:.5}
+.mark{fill-opacity:.1;stroke-width:2.5}.note{font-weight:600}.pointed{stroke-width:3}
 @media (prefers-color-scheme:dark){.card{fill:#1c2128}.head{fill:#2d333b}.name,.port{fill:#e6edf3}
 .type,.fact{fill:#9aa4af}}
 """
 
 
-def svg(graph: Graph) -> str:
-    """The graph as a stand-alone SVG document, left to right, for light and dark pages."""
-    table = {card.id: card for card in cards(graph)}
+@dataclass(frozen=True)
+class Mark:
+    """What a picture points out about a node.
+
+    Attributes:
+        hue: colour of its frame and notes.
+        notes: lines beneath its ports.
+        inputs: inputs whose links are drawn in the colour too.
+    """
+
+    hue: str
+    notes: tuple[str, ...] = ()
+    inputs: frozenset[str] = frozenset()
+
+
+def svg(graph: Graph, marks: Mapping[str, Mark] | None = None) -> str:
+    """The graph as a stand-alone SVG document, left to right, for light and dark pages.
+
+    Args:
+        graph: what is drawn.
+        marks: nodes to point out.
+    """
+    marks = marks or {}
+    table = {card.id: replace(card, notes=marks[card.id].notes) if card.id in marks else card for card in cards(graph)}
     for name, end in graph.outputs.items():
         shown = next((socket for socket in table[end.node].outputs if socket.name == end.port), None)
         socket = Socket(name, shown.kind if shown else "texture2d", shown.semantic if shown else "any")
@@ -70,12 +93,12 @@ def svg(graph: Graph) -> str:
         f"<style>{STYLE}</style>",
     ]
     for trunk in trunks:
-        parts += _strokes(trunk, boxes, table, lefts, widths)
+        parts += _strokes(trunk, boxes, table, lefts, widths, marks)
     for number, link in enumerate(returns):
         parts.append(_return(link, boxes, table, lefts, widths, MARGIN + bottom + 14 * (number + 1)))
     for id, card in table.items():
         box = boxes[id]
-        parts.append(_card(card, lefts[box.layer], box.y + MARGIN, widths[box.layer]))
+        parts.append(_card(card, lefts[box.layer], box.y + MARGIN, widths[box.layer], marks.get(id)))
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
@@ -83,7 +106,7 @@ def svg(graph: Graph) -> str:
 
 
 def _height(card: Card) -> float:
-    return HEAD + ROW * (len(card.inputs) + len(card.outputs)) + 6 if card.type else 26.0
+    return HEAD + ROW * (len(card.inputs) + len(card.outputs) + len(card.notes)) + 6 if card.type else 26.0
 
 
 def _width(card: Card) -> float:
@@ -91,7 +114,7 @@ def _width(card: Card) -> float:
         return CHARACTER * len(card.inputs[0].name) + 4 * PAD
     texts = [len(card.id) * 1.2, len(card.type)]
     texts += [len(socket.name) + (len(socket.carries) + 2 if socket.carries else 0) for socket in card.outputs]
-    texts += [len(socket.name) for socket in card.inputs]
+    texts += [len(text) for text in (*(socket.name for socket in card.inputs), *card.notes)]
     return max(110.0, CHARACTER * max(texts) + 2 * PAD)
 
 
@@ -155,8 +178,9 @@ def _source_socket(link: Link, table: dict[str, Card]) -> Socket:
 
 
 def _strokes(
-    trunk: Trunk, boxes: dict[str, Box], table: dict[str, Card], lefts: list[float], widths: list[float]
-) -> list[str]:
+    trunk: Trunk, boxes: dict[str, Box], table: dict[str, Card], lefts: list[float], widths: list[float],
+    marks: Mapping[str, Mark],
+) -> list[str]:  # fmt: skip
     first = trunk.links[0]
     start, card = boxes[first.source], table[first.source]
     hue = _hue(_source_socket(first, table))
@@ -172,7 +196,10 @@ def _strokes(
     for link in trunk.links:
         end = boxes[link.target]
         y = end.y + MARGIN + _in_height(table[link.target], link.target_port)
-        strokes.append(_stroke(_title(link), _bend(*ends[end.layer - 1], lefts[end.layer], y, begin=True), hue, ""))
+        mark = marks.get(link.target)
+        pointed = mark is not None and link.target_port in mark.inputs
+        own, extra = (mark.hue, ' class="pointed"') if mark is not None and pointed else (hue, "")
+        strokes.append(_stroke(_title(link), _bend(*ends[end.layer - 1], lefts[end.layer], y, begin=True), own, extra))
     return strokes
 
 
@@ -211,7 +238,7 @@ def _stroke(title: str, path: str, hue: str, extra: str) -> str:
     )
 
 
-def _card(card: Card, x: float, y: float, column: float) -> str:
+def _card(card: Card, x: float, y: float, column: float, mark: Mark | None = None) -> str:
     if not card.type:
         width = _width(card)
         return (
@@ -239,6 +266,15 @@ def _card(card: Card, x: float, y: float, column: float) -> str:
         middle = y + _in_height(card, socket.name)
         parts.append(_dot(x, middle, socket))
         parts.append(f'<text class="port" x="{x + PAD:.1f}" y="{middle + 4:.1f}">{escape(socket.name)}</text>')
+    if mark is not None:
+        parts.append(
+            f'<rect class="mark" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="6" '
+            f'fill="{mark.hue}" stroke="{mark.hue}"/>'
+        )
+        top = y + HEAD + ROW * (len(card.outputs) + len(card.inputs))
+        for number, note in enumerate(card.notes):
+            row = top + ROW * (number + 0.5) + 4
+            parts.append(f'<text class="note" x="{x + PAD:.1f}" y="{row:.1f}" fill="{mark.hue}">{escape(note)}</text>')
     return "\n".join(parts)
 
 

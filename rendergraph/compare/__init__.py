@@ -1,0 +1,1 @@
+"""Pipelines against each other: pictures, times, memory; one by one or as the product of axes."""

@@ -1,0 +1,19 @@
+"""What differs between two graphs: as a value, as text, as JSON and as a picture. Needs no GL."""
+
+from rendergraph.diff.show import diff_json, diff_svg, diff_text
+from rendergraph.diff.structure import (
+    GraphDiff,
+    LinkChange,
+    OutputChange,
+    ParameterChange,
+    PlanFigures,
+    Retyped,
+    diff,
+    figures,
+    value_text,
+)
+
+__all__ = [
+    "GraphDiff", "LinkChange", "OutputChange", "ParameterChange", "PlanFigures", "Retyped", "diff", "diff_json",
+    "diff_svg", "diff_text", "figures", "value_text",
+]  # fmt: skip

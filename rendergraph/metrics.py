@@ -1,0 +1,176 @@
+"""How unlike two pictures are: RMSE, PSNR, SSIM and FLIP, each with what it was computed on.
+
+| metric | on display-referred pictures | on scene-linear ones |
+|---|---|---|
+| RMSE | of the sRGB-encoded values 0…1, over pixels and channels | of the linear values |
+| PSNR | −20 log10 RMSE in dB, peak 1; None where the pictures are equal | the same |
+| SSIM | of the encoded values, the mean of R, G and B | of the values clipped to 0…1 and encoded |
+| FLIP | LDR-FLIP, the mean over pixels | HDR-FLIP, exposures from the reference |
+
+Alpha does not count. SSIM is Wang et al., "Image Quality Assessment", 2004: an 11×11 Gaussian window of standard
+deviation 1.5, K1 = 0.01, K2 = 0.03. FLIP is Andersson et al., "FLIP: A Difference Evaluator for Alternating Images",
+2020, and "Visualizing Errors in Rendered High Dynamic Range Images", 2021, as OpenImageIO computes them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import InputError, Problem
+from rendergraph.images import from_srgb, to_srgb
+
+Pixels: TypeAlias = npt.NDArray[Any]
+Floats: TypeAlias = npt.NDArray[np.float64]
+Encoding: TypeAlias = Literal["display", "linear"]
+
+PIXELS_PER_DEGREE = 67.0206
+"""FLIP's default viewer: 0.7 m before a screen 0.7 m wide with 3840 pixels."""
+_WINDOW = 11
+_SIGMA = 1.5
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """The four figures of one pair; equal pictures have 0, None, 1 and 0."""
+
+    rmse: float
+    psnr: float | None
+    ssim: float
+    flip: float
+
+    def as_json(self) -> dict[str, float | None]:
+        """The fields by name."""
+        return asdict(self)
+
+
+SAME = Metrics(0.0, None, 1.0, 0.0)
+"""A picture against itself."""
+
+
+def measure(
+    image: Pixels,
+    reference: Pixels,
+    *,
+    encoding: Encoding = "display",
+    names: tuple[str, str] = ("the picture", "the reference"),
+) -> tuple[Metrics, Pixels]:
+    """All figures of a picture against a reference, and FLIP's map of where they differ.
+
+    Args:
+        image, reference: (height, width, 3 or more), uint8 or 0…1 where `display`, linear light where `linear`.
+        encoding: what the values of both are.
+        names: what messages call them.
+
+    Returns:
+        The figures, and FLIP at each pixel: (height, width), 0…1.
+
+    Raises:
+        InputError: the sizes differ.
+    """
+    a, b = colors(image), colors(reference)
+    check_sizes(a, b, names)
+    error = rmse(a, b)
+    shown = (a, b) if encoding == "display" else (to_srgb(a), to_srgb(b))
+    map_ = flip(a, b, encoding=encoding)
+    return Metrics(error, psnr(error), ssim(*shown), float(map_.mean(dtype=np.float64))), map_
+
+
+def check_sizes(a: Pixels, b: Pixels, names: tuple[str, str]) -> None:
+    """Say that two pictures cannot be compared.
+
+    Raises:
+        InputError: they differ in width or height.
+    """
+    if a.shape[:2] != b.shape[:2]:
+        sizes = [f"'{name}' has {p.shape[1]}×{p.shape[0]} pixels" for name, p in zip(names, (a, b), strict=True)]
+        text = f"{sizes[0]}, but {sizes[1]}; render both at one size: --size {b.shape[1]}x{b.shape[0]}"
+        raise InputError(Problem("RG520", text))
+
+
+def colors(pixels: Pixels) -> Floats:
+    """The R, G and B of a picture as floats, 8-bit and 16-bit integers as 0…1; grey becomes three equal channels."""
+    shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+    shaped = shaped[..., :3] if shaped.shape[-1] >= 3 else np.repeat(shaped[..., :1], 3, axis=-1)
+    scale = np.iinfo(shaped.dtype).max if np.issubdtype(shaped.dtype, np.unsignedinteger) else 1
+    return shaped.astype(np.float64) / scale
+
+
+def rmse(a: Pixels, b: Pixels) -> float:
+    """Root of the mean squared difference over pixels and channels."""
+    return math.sqrt(float(np.mean(np.square(a.astype(np.float64) - b))))
+
+
+def psnr(error: float) -> float | None:
+    """Peak signal-to-noise ratio in dB of an RMSE whose peak is 1; None where the RMSE is 0."""
+    return -20.0 * math.log10(error) if error > 0 else None
+
+
+def ssim(a: Pixels, b: Pixels) -> float:
+    """Mean structural similarity of two pictures of values 0…1: 1 where they are equal.
+
+    Windows lie wholly inside the picture; one with a side under 11 pixels is continued by reflection instead.
+    """
+    if min(a.shape[:2]) < _WINDOW:
+        around = [(_WINDOW // 2,) * 2] * 2 + [(0, 0)]
+        a, b = (np.pad(x, around, mode="symmetric") for x in (a, b))
+    return float(np.mean([_ssim(a[..., channel], b[..., channel]) for channel in range(a.shape[-1])]))
+
+
+def _ssim(a: Floats, b: Floats) -> float:
+    mean_a, mean_b = _windowed(a), _windowed(b)
+    var_a, var_b = _windowed(a * a) - mean_a**2, _windowed(b * b) - mean_b**2
+    covariance = _windowed(a * b) - mean_a * mean_b
+    c1, c2 = 0.01**2, 0.03**2
+    likeness = (2 * mean_a * mean_b + c1) * (2 * covariance + c2)
+    return float(np.mean(likeness / ((mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2))))
+
+
+def _windowed(x: Floats) -> Floats:
+    """The Gaussian mean of every window inside the picture."""
+    weights = np.exp(-0.5 * np.square((np.arange(_WINDOW) - _WINDOW // 2) / _SIGMA))
+    for axis in (0, 1):
+        parts = np.lib.stride_tricks.sliding_window_view(x, _WINDOW, axis)
+        x = parts @ (weights / weights.sum())
+    return x
+
+
+def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray[np.float32]:
+    """FLIP at each pixel, 0…1; `b` is the reference.
+
+    OpenImageIO takes linear light for both forms, so display values are decoded first. HDR-FLIP chooses its exposures
+    from the reference alone: a `maxluminance` of 0 is what the authors' own program computes.
+    """
+    import OpenImageIO as oiio
+
+    hdr = encoding == "linear"
+    if np.array_equal(a, b) and np.isfinite(a).all():
+        return np.zeros(a.shape[:2], np.float32)
+    linear = [np.ascontiguousarray(x if hdr else from_srgb(x), np.float32) for x in (a, b)]
+    linear = [np.nan_to_num(x, nan=0.0, posinf=65504.0, neginf=0.0) for x in linear]
+    test, reference = (oiio.ImageBuf(x) for x in linear)
+    found = oiio.ImageBufAlgo.FLIP_diff(
+        reference, test, hdr=int(hdr), maxluminance=0.0 if hdr else 2.0, ppd=PIXELS_PER_DEGREE
+    )
+    if found.has_error:
+        raise InputError(Problem("RG521", f"FLIP cannot be computed: {found.geterror()}"))
+    return np.asarray(found.get_pixels(oiio.FLOAT), np.float32)[..., 0]
+
+
+def description() -> dict[str, Any]:
+    """Versions and parameters of the metrics, for results that outlive the program."""
+    from importlib.metadata import version
+
+    return {
+        "rmse": {"on": "sRGB-encoded R, G, B, 0…1; linear values for scene-linear references"},
+        "psnr": {"peak": 1.0},
+        "ssim": {"window": _WINDOW, "sigma": _SIGMA, "k1": 0.01, "k2": 0.03, "channels": "mean of R, G, B"},
+        "flip": {
+            "library": f"OpenImageIO {version('OpenImageIO')}", "pixels_per_degree": PIXELS_PER_DEGREE,
+            "hdr_max_luminance": 0.0, "mean": "over pixels",
+        },
+    }  # fmt: skip
