@@ -30,12 +30,21 @@ if TYPE_CHECKING:
     from rendergraph.link import Endpoint
 
 
+KEPT = 4
+"""Compiled pipelines a session keeps, each with its textures."""
+
+
 class Session:
     """Draws pipelines on one GL context.
 
     Programs live as long as the session, keyed by source and macros; a scene stays on the GPU until another pipeline
-    asks for a different one; textures belong to the pipeline and size drawn last. A session is bound to the thread
-    that made it.
+    asks for a different one; compiled pipelines and their textures are kept for the last few that were drawn, so that
+    variants can be drawn in turns. A session is bound to the thread that made it.
+
+    Attributes:
+        device: the GL device.
+        programs: every program compiled so far.
+        active: what was drawn last.
     """
 
     def __init__(self, device: int | None = None, *, ctx: moderngl.Context | None = None) -> None:
@@ -52,8 +61,8 @@ class Session:
         self.device: Device = open_device(device) if ctx is None else borrow_device(ctx)
         self.programs = ProgramCache(self.device)
         self._scenes: dict[int, tuple[Scene, GpuScene]] = {}
-        self._last: tuple[tuple[Any, ...], Executable, Runner] | None = None
-        self._expansion: Expansion | None = None
+        self.active: Executable | None = None
+        self._kept: dict[tuple[Any, ...], Executable] = {}
         self._image_warnings: list[Problem] = []
 
     def __enter__(self) -> Session:
@@ -68,7 +77,7 @@ class Session:
         """Free everything; the context too, unless it was borrowed."""
         with self.device.current():
             self.device.raw.glUseProgram(0)  # one in use would outlive its deletion
-            self._forget_executable()
+            self._forget_executables()
             for _, scene in self._scenes.values():
                 scene.release(self.programs)
             self._scenes.clear()
@@ -144,33 +153,33 @@ class Session:
         self, pipeline: Pipeline, outputs: Sequence[str] | None, taps: Sequence[str], alias: bool, poison: bool,
         shuffle: int | None,
     ) -> tuple[Executable, Runner]:  # fmt: skip
-        """The executable: the last one where only uniforms differ, else a new one."""
-        expansion = pipeline.expansion(outputs, taps)
-        scene = self._scene(pipeline)
-        key = (_structure(expansion), id(pipeline.scene), alias, poison, shuffle)
-        if self._last is not None and self._last[0] == key:
-            _, executable, runner = self._last
-            executable.set_uniforms(expansion.steps)
-            runner = Runner(executable, pipeline.graph)
-            self._last = (key, executable, runner)
-            return executable, runner
-        self._forget_executable()
+        """The executable: one that is kept where only uniforms differ, else a new one."""
         from rendergraph.allocate import allocate
         from rendergraph.schedule import schedule
 
-        plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
-        types = {node.id: node.type for node in pipeline.graph.nodes}
-        executable = compile_plan(self.device, plan, types, expansion.views, scene, self.programs, poison=poison)
-        runner = Runner(executable, pipeline.graph)
-        self._last = (key, executable, runner)
-        return executable, runner
+        expansion = pipeline.expansion(outputs, taps)
+        scene = self._scene(pipeline)
+        key = (_structure(expansion), id(pipeline.scene), alias, poison, shuffle)
+        executable = self._kept.pop(key, None)
+        if executable is None:
+            while len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept))).release()
+            plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
+            types = {node.id: node.type for node in pipeline.graph.nodes}
+            executable = compile_plan(self.device, plan, types, expansion.views, scene, self.programs, poison=poison)
+        else:
+            executable.set_uniforms(expansion.steps)
+        if executable is not self.active:
+            executable.fresh = True  # another pipeline may have written other values into shared programs
+        self._kept[key] = self.active = executable
+        return executable, Runner(executable, pipeline.graph)
 
     def _scene(self, pipeline: Pipeline) -> GpuScene:
         scene = pipeline.scene
         if id(scene) not in self._scenes:
             for _, old in self._scenes.values():
                 old.release(self.programs)
-            self._forget_executable()
+            self._forget_executables()
             self._image_warnings = []
             self._scenes = {id(scene): (scene, GpuScene(self.device, scene, pack.pack(scene), self._decode))}
             if pipeline.environment is not None and scene.environment is not None:
@@ -180,10 +189,11 @@ class Session:
     def _decode(self, source: ImageSource, srgb: bool) -> npt.NDArray[Any]:
         return decode(source, srgb=srgb, warn=self._image_warnings.append)
 
-    def _forget_executable(self) -> None:
-        if self._last is not None:
-            self._last[1].release()
-            self._last = None
+    def _forget_executables(self) -> None:
+        for executable in self._kept.values():
+            executable.release()
+        self._kept.clear()
+        self.active = None
 
     # Results ---------------------------------------------------------------------------------------------------------
 

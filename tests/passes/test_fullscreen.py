@@ -102,11 +102,11 @@ def test_a_changed_uniform_rebuilds_nothing_and_a_changed_define_one_program(ben
     pipeline = bench.pipeline(text, Ramp, Add, shaders=shaders)
     session = bench.session
     session.render(pipeline)
-    programs, executable = session.programs.compiled, session._last[1]
+    programs, executable = session.programs.compiled, session.active
     frame = session.render(pipeline.set("b.amount", 2.0).set("a.gain", 0.5))
     np.testing.assert_allclose(frame["image"][..., 0], ramp((16, 8))[..., 0] * 0.5 + 2.0, atol=1e-6)
     assert session.programs.compiled == programs
-    assert session._last[1] is executable
+    assert session.active is executable
     session.render(pipeline.set("b.sign", "minus"))
     assert session.programs.compiled == programs + 1
     session.render(pipeline.with_size((32, 4)))
