@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
 from rendergraph.api import Any as AnyTexture
 from rendergraph.api import Function, Input, Node, Output, ShadowLookup, ShadowMap, Signature, Visibility, param
@@ -25,6 +26,7 @@ from rendergraph.glsl import (
 )  # fmt: skip
 from rendergraph.glsl.names import calls, renamed
 from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.resources import folder as folder_of
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
 
@@ -171,7 +173,8 @@ def test_declared_names() -> None:
     names = {(name.name, name.role) for name in declared(TEXT)}
     assert names == {
         ("SCALE", "macro"), ("TWICE", "macro"), ("map", "uniform"), ("color", "uniform"), ("tints", "uniform"),
-        ("box_block", "block"), ("low", "variable"), ("high", "variable"), ("named_block", "block"), ("named", "variable"),
+        ("box_block", "block"), ("low", "variable"), ("high", "variable"), ("named_block", "block"),
+        ("named", "variable"),
         ("target", "uniform"), ("list", "buffer"), ("entries", "variable"), ("Hit", "struct"), ("table", "variable"),
         ("before", "variable"), ("after", "variable"), ("v_uv", "in"), ("v_material", "in"), ("made", "out"),
         ("area", "function"), ("main", "function"),
@@ -205,7 +208,10 @@ def test_calls() -> None:
 
 @pytest.mark.parametrize(
     ("node", "expected"),
-    [("shadows", "shadows_"), ("glow/blur", "glowZsblur_"), ("a-b", "aZdb_"), ("a_b", "aZub_"), ("Z", "ZZ_"), ("gl", "Zgl_")],
+    [
+        ("shadows", "shadows_"), ("glow/blur", "glowZsblur_"), ("a-b", "aZdb_"), ("a_b", "aZub_"), ("Z", "ZZ_"),
+        ("gl", "Zgl_"),
+    ],
 )  # fmt: skip
 def test_prefixes_are_identifiers(node: str, expected: str) -> None:
     assert prefix(node) == expected
@@ -285,7 +291,8 @@ def fragment(folder: Path, given: Step) -> StageText:
 @pytest.fixture
 def folder(shaders: Path) -> Path:
     write(
-        shaders, shadow__glsl=SHADOW, kernel__glsl="const float WIDTH = 2.0;\nfloat kernel(float s) { return s * WIDTH; }\n",
+        shaders, shadow__glsl=SHADOW,
+        kernel__glsl="const float WIDTH = 2.0;\nfloat kernel(float s) { return s * WIDTH; }\n",
         light__frag="out vec4 made;\nvoid main() { made = vec4(shadow(3, vec3(0.0), vec3(1.0))); }\n",
     )  # fmt: skip
     return shaders
@@ -423,3 +430,42 @@ def test_includes_of_two_prefixes_are_both_there(shaders: Path) -> None:
     resolver = Includes(shaders.parent / "include")
     assert "int b;" in resolver.expand(shaders / "a.glsl", prefix="one_").text
     assert "int b;" in resolver.expand(shaders / "a.glsl", prefix="two_").text
+
+
+# --- error pages -----------------------------------------------------------------------------------------------------
+
+PAGES = {path.name[:5]: path for path in sorted(folder_of("rendergraph.errors").glob("RG40*.yaml"))}
+
+
+def message_of(error: InputError) -> str:
+    """A problem as its page has it: without the file, and without the line of text."""
+    (found,) = error.problems
+    place = f"{found.place.line}:{found.place.column}: " if found.place and found.place.line else ""
+    return f"{place}{found.code} {found.text}"
+
+
+@pytest.mark.parametrize("code", ["RG401", "RG402", "RG404", "RG405", "RG406"])
+def test_error_pages_say_what_is_said(shaders: Path, monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    page = yaml.safe_load(PAGES[code].read_text())
+    monkeypatch.chdir(shaders)
+    write(shaders, glow__frag=page["wrong"], kernel__glsl="", secret__glsl="")
+    with pytest.raises(InputError, match=code) as error:
+        expand(shaders / "glow.frag", shaders.parent / "include")
+    assert message_of(error.value) == page["message"]
+    write(shaders, glow__frag=page["right"])
+    expand(shaders / "glow.frag", shaders.parent / "include")
+
+
+def test_error_pages_of_files_and_functions(shaders: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pages = {code: yaml.safe_load(path.read_text()) for code, path in PAGES.items()}
+    monkeypatch.chdir(shaders)
+    write(shaders, glow__frag="", big__frag="int a;\n" * 200_000)
+    (shaders / "latin.frag").write_bytes(pages["RG407"]["wrong"].encode("latin-1"))
+    for code, name in (("RG400", "glov.frag"), ("RG403", "big.frag"), ("RG407", "latin.frag")):
+        with pytest.raises(InputError, match=code) as error:
+            expand(shaders / name, shaders.parent / "include")
+        assert message_of(error.value) == pages[code]["message"]
+    write(folder, shadow__glsl=pages["RG408"]["wrong"])
+    with pytest.raises(InputError, match="RG408") as error:
+        fragment(folder, step("lamp"))
+    assert message_of(error.value) == pages["RG408"]["message"]

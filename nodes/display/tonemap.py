@@ -20,7 +20,9 @@ class Tonemap(Node):
     """
 
     radiance = Input(Radiance, doc="Scene-linear radiance.")
-    gain = Input(ExposureGain, size="any", optional=True, doc="Factor beside `exposure`, as automatic exposure makes it.")
+    gain = Input(
+        ExposureGain, size="any", optional=True, doc="Factor beside `exposure`, as automatic exposure makes it."
+    )
     color = Output(DisplayColor, format="rgba8", doc="Display-referred colour, sRGB encoded; alpha is 1.")
 
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
