@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene import image_header
 from rendergraph.scene.model import ImageSource
@@ -60,23 +61,9 @@ def inside(folder: Path) -> CheckPath:
     return check
 
 
-def shown(text: str, most: int = 80) -> str:
-    """Text from a file made fit for one line of a message."""
-    clean = "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
-    return clean if len(clean) <= most else clean[: most - 1] + "…"
-
-
 def named(text: str) -> str:
-    """A name from a file as text that can be printed and encoded."""
-    return (
-        text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-        if text.isascii() or _sane(text)
-        else ("".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in text))
-    )
-
-
-def _sane(text: str) -> bool:
-    return not any("\ud800" <= c <= "\udfff" for c in text)
+    """A name from a file as text that can be printed: what cannot becomes a replacement character."""
+    return "".join(c if c.isprintable() else "\ufffd" for c in text)
 
 
 class Names:

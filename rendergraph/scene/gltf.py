@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rendergraph.scene.files import Names, Reading, shown
+from rendergraph.document import shown
+from rendergraph.scene.files import Names, Reading
 from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, unit, vec3
 from rendergraph.scene.gltf_buffers import Buffers, split_glb
 from rendergraph.scene.gltf_json import Part, parse

@@ -13,7 +13,8 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.scene.files import Reading, shown
+from rendergraph.document import shown
+from rendergraph.scene.files import Reading
 from rendergraph.scene.gltf_json import Part
 
 _COMPONENTS: dict[int, np.dtype[np.generic]] = {

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.scene.files import CheckPath, Limits, Reading, inside, shown
+from rendergraph.scene.files import CheckPath, Limits, Reading, inside
 from rendergraph.scene.model import Scene
 
 EXTENSIONS = (".yaml", ".yml", ".obj", ".gltf", ".glb")

@@ -11,9 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rendergraph.document import shown
 from rendergraph.errors import InputError
-from rendergraph.scene.files import Reading, file_kind, named, shown
+from rendergraph.scene.files import Reading, file_kind, named
 from rendergraph.scene.model import Material, Texture, Vec3
+from rendergraph.scene.obj_block import text_of
 from rendergraph.scene.phong import dielectric_f0, roughness_of
 
 _MAPS = {b"map_kd": "base_color", b"map_ke": "emissive", b"norm": "normal", b"map_bump": "bump", b"bump": "bump",
@@ -42,8 +44,6 @@ def read_mtl(path: Path, reading: Reading) -> dict[str, Material]:
     Raises:
         InputError: a map's path leaves the roots, or an image is beyond the limits.
     """
-    from rendergraph.scene.obj_text import text_of
-
     entries: dict[str, _Entry] = {}
     entry: _Entry | None = None
     data = reading.read(path, "material library").removeprefix(b"\xef\xbb\xbf")
@@ -93,8 +93,6 @@ def _value(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, readin
 
 def _map(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, reading: Reading) -> None:
     """A texture with its options; a missing or broken one is left out."""
-    from rendergraph.scene.obj_text import text_of
-
     options, name = _options(rest)
     slot = _MAPS[key]
     file = _follow(text_of(name), path, line, reading)

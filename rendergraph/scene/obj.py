@@ -14,11 +14,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.scene.files import Names, Reading, file_kind, named, shown
+from rendergraph.document import shown
+from rendergraph.scene.files import Names, Reading, file_kind, named
 from rendergraph.scene.geometry import Doubles, face_normals, mean_normals, unit
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
 from rendergraph.scene.mtl import read_mtl
-from rendergraph.scene.obj_text import ABSENT, Ints, Statements, statements
+from rendergraph.scene.obj_block import ABSENT, Ints
+from rendergraph.scene.obj_text import Statements, statements
 from rendergraph.scene.polygons import MOST_CORNERS, newell, triangulate
 
 _DEFAULT = "default"

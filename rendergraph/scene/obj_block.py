@@ -1,0 +1,341 @@
+"""One block of lines of an OBJ file: words are found, lines sorted by statement, each kind parsed at once.
+
+Vertices and faces are turned into numbers by one vectorised parse; lines that this cannot take are halved until the one
+with the mistake is found.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.document import shown
+from rendergraph.scene.files import Reading
+
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bytes = npt.NDArray[np.uint8]
+
+ABSENT = 9_999_999_999
+"""Stands for a texture coordinate or normal that a corner does not have."""
+_ARRAYS = (b"v", b"vt", b"vn", b"f")
+_STATES = (b"o", b"g", b"s", b"usemtl")
+_SILENT = (b"vp", b"mg", b"lod", b"bevel", b"c_interp", b"d_interp", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
+_CORNER = re.compile(rb"[-+]?[0-9]+(/([-+]?[0-9]+)?(/([-+]?[0-9]+)?)?)?\Z")
+_BLANKS = np.zeros(256, bool)
+_BLANKS[[9, 11, 12, 13, 32]] = True
+
+
+@dataclass
+class Growing:
+    """What has been read so far; state words are numbered as they come."""
+
+    positions: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
+    colors: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
+    uvs: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 2))])
+    normals: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
+    corners: list[Ints] = field(default_factory=lambda: [np.zeros((0, 3), np.int64)])
+    sizes: list[Ints] = field(default_factory=lambda: [np.zeros(0, np.int64)])
+    lines: list[Ints] = field(default_factory=lambda: [np.zeros(0, np.int64)])
+    states: list[Ints] = field(default_factory=lambda: [np.zeros((0, 4), np.int64)])
+    counts: list[int] = field(default_factory=lambda: [0, 0, 0])
+    numbers: tuple[dict[str, int], ...] = field(default_factory=lambda: ({"": 0}, {"": 0}, {"": 0}, {"": 0}))
+    current: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
+    libraries: dict[str, int] = field(default_factory=dict)
+    smoothed: bool = False
+
+
+def text_of(raw: bytes) -> str:
+    """A name's bytes as text: UTF-8, or Latin-1 where it is none."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+class Block:
+    """One block of lines: finds words, sorts lines by statement, and parses each kind at once."""
+
+    def __init__(self, block: bytes, first_line: int, grown: Growing, reading: Reading) -> None:
+        self.grown, self.reading, self.first_line = grown, reading, first_line
+        self.original = block
+        self._newlines: Ints | None = None
+        if b"\\" in block:  # a continued line becomes one; byte offsets, and so line numbers, stay
+            block = block.replace(b"\\\r\n", b"   ").replace(b"\\\n", b"  ")
+        if not block.endswith(b"\n"):
+            block += b"\n"
+        if b"#" in block:
+            block = _without_comments(block)
+        self.block = block
+        self.bytes: Bytes = np.frombuffer(block, np.uint8)
+        ends = np.flatnonzero(self.bytes == 10)
+        self.starts = np.concatenate([[0], ends[:-1] + 1])
+        self.lengths = ends + 1 - self.starts
+        ink = ~_BLANKS[self.bytes]
+        ink[ends] = False
+        before = np.empty_like(ink)
+        before[0] = False
+        before[1:] = ink[:-1]
+        self.words = np.flatnonzero(ink & ~before)
+        self.word_ends = np.flatnonzero(~ink & before)
+        self.line_of_word = np.searchsorted(ends, self.words)
+        self.word_counts = np.bincount(self.line_of_word, minlength=len(ends))
+        self.first_word = np.cumsum(self.word_counts) - self.word_counts
+
+    def line(self, row: int) -> int:
+        """The number in the file of one of the block's (joined) lines."""
+        return self.first_line + int(self.lines_before(self.starts[row : row + 1])[0])
+
+    def lines_before(self, offsets: Ints) -> Ints:
+        """Line ends of the file in front of each byte offset."""
+        if self._newlines is None:
+            self._newlines = np.flatnonzero(np.frombuffer(self.original, np.uint8) == 10)
+        return np.searchsorted(self._newlines, offsets)
+
+    def read(self) -> None:
+        """Add everything in the block to what is grown."""
+        kinds = self._kinds()
+        rows = [np.flatnonzero(kinds == kind) for kind in range(4)]
+        limit = self.reading.limits.vertices
+        for kind, what in enumerate(("positions", "texture coordinates", "normals")):
+            if self.grown.counts[kind] + len(rows[kind]) > limit:
+                raise self.reading.over(f"more than {limit:,} {what}", "vertices")
+        self._faces(rows, kinds)
+        self._vertices(rows[0])
+        for kind, least, target in ((1, 1, self.grown.uvs), (2, 3, self.grown.normals)):
+            if len(rows[kind]):
+                values, counts, at = self._numbers(rows[kind], least, 3)
+                width = 2 if kind == 1 else 3
+                table = np.zeros((len(rows[kind]), width))
+                for column in range(width):
+                    has = counts > column
+                    table[has, column] = values[at[has] + column]
+                target.append(table)
+        for kind in range(3):
+            self.grown.counts[kind] += len(rows[kind])
+
+    def _kinds(self) -> npt.NDArray[np.int8]:
+        """For each line its place in `_ARRAYS`, 4 for a change of state or library, -1 for nothing to read."""
+        kinds = np.full(len(self.starts), -1, np.int8)
+        used = np.flatnonzero(self.word_counts)
+        first = self.first_word[used]
+        start, length = self.words[first], self.word_ends[first] - self.words[first]
+        one, two = self.bytes[start], self.bytes[np.minimum(start + 1, len(self.bytes) - 1)]
+        short, pair = length == 1, length == 2
+        found = np.full(len(used), 9, np.int8)
+        found[short & (one == ord("v"))] = 0
+        found[pair & (one == ord("v")) & (two == ord("t"))] = 1
+        found[pair & (one == ord("v")) & (two == ord("n"))] = 2
+        found[short & (one == ord("f"))] = 3
+        for place in np.flatnonzero(found == 9):
+            found[place] = self._other(int(used[place]))
+        kinds[used] = found
+        return kinds
+
+    def _other(self, row: int) -> int:
+        """A line that is neither vertex nor face: 4 where it changes the state, else -1 with a warning where needed."""
+        start = self.words[self.first_word[row]]
+        end = self.word_ends[self.first_word[row]]
+        word = self.block[start:end]
+        if word in _STATES:
+            return 4
+        if word == b"mtllib":
+            self.grown.libraries.setdefault(text_of(self._rest(row)), self.line(row))
+        elif word in (b"l", b"p"):
+            what = "lines" if word == b"l" else "points"
+            self.reading.warn("RG333", what, f"{what} are left out; only faces are drawn", line=self.line(row))
+        elif word not in _SILENT:
+            name = shown(text_of(word), 30)
+            self.reading.warn("RG331", name, f"unknown statement '{name}' is left out", line=self.line(row))
+        return -1
+
+    def _rest(self, row: int) -> bytes:
+        end = self.starts[row] + self.lengths[row]
+        return self.block[self.word_ends[self.first_word[row]] : end].strip()
+
+    # Numbers ----------------------------------------------------------------------------------------------------------
+
+    def _text(self, rows: Ints, slashes: bool = False) -> bytes:
+        """The arguments of some lines as one text, the first words blanked."""
+        keep = np.zeros(len(self.starts), bool)
+        keep[rows] = True
+        chosen: Bytes = self.bytes.copy()
+        first = self.first_word[rows]
+        chosen[self.words[first]] = 32
+        chosen[self.word_ends[first] - 1] = 32  # vt and vn have a second letter
+        text: bytes = chosen[np.repeat(keep, self.lengths)].tobytes()
+        if slashes:
+            text = text.replace(b"//", b"/%d/" % ABSENT)
+            for blank in (b" ", b"\n", b"\r", b"\t"):  # a trailing slash stands for nothing
+                text = text.replace(b"/" + blank, b"/%d" % ABSENT + blank)
+            text = text.replace(b"/", b" ")
+        return text
+
+    def _parse(
+        self, text: bytes, kind: type[np.float64] | type[np.int64], count: int
+    ) -> npt.NDArray[np.generic] | None:
+        """The numbers in a text, or None where it holds something else or another number of them."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)
+            try:
+                values: npt.NDArray[np.generic] = np.fromstring(text, kind, sep=" ")
+            except (DeprecationWarning, ValueError):
+                return None
+        return values if len(values) == count else None
+
+    def _numbers(self, rows: Ints, least: int, most: int) -> tuple[Doubles, Ints, Ints]:
+        """Arguments of lines as finite numbers, how many each line has, and where each line's first is."""
+        counts = self.word_counts[rows] - 1
+        for row in rows[(counts < least) | (counts > most)][:1]:
+            name = text_of(self.block[self.words[self.first_word[row]] : self.word_ends[self.first_word[row]]])
+            count = self.word_counts[row] - 1
+            raise self._wrong(int(row), f"'{name}' takes {least} to {most} numbers, here are {count}")
+        values = self._parse(self._text(rows), np.float64, int(counts.sum()))
+        if values is None:
+            row = self._first_bad(
+                rows,
+                lambda some: (
+                    self._parse(self._text(some), np.float64, int((self.word_counts[some] - 1).sum())) is not None
+                ),
+            )
+            for word in self._rest(row).split():
+                if self._parse(word, np.float64, 1) is None:
+                    raise self._wrong(row, f"'{shown(text_of(word), 30)}' is no number")
+            raise self._wrong(row, "its numbers cannot be told apart")
+        at = np.cumsum(counts) - counts
+        with np.errstate(over="ignore"):
+            bad = ~np.isfinite(values.astype(np.float32))
+        if bad.any():
+            row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
+            raise self.reading.error(
+                "RG306", f"'{shown(text_of(self._rest(row)), 60)}' is not finite", line=self.line(row)
+            )
+        return values.astype(np.float64), counts, at
+
+    def _first_bad(self, rows: Ints, good: Callable[[Ints], bool]) -> int:
+        """The first line that spoils a parse, by halving."""
+        while len(rows) > 1:
+            half = rows[: len(rows) // 2]
+            rows = rows[len(rows) // 2 :] if good(half) else half
+        return int(rows[0])
+
+    def _wrong(self, row: int, text: str) -> Exception:
+        return self.reading.error("RG304", text, line=self.line(row))
+
+    def _vertices(self, rows: Ints) -> None:
+        if not len(rows):
+            return
+        values, counts, at = self._numbers(rows, 3, 7)
+        for row in rows[counts == 5][:1]:
+            raise self._wrong(int(row), "'v' takes 3, 4, 6 or 7 numbers, here are 5")
+        self.grown.positions.append(values[at[:, None] + np.arange(3)])
+        colors = np.full((len(rows), 3), np.nan)
+        colored = counts >= 6
+        if colored.any():
+            colors[colored] = values[(at + counts - 3)[colored, None] + np.arange(3)]
+        self.grown.colors.append(colors)
+
+    # Faces ------------------------------------------------------------------------------------------------------------
+
+    def _faces(self, rows: list[Ints], kinds: npt.NDArray[np.int8]) -> None:
+        faces = rows[3]
+        states = self._states(faces, np.flatnonzero(kinds == 4))
+        if not len(faces):
+            return
+        sizes = self.word_counts[faces] - 1
+        for row in faces[sizes < 3][:1]:
+            raise self._wrong(int(row), f"a face takes at least 3 corners, here are {self.word_counts[row] - 1}")
+        corners = self._corners(faces, sizes)
+        seen = np.stack([np.cumsum(kinds == kind)[faces] + self.grown.counts[kind] for kind in range(3)], axis=1)
+        seen = np.repeat(seen, sizes, axis=0)
+        zero = corners == 0
+        if zero.any():
+            face = int(np.searchsorted(np.cumsum(sizes), int(np.flatnonzero(zero.any(axis=1))[0]), side="right"))
+            line = self.line(int(faces[face]))
+            raise self.reading.error("RG305", "index 0 is out of range; indices start at 1", line=line)
+        corners = np.where(corners < 0, corners + seen, np.where(corners == ABSENT, ABSENT, corners - 1))
+        self.grown.corners.append(corners)
+        self.grown.sizes.append(sizes.astype(np.int64))
+        self.grown.lines.append(self.lines_before(self.starts[faces]) + self.first_line)
+        self.grown.states.append(states)
+
+    def _corners(self, faces: Ints, sizes: Ints) -> Ints:
+        """Indices of every corner as written, `ABSENT` for missing ones."""
+        marks = np.flatnonzero(self.bytes == ord("/"))
+        words = np.repeat(self.first_word[faces] + 1, sizes) + _within(sizes)
+        slashes = np.searchsorted(marks, self.word_ends[words]) - np.searchsorted(marks, self.words[words])
+        if int(slashes.max()) <= 2:
+            values = self._parse(self._text(faces, slashes=True), np.int64, int((slashes + 1).sum()))
+            if values is not None:
+                table = np.full((len(slashes), 3), ABSENT, np.int64)
+                at = np.cumsum(slashes + 1) - (slashes + 1)
+                whole = values.astype(np.int64)
+                table[:, 0] = whole[at]
+                for column in (1, 2):
+                    has = slashes >= column
+                    table[has, column] = whole[at[has] + column]
+                table[:, 0] = np.where(table[:, 0] == ABSENT, 0, table[:, 0])
+                return table
+
+        def good(some: Ints) -> bool:
+            text = self._text(some, slashes=True)
+            between = text.translate(None, b"+-0123456789 \t\v\f\r\n") == b""
+            return between and self._parse(text, np.int64, _needed(self._text(some))) is not None
+
+        row = self._first_bad(faces, good)
+        for word in self._rest(row).split():
+            if not _CORNER.match(word):
+                raise self._wrong(row, f"'{shown(text_of(word), 40)}' is no corner; write v, v/vt, v//vn or v/vt/vn")
+        raise self._wrong(row, "its corners cannot be told apart")
+
+    def _states(self, faces: Ints, changes: Ints) -> Ints:
+        """Numbers of object, group, smoothing group and material in force at each face."""
+        grown = self.grown
+        table = [list(grown.current)]
+        for row in changes:
+            start, end = self.words[self.first_word[row]], self.word_ends[self.first_word[row]]
+            column = _STATES.index(self.block[start:end])
+            name = text_of(self._rest(int(row)))
+            if column == 2:
+                grown.smoothed = True
+                name = "" if name.lower() in ("off", "0") else name
+            numbers = grown.numbers[column]
+            grown.current[column] = numbers.setdefault(name, len(numbers))
+            if column == 0:  # a new object starts without a group
+                grown.current[1] = 0
+            table.append(list(grown.current))
+        return np.array(table, np.int64)[np.searchsorted(changes, faces)]
+
+
+def _needed(text: bytes) -> int:
+    """How many numbers the corners in a text have, those left out between and behind slashes counted."""
+    return len(text.split()) + text.count(b"/")
+
+
+def _within(sizes: Ints) -> Ints:
+    """0, 1, … within each run."""
+    total = int(sizes.sum())
+    return np.arange(total) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+
+
+def _without_comments(block: bytes) -> bytes:
+    """Blank every `#` that starts a word, up to the line's end."""
+    pieces, at = [], 0
+    while True:
+        found = block.find(b"#", at)
+        if found < 0:
+            break
+        if found and block[found - 1] not in b" \t\r\n\v\f":  # part of a name
+            pieces.append(block[at : found + 1])
+            at = found + 1
+            continue
+        end = block.find(b"\n", found)
+        end = len(block) if end < 0 else end
+        pieces += [block[at:found], b" " * (end - found)]
+        at = end
+    return b"".join([*pieces, block[at:]])
