@@ -1,0 +1,79 @@
+"""Every key of a pipeline and a scene file, from the tables that `explain` prints, and the limits on files."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from rendergraph import document
+from rendergraph.cli.explain import file_keys
+from rendergraph.glsl import source
+from rendergraph.resolve import MOST_SIDE, flatten
+from rendergraph.scene import files
+from rendergraph.schedule import MOST_STEPS
+
+from .markdown import code, prose, table
+
+HEADS = ("key", "value", "default", "")
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """A part of a page for each kind of file."""
+    yield "scene-keys.md", _sections(file_keys("scene"), "The file")
+    yield "pipeline-keys.md", _sections(file_keys("pipeline"), "The file")
+    yield "limits.md", _limits()
+
+
+def _sections(keys: list[dict[str, Any]], top: str) -> str:
+    parts = []
+    for section in dict.fromkeys(row["section"] for row in keys):
+        rows = [
+            (code(row["key"]), code(row["value"]), _default(row), prose(row["doc"]))
+            for row in keys
+            if row["section"] == section
+        ]
+        title = f"`{section}`" if section else top
+        parts.append(f"### {title}\n\n{table(HEADS, rows)}")
+    return "\n".join(parts)
+
+
+def _default(row: dict[str, Any]) -> str:
+    if row["required"]:
+        return "required"
+    value = row["default"]
+    if value is None:
+        return row["unit"] or ""
+    if isinstance(value, bool):
+        value = "true" if value else "false"
+    elif isinstance(value, list):
+        value = "[" + ", ".join(f"{item:g}" if isinstance(item, float) else str(item) for item in value) + "]"
+    elif isinstance(value, float):
+        value = f"{value:g}"
+    return f"{code(value)} {row['unit']}".strip()
+
+
+def _limits() -> str:
+    rows = [*_documented("a YAML file", document.Limits), *_documented("a scene", files.Limits)]
+    rows += [
+        ("a pipeline", "nodes, those of sub-pipelines included", flatten.MOST_NODES),
+        ("a pipeline", "sub-pipelines inside each other", flatten.MOST_NESTED),
+        ("a pipeline", "steps", MOST_STEPS),
+        ("a picture", "pixels along one side; a driver's own limit may be lower", MOST_SIDE),
+        ("a shader", "bytes with its includes", source.MAX_BYTES),
+        ("a shader", "includes inside each other", source.MAX_DEPTH),
+    ]
+    return table(("of", "limit on", "value"), [(of, prose(what), f"{most:,}") for of, what, most in rows])
+
+
+def _documented(of: str, limits: Any) -> list[tuple[str, str, int]]:
+    """The fields of a class of limits, as its docstring explains them."""
+    doc = re.sub(r"\n {8,}", " ", inspect.getdoc(limits) or "")
+    about = dict(re.findall(r"^ +(\w+): (.*)$", doc, re.MULTILINE))
+    return [
+        (of, about[field.name].rstrip("."), field.default)
+        for field in dataclasses.fields(limits)
+        if field.name in about
+    ]

@@ -1,0 +1,187 @@
+"""A page for each node type, and their list by family."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.cli.describe import describe, example, summary
+
+from .markdown import block, code, folded, listing, page, prose, table
+from .pictures import Studio, uses
+
+STEPS = {"param": "uniform", "define": "compiled in", "structural": "plan"}
+
+
+def pages(studio: Studio) -> Iterator[tuple[str, str]]:
+    """The index and every page."""
+    catalog = Catalog.discover()
+    families = {
+        family: [found for found in map(catalog.get, names) if found.plugin == "builtin"]
+        for family, names in catalog.families().items()
+    }
+    described = {found.name: describe(found) for members in families.values() for found in members}
+    yield "nodes/index.md", _index(families)
+    for members in families.values():
+        for found in members:
+            yield f"nodes/{found.name}.md", _page(found, described, studio)
+
+
+def _index(families: dict[str, list[NodeType]]) -> str:
+    parts = [
+        "Every node type that comes with rendergraph, by family. `rendergraph nodes` prints the same list, and "
+        "`rendergraph explain NODE` the same pages."
+    ]
+    for family, members in families.items():
+        if members:
+            rows = [(f"[`{found.name}`]({found.name}.md)", prose(summary(found))) for found in members]
+            parts.append(f"## {family.capitalize() or 'Others'}\n\n" + table(("type", "what it makes"), rows))
+    names = [found.name for members in families.values() for found in members]
+    return page("Nodes", *parts, listing(names))
+
+
+def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio) -> str:
+    node = described[found.name]
+    pictures = [_picture(found, port, studio) for port in node["outputs"]]
+    first, _, rest = node["doc"].partition("\n")
+    inputs = table(
+        ("input", "takes", "", "", "made by"),
+        [
+            (code(p["name"]), code(_meaning(p)), _input_facts(p), prose(p["doc"]), _makers(p, described))
+            for p in node["inputs"]
+        ],
+    )
+    outputs = table(
+        ("output", "carries", "as", ""),
+        [(code(p["name"]), code(_meaning(p)), _output_facts(p), prose(p["doc"])) for p in node["outputs"]],
+    )
+    internal = table(
+        ("texture", "as", ""), [(code(p["name"]), _output_facts(p), prose(p["doc"])) for p in node["internal"]]
+    )
+    parameters = table(
+        ("parameter", "value", "default", "range", "changes", ""),
+        [
+            (
+                code(p["name"]), code(p["type"]), _value(p["default"], p["unit"]), _range(p), STEPS[p["role"]],
+                prose(p["doc"]),
+            )
+            for p in node["parameters"]
+        ],
+    )  # fmt: skip
+    return page(
+        f"`{found.name}`",
+        f"*{found.family}* — {prose(first)}",
+        "\n\n".join(filter(None, pictures)),
+        prose(rest.strip()),
+        f"## In a file\n\n{block(example(node), 'yaml')}",
+        f"## Inputs\n\n{inputs}" if inputs else "",
+        f"## Outputs\n\n{outputs}",
+        f"## Parameters\n\n{parameters}" if parameters else "",
+        f"## Textures of its own\n\n{internal}" if internal else "",
+        "## How it is made\n\n" + "\n\n".join(_sources(found)),
+    )
+
+
+def _picture(found: NodeType, port: dict[str, Any], studio: Studio) -> str:
+    if port["kind"] in ("view", "function", "buffer", "scene"):
+        return ""
+    example_of = uses(found, port["name"])
+    if example_of is None:
+        return ""
+    pipeline, tap = example_of
+    file = studio.draw(pipeline, f"nodes/{found.name}-{port['name']}.png", tap)
+    if file is None:
+        return ""
+    caption = f"`{tap}` of `{pipeline.name}`, scene `shadow_study`"
+    return f"```{{figure}} {Path(file).name}\n:alt: {tap} of {pipeline.name}\n\n{caption}\n```"
+
+
+def _meaning(port: dict[str, Any]) -> str:
+    return str(port["semantic"] or f"like {port['like']}")
+
+
+def _input_facts(port: dict[str, Any]) -> str:
+    words = [] if port["kind"] == "texture2d" else [code(port["kind"])]
+    words += ["optional"] if port["optional"] else []
+    words += ["one or a list"] if port.get("many") else []
+    words += ["continued"] if port.get("continues") else []
+    words += [f"in group {code(port['group'])}"] if port.get("group") else []
+    words += ["any size"] if port.get("size") == "any" else []
+    return ", ".join(words)
+
+
+def _makers(port: dict[str, Any], described: dict[str, dict[str, Any]]) -> str:
+    """The standard nodes with an output that fits."""
+    if port["semantic"] in (None, "any", "view", "scene"):
+        return ""
+    names = [
+        name
+        for name, node in described.items()
+        if any(o["semantic"] == port["semantic"] and o["kind"] == port["kind"] for o in node["outputs"])
+    ]
+    return ", ".join(f"[`{name}`]({name}.md)" for name in names)
+
+
+def _output_facts(port: dict[str, Any]) -> str:
+    words = [] if port["kind"] == "texture2d" else [code(port["kind"])]
+    words += [code(port["format"])] if port.get("format") else []
+    words += [str(port["size"])] if port.get("size") else []
+    words += [f"{port[key]} {key}" for key in ("mips", "layers", "samples") if port.get(key)]
+    words += [f"needs {' and '.join(map(code, port['needs']))}"] if port.get("needs") else []
+    words += [f"`{port['declaration']}`"] if port.get("declaration") else []
+    return ", ".join(words)
+
+
+def _value(value: Any, unit: str) -> str:
+    shown = {True: "true", False: "false"}.get(value, value) if isinstance(value, bool) else value
+    shown = f"{value:g}" if isinstance(value, float) else shown
+    return f"{code(shown)} {unit}".strip()
+
+
+def _range(parameter: dict[str, Any]) -> str:
+    low, high = parameter.get("min"), parameter.get("max")
+    if low is None and high is None:
+        return ""
+    if low is None or high is None:
+        return f"≥ {low:g}" if high is None else f"≤ {high:g}"
+    return f"{low:g} … {high:g}"
+
+
+def _sources(found: NodeType) -> Iterator[str]:
+    """The whole node: its module, and the shaders that the module or one of its bases names."""
+    text = found.file.read_text(encoding="utf-8")
+    yield folded(f"<code>{found.file.name}</code>", block(text, "python"))
+    for file in shader_files(found):
+        yield folded(f"<code>{file.name}</code>", block(file.read_text(encoding="utf-8"), "glsl"))
+
+
+def shader_files(found: NodeType) -> list[Path]:
+    """The node's own shader files, in the order they are named, and what they include from beside them."""
+    own = [cls for cls in found.cls.__mro__ if cls.__module__.startswith(found.cls.__module__.partition(".")[0])]
+    own = [cls for cls in own if not cls.__module__.startswith("rendergraph.declare")]
+    texts = [Path(inspect.getfile(cls)).read_text(encoding="utf-8") for cls in own]
+    names = re.findall(r'"([\w/]+\.(?:vert|geom|frag|comp|glsl))"', "\n".join(texts))
+    if found.cls.record is _default_record():
+        names.insert(0, found.cls.shader or f"{found.name}.frag")
+    files: list[Path] = []
+    for name in names:
+        _with_includes(found.shaders / name, files)
+    return files
+
+
+def _default_record() -> Any:
+    from rendergraph.api import Node
+
+    return Node.record
+
+
+def _with_includes(file: Path, files: list[Path]) -> None:
+    if file in files or not file.is_file():
+        return
+    files.append(file)
+    for name in re.findall(r'^\s*#\s*include\s+"([^"]+)"', file.read_text(encoding="utf-8"), re.MULTILINE):
+        _with_includes(file.parent / name, files)

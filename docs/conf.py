@@ -1,0 +1,52 @@
+"""Sphinx settings: Markdown pages and the Furo theme. The reference is generated before every build."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+    from sphinx.config import Config
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from _generate import generate  # noqa: E402  # found by the line above
+
+import rendergraph  # noqa: E402
+
+project = "rendergraph"
+author = "The rendergraph authors"
+copyright = f"2026, {author}"
+version = release = rendergraph.__version__
+
+extensions = ["myst_parser"]
+myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build", "_generate", "reference/generated/scene-keys.md", "reference/generated/pipeline-keys.md",
+                    "reference/generated/shipped-scenes.md", "reference/generated/limits.md"]  # fmt: skip
+suppress_warnings = ["misc.highlighting_failure"]  # GLSL with our own directives, and wrong text on error pages
+
+html_theme = "furo"
+html_title = "rendergraph"
+html_static_path = ["_static"]
+html_css_files = ["rendergraph.css"]
+html_show_sourcelink = False
+html_copy_source = False
+pygments_style = "tango"
+pygments_dark_style = "github-dark"
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#0b6a63", "color-brand-content": "#0b6a63"},
+    "dark_css_variables": {"color-brand-primary": "#5cc9bd", "color-brand-content": "#5cc9bd"},
+}
+
+
+def _generate(app: Sphinx, config: Config) -> None:
+    generate(HERE / "reference" / "generated")
+
+
+def setup(app: Sphinx) -> None:
+    """Sphinx's hook."""
+    app.connect("config-inited", _generate)
