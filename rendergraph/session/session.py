@@ -107,53 +107,53 @@ class Session:
         if threading.get_ident() != self._thread:
             raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
         wanted = pipeline.wanted(outputs, taps)
+        frames = range(1, 2) if frames is None else frames
         with self.device.current():
-            return self._render(pipeline, wanted, outputs, taps, frames or range(1, 2), alias, poison, shuffle, fps, on_frame, warm_up)
-
-    def _render(
-        self, pipeline: Pipeline, wanted: Mapping[str, Endpoint], outputs: Sequence[str] | None, taps: Sequence[str],
-        frames: range, alias: bool, poison: bool, shuffle: int | None, fps: float,
-        on_frame: Callable[[Frame], None] | None, warm_up: bool,
-    ) -> Frame:  # fmt: skip
-        executable, runner = self._prepare(pipeline, outputs, taps, alias, poison, shuffle)
-        size = pipeline.graph.size
-        times: list[FrameTimes] = []
-        if warm_up:
-            self._frame(pipeline, executable, runner, frames[0], fps, size)
-            runner.check()
-            self.device.ctx.finish()
-        runner.reset()
-        frame: Frame | None = None
-        for number in frames:
-            taken = self._frame(pipeline, executable, runner, number, fps, size)
-            assert taken is not None
-            times.append(taken)
-            runner.check()
-            last = number == frames[-1]
-            if last or on_frame is not None:
-                frame = self._collect(pipeline, executable, runner, wanted, number, times)
-                if on_frame is not None:
-                    on_frame(frame)
+            runner = self.prepare(pipeline, outputs, taps, alias=alias, poison=poison, shuffle=shuffle)
+            if warm_up:
+                self._frame(pipeline, runner, frames[0], fps)
+                runner.check()
+                self.device.ctx.finish()
+            runner.reset()
+            times: list[FrameTimes] = []
+            frame: Frame | None = None
+            for number in frames:
+                times.append(self._frame(pipeline, runner, number, fps))
+                runner.check()
+                if number == frames[-1] or on_frame is not None:
+                    frame = self._collect(pipeline, runner, wanted, number, times)
+                    if on_frame is not None:
+                        on_frame(frame)
         assert frame is not None, "an empty range of frames"
         return frame
 
-    def _frame(
-        self, pipeline: Pipeline, executable: Executable, runner: Runner, number: int, fps: float, size: tuple[int, int]
-    ) -> FrameTimes | None:
+    def _frame(self, pipeline: Pipeline, runner: Runner, number: int, fps: float) -> FrameTimes:
         time = (number - 1) / fps
         scene = pipeline.scene
         if animate.moves(scene):
             scene = animate.at(scene, time)
             self._scenes[id(pipeline.scene)][1].update(scene)
         name = pipeline.camera or next(iter(scene.cameras))
-        camera = view_matrices(scene.cameras[name], size)
-        return runner.run(number, time, 1.0 / fps, scene, camera, timed=True)
+        camera = view_matrices(scene.cameras[name], pipeline.graph.size)
+        times = runner.run(number, time, 1.0 / fps, scene, camera, timed=True)
+        assert times is not None
+        return times
 
-    def _prepare(
-        self, pipeline: Pipeline, outputs: Sequence[str] | None, taps: Sequence[str], alias: bool, poison: bool,
-        shuffle: int | None,
-    ) -> tuple[Executable, Runner]:  # fmt: skip
-        """The executable: one that is kept where only uniforms differ, else a new one."""
+    def prepare(
+        self,
+        pipeline: Pipeline,
+        outputs: Sequence[str] | None = None,
+        taps: Sequence[str] = (),
+        *,
+        alias: bool = True,
+        poison: bool = False,
+        shuffle: int | None = None,
+    ) -> Runner:
+        """Compile a pipeline without drawing it; one that is kept is taken again where only uniforms differ.
+
+        The runner's `run` is the bare frame: what `render` does before and after it (warming up, reading back) is the
+        caller's. The session's context must be current.
+        """
         from rendergraph.allocate import allocate
         from rendergraph.schedule import schedule
 
@@ -172,7 +172,7 @@ class Session:
         if executable is not self.active:
             executable.fresh = True  # another pipeline may have written other values into shared programs
         self._kept[key] = self.active = executable
-        return executable, Runner(executable, pipeline.graph)
+        return Runner(executable, pipeline.graph)
 
     def _scene(self, pipeline: Pipeline) -> GpuScene:
         scene = pipeline.scene
@@ -198,10 +198,14 @@ class Session:
     # Results ---------------------------------------------------------------------------------------------------------
 
     def _collect(
-        self, pipeline: Pipeline, executable: Executable, runner: Runner, wanted: Mapping[str, Endpoint], number: int,
+        self,
+        pipeline: Pipeline,
+        runner: Runner,
+        wanted: Mapping[str, Endpoint],
+        number: int,
         times: Sequence[FrameTimes],
-    ) -> Frame:  # fmt: skip
-        graph, plan = pipeline.graph, executable.plan
+    ) -> Frame:
+        graph, plan = pipeline.graph, runner.executable.plan
         resources = plan.schedule.wanted
         arrays = {name: runner.read(resources[name], number) for name in wanted}
         infos = {}

@@ -122,7 +122,8 @@ def frame_loop(session: Any, pipeline: Any) -> Draw:
     """The framework's bare frame loop over a pipeline that is compiled once."""
     from rendergraph.scene.cameras import view_matrices
 
-    executable, runner = session._prepare(pipeline, None, (), True, False, None)
+    with session.device.ctx:
+        runner = session.prepare(pipeline)
     scene = pipeline.scene
     camera = view_matrices(next(iter(scene.cameras.values())), pipeline.graph.size)
     number = 0
@@ -135,7 +136,7 @@ def frame_loop(session: Any, pipeline: Any) -> Draw:
                 runner.run(number, number / 30, 1 / 30, scene, camera)
             session.device.ctx.finish()
 
-    draw.executable = executable  # type: ignore[attr-defined]
+    draw.executable = runner.executable  # type: ignore[attr-defined]
     return draw
 
 
