@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.errors import InputError
+from rendergraph.errors import InputError, UsageError
 from rendergraph.gl.raw import RawGL
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Program", "Query", "Renderbuffer")
@@ -110,3 +110,23 @@ def test_variants_drawn_in_turns_are_compiled_once_and_keep_their_pictures(gl: r
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a, b)
     assert not np.array_equal(first[0], first[2])
+
+
+def test_limits_are_raised_by_the_name_that_the_message_gives(tmp_path: Any) -> None:
+    deep = "x: " + "[" * 70 + "]" * 70
+    (tmp_path / "deep.yaml").write_text(f"rendergraph: 1\n{deep}\n")
+    with pytest.raises(InputError, match="--limit yaml-depth=N"):
+        rg.load(tmp_path / "deep.yaml").spec.check()
+    with pytest.raises(InputError) as caught:
+        rg.load(tmp_path / "deep.yaml", limits={"yaml-depth": 100}).spec.check()
+    assert "yaml-depth" not in str(caught.value)
+    with pytest.raises(InputError, match="--limit scene-vertices=N"):
+        rg.load("forward", limits={"scene-vertices": 10}, scene=_triangle(tmp_path)).check()
+    with pytest.raises(UsageError, match="there is no limit 'scene-vertexes'; did you mean 'scene-vertices'"):
+        rg.load("forward", limits={"scene-vertexes": 10})
+
+
+def _triangle(folder: Any) -> Any:
+    rows = [f"v {k} {k * k} 0" for k in range(20)] + [f"f {k} {k + 1} {k + 2}" for k in range(1, 18)]
+    (folder / "t.obj").write_text("\n".join(rows))
+    return folder / "t.obj"

@@ -87,6 +87,13 @@ def _picture(name: str, text: str) -> Path:
     return Path(name)
 
 
+def _limit(text: str) -> tuple[str, int]:
+    name, _, number = text.partition("=")
+    if not name or not re.fullmatch(r"\d{1,18}", number):
+        raise ValueError(f"'{text}' is not NAME=N, as in yaml-depth=100")
+    return name, int(number)
+
+
 def _positive(text: str) -> float:
     try:
         number = float(text)
@@ -102,6 +109,7 @@ FRAMES = Parsed("A-B", _frames)
 SETTING = Parsed("PATH=VALUE", _setting)
 OUTPUT = Parsed("[NAME=]FILE", _output)
 TAP = Parsed("NODE.PORT=FILE", _tap)
+LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
 _PATH = click.Path(path_type=Path)
 
@@ -134,6 +142,9 @@ def selection_options(function: F) -> F:
                 "--asset-root", "asset_roots", multiple=True, type=_PATH, metavar="DIR",
                 help="A further folder that files may be read from.",
             ),
+            click.option(
+                "--limit", "limits", multiple=True, type=LIMIT, help="Allow a file more than usual; messages say when."
+            ),
             plugin_option,
         ]
     ):  # fmt: skip
@@ -162,6 +173,7 @@ def make(
     sets: tuple[str, ...] = (),
     patches: tuple[Path, ...] = (),
     asset_roots: tuple[Path, ...] = (),
+    limits: tuple[tuple[str, int], ...] = (),
     plugins: tuple[Path, ...] = (),
 ) -> rg.Pipeline:
     """The pipeline that `pipeline_options` describe; nothing is read yet."""
@@ -169,7 +181,7 @@ def make(
 
     return rg.load(
         pipeline, scene=scene, camera=camera, environment=environment, size=size, sets=list(sets),
-        patches=list(patches), asset_roots=list(asset_roots), plugins=list(plugins),
+        patches=list(patches), asset_roots=list(asset_roots), limits=dict(limits), plugins=list(plugins),
     )  # fmt: skip
 
 

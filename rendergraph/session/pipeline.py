@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Problem, UsageError, suggestion
 from rendergraph.link import Endpoint, Graph
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ def load(
     sets: Sequence[str] = (),
     patches: Sequence[str | Path | Mapping[str, Any]] = (),
     asset_roots: Sequence[str | Path] = (),
+    limits: Mapping[str, int] | None = None,
     plugins: Sequence[str | Path] = (),
 ) -> Pipeline:
     """A pipeline by shipped name or file; nothing is read until it is asked for.
@@ -48,8 +49,16 @@ def load(
         sets: what `-s` takes on the command line, such as `ao.radius=0.8`.
         patches: merge patches, as files or mappings.
         asset_roots: more folders that the file may reach.
+        limits: what files may ask for, by the names that messages give: `yaml-depth`, `scene-vertices`, …
         plugins: Python files or folders with node types.
+
+    Raises:
+        UsageError: a limit of an unknown name.
     """
+    known = {name for names in _limit_names().values() for name in names}
+    for name in limits or {}:
+        if name not in known:
+            raise UsageError(Problem("RG500", f"there is no limit '{name}'{suggestion(name, known)}"))
     return Pipeline(
         source=str(source),
         scene_name=None if scene is None else str(scene),
@@ -59,8 +68,20 @@ def load(
         sets=tuple(sets),
         patches=tuple(Path(p) if isinstance(p, str) else p for p in patches),
         asset_roots=tuple(Path(root) for root in asset_roots),
+        limits=tuple((limits or {}).items()),
         plugins=tuple(Path(plugin) for plugin in plugins),
     )
+
+
+def _limit_names() -> dict[str, dict[str, str]]:
+    """What each kind of file has limits of: the name on the command line to the field."""
+    from rendergraph.document import Limits as YamlLimits
+    from rendergraph.scene.files import Limits as SceneLimits
+
+    return {
+        kind: {f"{kind}-{entry.name.replace('_', '-')}": entry.name for entry in fields(limits)}
+        for kind, limits in (("yaml", YamlLimits), ("scene", SceneLimits))
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +96,7 @@ class Pipeline:
     sets: tuple[str, ...] = ()
     patches: tuple[Path | Mapping[str, Any], ...] = ()
     asset_roots: tuple[Path, ...] = ()
+    limits: tuple[tuple[str, int], ...] = ()
     plugins: tuple[Path, ...] = ()
     known_catalog: Catalog | None = field(default=None, repr=False)
 
@@ -99,6 +121,11 @@ class Pipeline:
         """The same at another size."""
         return self if self.size == size else replace(self, size=size)
 
+    def allowed(self, kind: str) -> dict[str, int]:
+        """The limits set for `yaml` or `scene` files, by field."""
+        names = _limit_names()[kind]
+        return {names[name]: most for name, most in self.limits if name in names}
+
     # Stages ----------------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -111,6 +138,7 @@ class Pipeline:
     @cached_property
     def spec(self) -> PipelineSpec:
         """The resolved file."""
+        from rendergraph.document import Limits
         from rendergraph.resolve import resolve
 
         return resolve(
@@ -120,6 +148,7 @@ class Pipeline:
             scene=self.scene_name,
             size=self.size,
             asset_roots=self.asset_roots,
+            limits=Limits(**self.allowed("yaml")),
             catalog=self.catalog,
         )
 
@@ -135,19 +164,21 @@ class Pipeline:
         Pipelines that ask for the same unchanged file share one scene, and so its place on the GPU.
         """
         from rendergraph.scene.animate import complete
-        from rendergraph.scene.files import Reading
+        from rendergraph.scene.files import Limits, Reading
         from rendergraph.scene.load import load
         from rendergraph.scene.model import Environment, Scene
 
         file = self.spec.scene
         stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
+        limits = Limits(**self.allowed("scene"))
         roots = self.spec.roots.folders if file is not None else ()
-        key = (file, stamp, self.environment, self.camera, roots)
+        key = (file, stamp, self.environment, self.camera, roots, limits)
         found = _SCENES.get(key)
         if found is None:
-            scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check)
+            scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check, limits=limits)
             if self.environment is not None:
-                image = Reading(self.environment, lambda path, place: path).image(self.environment, "environment")
+                reading = Reading(self.environment, lambda path, place: path, limits)
+                image = reading.image(self.environment, "environment")
                 scene = replace(scene, environment=Environment(image))
             _SCENES[key] = found = complete(scene, self.camera)
         return found

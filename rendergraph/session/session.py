@@ -15,6 +15,7 @@ from rendergraph.execute import FrameTimes, Runner, median_times, summary
 from rendergraph.expand import CAMERA
 from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.images import decode
+from rendergraph.images.decode import Limits
 from rendergraph.scene import animate, pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import ImageSource, Scene
@@ -181,13 +182,16 @@ class Session:
                 old.release(self.programs)
             self._forget_executables()
             self._image_warnings = []
+            allowed = pipeline.allowed("scene")
+            names = {"image_side": "side", "image_bytes": "bytes", "image_ratio": "ratio"}
+            self._limits = Limits(**{names[name]: most for name, most in allowed.items() if name in names})
             self._scenes = {id(scene): (scene, GpuScene(self.device, scene, pack.pack(scene), self._decode))}
             if pipeline.environment is not None and scene.environment is not None:
                 self._decode(scene.environment.image, False)  # named by the user: a broken one is said, used or not
         return self._scenes[id(scene)][1]
 
     def _decode(self, source: ImageSource, srgb: bool) -> npt.NDArray[Any]:
-        return decode(source, srgb=srgb, warn=self._image_warnings.append)
+        return decode(source, srgb=srgb, warn=self._image_warnings.append, limits=self._limits)
 
     def _forget_executables(self) -> None:
         for executable in self._kept.values():
