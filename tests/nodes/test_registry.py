@@ -13,16 +13,22 @@ from rendergraph.glsl import expand, interface
 from rendergraph.resources import folder, shipped_pipelines
 
 CATALOG = Catalog.discover()
-BUILTIN = [name for name in CATALOG.names() if CATALOG.get(name).plugin == "builtin"]
+BUILTIN = sorted(path.stem for path in folder("rendergraph.nodes").rglob("*.py") if not path.stem.startswith("_"))
 SHADERS = folder("rendergraph.shaders")
 STAGES = {".vert", ".frag", ".geom", ".comp"}
 
 
-def shader_names(name: str) -> set[str]:
-    """Files a node's module and its helpers name: strings that end like a shader."""
+def module_text(name: str) -> str:
+    """The text of a node's module and of the helpers beside it."""
     text = CATALOG.get(name).file.read_text()
     for helper in re.findall(r"from \.(_\w+) import", text):
         text += (CATALOG.get(name).file.parent / f"{helper}.py").read_text()
+    return text
+
+
+def shader_names(name: str) -> set[str]:
+    """Files a node's module and its helpers name: strings that end like a shader."""
+    text = module_text(name)
     found = set(re.findall(r'"(<?[\w./]+\.(?:vert|frag|geom|comp|glsl)>?)"', text))
     cls = CATALOG.get(name).cls
     if cls.record is Node.record:
@@ -64,9 +70,9 @@ def test_shaders_exist_and_their_includes_resolve(name: str) -> None:
 
 @pytest.mark.parametrize("name", BUILTIN)
 def test_what_its_shaders_declare_is_declared_by_the_node(name: str) -> None:
-    """Uniforms of a node's own shaders are its ports, its parameters, or the framework's."""
+    """Uniforms of a node's own shaders are its ports, its parameters, what its steps bind, or the framework's."""
     cls = CATALOG.get(name).cls
-    framework = {"view_index"}
+    framework = {"view_index", *re.findall(r"\b(\w+)=", module_text(name))}
     for shader in shader_names(name):
         if shader.startswith("<"):
             continue

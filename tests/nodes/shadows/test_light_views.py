@@ -19,12 +19,16 @@ def camera(
     eye: Any = (0, 2, 6), target: Any = (0, 0, 0), far: float = 100.0, kind: Any = "perspective"
 ) -> ViewMatrices:
     made = Camera("c", look_at(eye, target), type=kind, near=0.1, far=far, height=3.0)
-    return ViewMatrices(np.linalg.inv(made.transform), projection(made, 1.5), (300, 200), 0.1, far)
+    return ViewMatrices(
+        np.asarray(np.linalg.inv(made.transform), np.float64), projection(made, 1.5), (300, 200), 0.1, far
+    )
 
 
 def quad() -> Mesh:
     positions = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], np.float32)
-    return Mesh("quad", positions, np.array([[0, 2, 1], [0, 3, 2]], np.uint32), np.tile(np.float32([0, 1, 0]), (4, 1)))
+    return Mesh(
+        "quad", positions, np.array([[0, 2, 1], [0, 3, 2]], np.uint32), np.tile(np.array([0, 1, 0], np.float32), (4, 1))
+    )
 
 
 def cube() -> Mesh:
