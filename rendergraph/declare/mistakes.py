@@ -10,7 +10,13 @@ from rendergraph.textures import FORMATS
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
-# Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that pydantic's base owns.
+_OF_THE_BASE = frozenset(
+    """
+    copy json dict schema construct fields validate record update ports inputs outputs groups parameters shader role_of
+    """.split()  # noqa: SIM905 - as below
+)
+
+# Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that the base class owns.
 RESERVED_NAMES: frozenset[str] = frozenset(
     """
     attribute const uniform varying buffer shared coherent volatile restrict readonly writeonly layout centroid flat
@@ -22,10 +28,9 @@ RESERVED_NAMES: frozenset[str] = frozenset(
     sizeof cast namespace using texture sampler2D sampler3D samplerCube image2D abs acos all any asin atan ceil clamp
     cos cross degrees determinant distance dot equal exp exp2 floor fma fract inverse inversesqrt length log log2 main
     max min mix mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose
-    trunc copy json dict schema construct fields validate record update ports inputs outputs groups parameters shader
-    role_of
+    trunc
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
-)
+) | _OF_THE_BASE
 
 
 def declaration_mistakes(cls: type[Node]) -> list[str]:
@@ -37,10 +42,11 @@ def declaration_mistakes(cls: type[Node]) -> list[str]:
     mistakes: list[str] = []
     ports = cls.ports()
     names = [*ports, *cls.parameters()]
+    plan = {name for name in cls.parameters() if cls.role_of(name) == "structural"}  # these never reach a shader
     for name in names:
         if not _IDENTIFIER.match(name) or name.startswith("gl_") or "__" in name:
             mistakes.append(f"'{name}' is not a lower-case GLSL identifier")
-        elif name in RESERVED_NAMES or name.startswith("model_"):
+        elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES) or name.startswith("model_"):
             mistakes.append(f"'{name}' is reserved by GLSL or by the node's base class; choose another name")
     for name in set(ports) & set(cls.parameters()):
         mistakes.append(f"'{name}' is both a port and a parameter")
