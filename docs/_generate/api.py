@@ -89,7 +89,9 @@ def _signature(thing: Any, *, method: bool = False) -> str:
     except (TypeError, ValueError):
         return "(…)"
     shown, keyword_only = [], False
-    for parameter in list(found.parameters.values())[1 if method and "self" in found.parameters else 0 :]:
+    for parameter in found.parameters.values():
+        if method and parameter.name in ("self", "cls"):
+            continue
         if parameter.kind is parameter.KEYWORD_ONLY and not keyword_only:
             shown.append("*")
             keyword_only = True

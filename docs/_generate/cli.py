@@ -46,7 +46,7 @@ def _verb(verb: str, command: click.Command) -> str:
     context = click.Context(command, info_name=f"rendergraph {verb}")
     about, _, examples = inspect.cleandoc(command.help or "").partition("\b")
     lines = [f"$ {line.strip()}" for line in examples.splitlines()[2:] if line.strip()]
-    options = [record for parameter in command.params if (record := parameter.get_help_record(context))]
+    options = [record for parameter in command.params if (record := parameter.get_help_record(context)) and record[1]]
     usage = f"rendergraph {verb} {' '.join(command.collect_usage_pieces(context))}"
     return "\n\n".join(
         [

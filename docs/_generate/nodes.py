@@ -63,7 +63,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         ("texture", "as", ""), [(code(p["name"]), _output_facts(p), prose(p["doc"])) for p in node["internal"]]
     )
     parameters = table(
-        ("parameter", "value", "default", "range", "changes", ""),
+        ("parameter", "value", "default", "range", "as", ""),
         [
             (
                 code(p["name"]), code(p["type"]), _value(p["default"], p["unit"]), _range(p), STEPS[p["role"]],

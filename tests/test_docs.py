@@ -1,0 +1,183 @@
+"""The documentation says what is true: every block of code in it is checked or run, every generated page is there.
+
+The blocks of a page run in order in one empty folder. A block whose first line is a comment with a file's name
+(`# a.yaml`, `// a.frag`) is written there. YAML that is a pipeline or a scene must pass `check`; of `console` blocks
+every `rendergraph` line is run, small, and the lines under it are compared with what it prints, where `…` stands for
+anything.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from rendergraph.cli.app import VERBS, main
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(page for page in DOCS.rglob("*.md") if "generated" not in page.parts)]
+SMALL = ["--size", "48x27"]  # the last one counts
+NOT_RUN = ("apt-get ", "python3 -m venv ")
+
+
+@dataclass(frozen=True)
+class Block:
+    """One fenced block."""
+
+    line: int
+    language: str
+    text: str
+
+    @property
+    def file(self) -> str | None:
+        """The name in the first line's comment."""
+        found = re.match(r"(?:#|//) ([\w.-]+\.\w+)\n", self.text)
+        return found[1] if found else None
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    text = page.read_text(encoding="utf-8")
+    for found in re.finditer(r"^(`{3,})(\w+)\n(.*?)^\1$", text, re.MULTILINE | re.DOTALL):
+        yield Block(text.count("\n", 0, found.start()) + 1, found[2], found[3])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_blocks_of_a_page(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RENDERGRAPH_TRACEBACK", "1")
+    for block in blocks(page):
+        where = f"{page.name}:{block.line}"
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
+        if block.language == "console":
+            _run_console(block.text, where, capsys)
+        elif block.language == "python" and not block.file:
+            exec(compile(block.text, where, "exec"), {})
+        elif block.language == "yaml":
+            _check_yaml(block, where, capsys)
+        elif block.language == "toml":
+            importlib.import_module("tomllib").loads(block.text)
+
+
+def _check_yaml(block: Block, where: str, capsys: pytest.CaptureFixture[str]) -> None:
+    document = yaml.load(block.text, yaml.BaseLoader)
+    assert isinstance(document, dict), where
+    name = block.file or "block.yaml"
+    if name.startswith("broken") or "inputs" in document:  # shown for its mistakes; or no pipeline on its own
+        return
+    path = Path(name)
+    path.write_text(block.text, encoding="utf-8")
+    plugins = [word for plugin in Path().glob("*.py") for word in ("--plugin", str(plugin))]
+    if "scene" in document and "nodes" not in document and "extends" not in document:
+        words = ["check", "forward", "--scene", name]
+    elif "extends" in document or "outputs" in document:
+        words = ["check", name, *plugins]
+    elif "nodes" in document:  # a patch
+        words = ["check", "forward", "-p", name]
+    else:
+        return
+    code = main(words)
+    assert code == 0, f"{where}: {capsys.readouterr().err}"
+
+
+def _run_console(text: str, where: str, capsys: pytest.CaptureFixture[str]) -> None:
+    commands = re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", text, re.MULTILINE)
+    assert commands, f"{where}: a console block without a line that starts with '$ '"
+    for command, shown in commands:
+        if command.startswith(NOT_RUN):
+            continue
+        words = shlex.split(command)
+        assert words[0] == "rendergraph", f"{where}: what is '{words[0]}'?"
+        capsys.readouterr()
+        code = main([*words[1:], *(SMALL if words[1] in ("run", "bench") else [])])
+        out, err = capsys.readouterr()
+        expected = shown.strip()
+        fails = re.search(r"\bRG(?:\d|…)", expected) is not None
+        assert (code == 3) if fails else (code == 0), f"{where}: {command}\n{err}"
+        if expected:
+            pattern = ".*".join(re.escape(part) for part in re.split(r"\s*…\s*", expected))
+            printed = (err if fails else out).strip()
+            assert re.fullmatch(pattern, printed, re.DOTALL), f"{where}: {command}\n{printed}"
+
+
+# --- what is generated -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("generated")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(DOCS))
+        generate: Any = importlib.import_module("_generate").generate
+        generate(folder, pictures=False)
+    return folder
+
+
+def test_every_node_type_has_its_page(generated: Path) -> None:
+    from rendergraph.catalog import Catalog
+
+    for name in Catalog.discover().names():
+        page = (generated / "nodes" / f"{name}.md").read_text(encoding="utf-8")
+        cls = Catalog.discover().get(name).cls
+        for word in [*cls.inputs(), *cls.outputs(), *cls.parameters()]:
+            assert f"| `{word}` |" in page, f"{name}: {word}"
+
+
+def test_the_sources_of_a_node_are_on_its_page(generated: Path) -> None:
+    page = (generated / "nodes" / "shadow_pcf.md").read_text(encoding="utf-8")
+    shown = re.findall(r"<summary><code>(.*?)</code>", page)
+    assert shown == ["shadow_pcf.py", "shadow_pcf.glsl", "map_shadow.glsl", "map_visibility.frag"]
+
+
+def test_every_error_code_has_its_page(generated: Path) -> None:
+    codes = {file.name.partition("-")[0] for file in (ROOT / "rendergraph" / "errors").glob("RG*.yaml")}
+    assert codes == {file.stem for file in (generated / "errors").glob("RG*.md")}
+
+
+def test_every_verb_and_shipped_file_is_listed(generated: Path) -> None:
+    verbs = (generated / "cli.md").read_text(encoding="utf-8")
+    assert all(f"## {verb}\n" in verbs for verb in VERBS)
+    for page, folder in (("pipelines.md", ROOT / "pipelines"), ("shipped-scenes.md", ROOT / "pipelines" / "scenes")):
+        text = (generated / page).read_text(encoding="utf-8")
+        assert all(f"## {file.stem}\n" in text for file in folder.glob("*.yaml"))
+
+
+def test_names_for_node_authors_are_all_documented(generated: Path) -> None:
+    import rendergraph.api
+
+    text = (generated / "node-api.md").read_text(encoding="utf-8")
+    missing = [name for name in rendergraph.api.__all__ if f"## {name}\n" not in text and f"| `{name}` |" not in text]
+    assert not missing
+
+
+# --- the README ------------------------------------------------------------------------------------------------------
+
+
+def test_the_picture_is_what_the_file_draws(gl: Any, tmp_path: Path) -> None:
+    import rendergraph as rg
+    from rendergraph.images import read
+
+    text = next(block.text for block in blocks(ROOT / "README.md") if block.file == "study.yaml")
+    (tmp_path / "study.yaml").write_text(text, encoding="utf-8")
+    drawn = gl.render(rg.load(tmp_path / "study.yaml"), outputs=["image"])["image"][..., :3]
+    shown = read(DOCS / "images" / "study.png")[..., :3]
+    assert shown.shape == drawn.shape
+    difference = np.abs(np.asarray(drawn, np.float64) - shown)
+    assert difference.mean() < 1.0, "render README's study.yaml again: docs/images/study.png"
+
+
+def test_links_of_the_readme_lead_somewhere() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for target in re.findall(r"\]\((?!https?:)([^)#]+)", text):
+        assert (ROOT / target).exists(), target
