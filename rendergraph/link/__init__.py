@@ -76,6 +76,7 @@ class _Linker:
         knots = cycles(nodes)
         used = {end.source for bound in nodes.values() for links in bound.links.values() for end in links}
         infer = Infer(nodes, self.spec.size, self.lights, used | {found.source for found in outputs.values()})
+        textures: dict[Endpoint, TextureInfo] = {}
         if knots:
             self.problems += knots
         else:

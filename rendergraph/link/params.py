@@ -97,9 +97,11 @@ def words_for(annotation: Any, limits: Mapping[str, Any]) -> str:
     if origin in (Union, types.UnionType):
         return " or ".join(words_for(part, limits) for part in arguments if part is not types.NoneType)
     if origin is Literal:
-        return f"one of {', '.join(map(str, arguments))}" if len(arguments) > 1 else f"only {arguments[0]}"
+        return (
+            f"one of {', '.join(map(str, arguments))}" if len(arguments) > 1 else f"only {''.join(map(str, arguments))}"
+        )
     if origin in (tuple, list):
-        of = "whole numbers" if arguments and arguments[0] is int else "words" if arguments[0] is str else "numbers"
+        of = {int: "whole numbers", str: "words"}.get(next(iter(arguments), float), "numbers")
         count = "" if origin is list or Ellipsis in arguments else f"{len(arguments)} "
         return f"a list of {count}{of}"
     words = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}.get(annotation, "a mapping")

@@ -11,7 +11,7 @@ from rendergraph.document import Source, Value, scalar
 from rendergraph.resources import folder
 
 _PLAIN = re.compile(r"[A-Za-z_./$][A-Za-z0-9_./$@ -]*(?<! )\Z")
-_WIDTH = 100
+_WIDTH = 60
 
 
 def to_yaml(tree: Value, origins: bool) -> str:
@@ -19,7 +19,7 @@ def to_yaml(tree: Value, origins: bool) -> str:
     lines = list(_block(tree, 0))
     if not origins:
         return "".join(f"{text}\n" for text, _ in lines)
-    width = min(_WIDTH, max((len(text) for text, origin in lines if origin), default=0))
+    width = max((len(text) for text, origin in lines if origin and len(text) <= _WIDTH), default=0)
     return "".join(f"{text.ljust(width)}  # {_origin(origin)}\n" if origin else f"{text}\n" for text, origin in lines)
 
 
