@@ -8,7 +8,6 @@ from rendergraph.api import (
     PREMULTIPLIED,
     Depth,
     Input,
-    Node,
     Occlusion,
     Output,
     Port,
@@ -20,14 +19,12 @@ from rendergraph.api import (
     View,
     Visibility,
     define,
-    param,
-    structural,
 )  # fmt: skip
 
-Color = float | tuple[float, float, float]
+from ._lighting import Lighting
 
 
-class ForwardLighting(Node):
+class ForwardLighting(Lighting):
     """Radiance of the scene under all its lights, in one pass over the geometry.
 
     Opaque surfaces first, front to back, then those with alpha blending, back to front. Shadows come as functions
@@ -54,21 +51,7 @@ class ForwardLighting(Node):
         Depth, format="depth32f", clear=1.0, doc="Depth of the nearest opaque surface, where no pre-pass is connected."
     )
 
-    shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] = define(
-        default="pbr", doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model."
-    )
     evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often light is computed.")
-    smith: Literal["exact", "fast"] = define(default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots.")
-    terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
-        default="all", doc="One term alone, to look at; the four sum to the whole."
-    )
-    ambient: Color = param(default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB.")
-    background: Color = structural(default=0.0, min=0, doc="Radiance where nothing is, a number or RGB.")
-
-    @property
-    def background_rgb(self) -> tuple[float, float, float]:
-        """The background as RGB."""
-        return self.background if isinstance(self.background, tuple) else (self.background,) * 3
 
     def record(self, steps: Steps) -> None:
         """One pass over what is opaque, one over what is blended."""

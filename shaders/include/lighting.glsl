@@ -2,17 +2,30 @@
 #include <lights.glsl>
 #include <terms.glsl>
 
-// Light of all punctual lights reflected to the viewer.
+// Light of one of them reflected to the viewer, by the scene's index.
+Reflected reflected_light(Surface s, int light) {
+#if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
+    vec3 to_light;
+    vec3 irradiance = irradiance_from(lights[light], s.position, to_light);
+    if (dot(s.normal, to_light) > 0.0) irradiance *= shadow(light, s.position, s.geometric_normal);
+    Reflected one = reflected(s, to_light);
+    return Reflected(one.diffuse * irradiance, one.specular * irradiance);
+#else
+    return Reflected(vec3(0.0), vec3(0.0));
+#endif
+}
+
+// Light of all; with DIRECTIONALS_ONLY of those alone that shine everywhere.
 Reflected reflected_lights(Surface s) {
     Reflected sum = Reflected(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
     for (int i = 0; i < LIGHT_COUNT; ++i) {
-        vec3 to_light;
-        vec3 irradiance = irradiance_from(lights[i], s.position, to_light);
-        if (dot(s.normal, to_light) > 0.0) irradiance *= shadow(i, s.position, s.geometric_normal);
-        Reflected one = reflected(s, to_light);
-        sum.diffuse += one.diffuse * irradiance;
-        sum.specular += one.specular * irradiance;
+#ifdef DIRECTIONALS_ONLY
+        if (lights[i].position.w > 0.0) continue;
+#endif
+        Reflected one = reflected_light(s, i);
+        sum.diffuse += one.diffuse;
+        sum.specular += one.specular;
     }
 #endif
     return sum;

@@ -1,5 +1,7 @@
 // What a shading model knows of a point on a surface, whether it comes from geometry or from a G-buffer.
+#ifdef MATERIAL_COUNT
 #include <materials.glsl>
+#endif
 
 #ifndef SHADING  // a pass that only writes surfaces down needs no model
 #define SHADING 0
@@ -8,6 +10,13 @@
 #define SHADING_BLINN_PHONG 2
 #define SHADING_ANISOTROPIC 3
 #define SHADING_PBR 4
+#endif
+
+#if SHADING == SHADING_PHONG || SHADING == SHADING_BLINN_PHONG
+#define EMPIRICAL
+#endif
+#if SHADING == SHADING_ANISOTROPIC
+#define NEEDS_GRAIN
 #endif
 
 struct Surface {
@@ -22,6 +31,7 @@ struct Surface {
     vec3 f0;         // specular colour at normal incidence, or ks
     vec3 ambient;    // what an even light from all sides is multiplied with: base colour, or ka
     vec3 emissive;
+    vec4 dielectric;  // f0 and f90 of what is not metal
     float f90;
     float alpha;     // opacity
     float metallic;
@@ -29,26 +39,38 @@ struct Surface {
     float occlusion;
     float exponent;    // n of `phong`
     float anisotropy;  // strength
+    float lit;         // 0 where the material is unlit, else 1
 };
 
-// Fills in what the models of this program look at. Empirical models take the material's own kd, ks and n where no
-// texture changes what they are derived from, else: kd = base (1 - metallic), ks = f0, 4 n = 2 / alpha^2 - 2.
-void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
-#ifdef DEFAULT_SPECULAR  // no material of the scene has another index of refraction or specular colour
-    s.f0 = mix(vec3(0.04), s.base_color, s.metallic);
-    s.f90 = 1.0;
-#else
-    vec3 dielectric = min(m.extra.x * specular.rgb, 1.0) * specular.a;
-    s.f0 = mix(dielectric, s.base_color, s.metallic);
-    s.f90 = mix(specular.a, 1.0, s.metallic);
-#endif
+// Reflectance from base colour, metallic part and, in `dielectric`, the rest's colour at normal and brightness at
+// grazing incidence.
+void physical_reflectance(inout Surface s, vec4 dielectric) {
     s.diffuse = s.base_color * (1.0 - s.metallic);
     s.ambient = s.base_color;
-#if SHADING == SHADING_PHONG || SHADING == SHADING_BLINN_PHONG
-#ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
-    float alpha = max(s.roughness * s.roughness, 0.001);
-    s.exponent = 0.5 / (alpha * alpha) - 0.5;
+    s.f0 = mix(dielectric.rgb, s.base_color, s.metallic);
+    s.f90 = mix(dielectric.a, 1.0, s.metallic);
+}
+
+// The exponent of `phong` that draws about the same highlight: 4 n = 2 / alpha^2 - 2.
+float phong_exponent(float roughness) {
+    float alpha = max(roughness * roughness, 0.001);
+    return 0.5 / (alpha * alpha) - 0.5;
+}
+
+#ifdef MATERIAL_COUNT
+vec4 dielectric_of(MaterialData m, vec4 specular) {
+#ifdef DEFAULT_SPECULAR  // no material of the scene has another index of refraction or specular colour
+    return vec4(0.04, 0.04, 0.04, 1.0);
 #else
+    return vec4(min(m.extra.x * specular.rgb, 1.0) * specular.a, specular.a);
+#endif
+}
+
+// The empirical models' coefficients, after the physical ones: the material's own kd, ks and ka where no texture
+// changes what they are derived from, else kd = base (1 - metallic), ks = f0.
+void empirical_reflectance(inout Surface s, MaterialData m) {
+    s.exponent = phong_exponent(s.roughness);
+#ifndef HAS_METALLIC_ROUGHNESS_TEXTURE
     // The texture multiplies kd and ka; of ks it changes the metallic part.
     vec3 textured = s.base_color / max(m.base_color.rgb, 1e-6);
     s.diffuse = m.phong_diffuse.rgb * textured;
@@ -56,5 +78,14 @@ void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
     s.ambient = m.phong_ambient.rgb * textured;
     s.exponent = m.phong_diffuse.w;
 #endif
+}
+
+// Fills in what the models of this program look at.
+void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
+    s.dielectric = dielectric_of(m, specular);
+    physical_reflectance(s, s.dielectric);
+#ifdef EMPIRICAL
+    empirical_reflectance(s, m);
 #endif
 }
+#endif

@@ -6,7 +6,7 @@ in vec3 v_position;
 in vec3 v_normal;
 flat in int v_material;
 
-#if defined(HAS_NORMAL_TEXTURE) || SHADING == SHADING_ANISOTROPIC
+#if defined(HAS_NORMAL_TEXTURE) || defined(NEEDS_GRAIN)
 #define NEEDS_TANGENT
 #ifdef HAS_TANGENT
 in vec4 v_tangent;
@@ -30,7 +30,7 @@ uniform sampler2D specular_texture;
 #ifdef HAS_SPECULAR_COLOR_TEXTURE
 uniform sampler2D specular_color_texture;
 #endif
-#if defined(HAS_ANISOTROPY_TEXTURE) && SHADING == SHADING_ANISOTROPIC
+#if defined(HAS_ANISOTROPY_TEXTURE) && defined(NEEDS_GRAIN)
 uniform sampler2D anisotropy_texture;
 #endif
 
@@ -105,7 +105,7 @@ Surface surface_here(View view) {
     mapped.xy *= m.surface.w;
     s.normal = normalize(mat3(s.tangent, s.bitangent, s.normal) * mapped);
 #endif
-#if SHADING == SHADING_ANISOTROPIC
+#ifdef NEEDS_GRAIN
     s.anisotropy = m.extra.y;
     vec2 grain = vec2(cos(m.extra.z), sin(m.extra.z));
 #ifdef HAS_ANISOTROPY_TEXTURE
@@ -121,6 +121,11 @@ Surface surface_here(View view) {
     if (!gl_FrontFacing) s.normal = -s.normal;
 #endif
 
+#ifdef UNLIT
+    s.lit = 0.0;
+#else
+    s.lit = 1.0;
+#endif
     s.occlusion = 1.0;
 #ifdef HAS_OCCLUSION_TEXTURE
     float open = texture(occlusion_texture, slot_uv(v_material, OCCLUSION_SLOT, UV_SET(OCCLUSION_UV))).r;

@@ -1,0 +1,70 @@
+"""What the nodes share that light a G-buffer in image space."""
+
+from __future__ import annotations
+
+from rendergraph.api import (
+    Albedo,
+    Any,
+    Depth,
+    Emissive,
+    Input,
+    Material,
+    Normal,
+    Occlusion,
+    Port,
+    ShadowLookup,
+    Steps,
+    Visibility,
+    param,
+)  # fmt: skip
+
+from ._lighting import Color, Lighting
+
+
+class ImageLighting(Lighting):
+    """Base of the nodes that light a G-buffer: its textures as one group of inputs, and the shadows.
+
+    What the shading model has no use for is not read, and so not drawn.
+    """
+
+    depth = Input(Depth, group="gbuffer", doc="Window depth; positions come from it and its view.")
+    albedo = Input(Albedo, group="gbuffer", doc="Base colour.")
+    normal = Input(Normal, group="gbuffer", doc="Unit normal for shading.")
+    material = Input(Material, group="gbuffer", doc="Metallic, roughness, occlusion, and 0 for unlit surfaces.")
+    emissive = Input(Emissive, group="gbuffer", doc="Emitted radiance.")
+    specular = Input(Any, group="gbuffer", optional=True, doc="Reflectance of what is not metal; else 4 %.")
+    grain = Input(Any, group="gbuffer", optional=True, doc="Direction and strength of the grain; else none.")
+    phong_diffuse = Input(Any, group="gbuffer", optional=True, doc="kd of the empirical models; else derived.")
+    phong_specular = Input(Any, group="gbuffer", optional=True, doc="ks of the empirical models; else derived.")
+    phong_ambient = Input(Any, group="gbuffer", optional=True, doc="ka of the empirical models; else derived.")
+    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
+    visibility = Input(
+        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
+    )
+    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
+
+    background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance where nothing is, a number or RGB.")
+
+    def surface(self, steps: Steps) -> dict[str, Port]:
+        """What a shader that includes `gbuffer_surface.glsl` reads for this shading model."""
+        ports: list[Port] = [self.depth, self.albedo]
+        if self.shading != "unlit":
+            ports += [self.normal, self.material, self.emissive, self.specular]
+        if self.shading == "anisotropic":
+            ports.append(self.grain)
+        if self.shading in ("phong", "blinn_phong"):
+            ports += [self.phong_diffuse, self.phong_specular, self.phong_ambient]
+            ports.remove(self.specular)
+        return _connected(steps, ports)
+
+    def shadows(self, steps: Steps) -> dict[str, Port]:
+        """What `shadow()` is made of."""
+        return _connected(steps, [self.lookup, self.visibility] if self.wants_lights else [])
+
+    def ambient_light(self, steps: Steps) -> dict[str, Port]:
+        """What scales ambient light."""
+        return _connected(steps, [self.occlusion] if self.terms in ("all", "ambient") else [])
+
+
+def _connected(steps: Steps, ports: list[Port]) -> dict[str, Port]:
+    return {port.name: port for port in ports if steps.connected(port)}

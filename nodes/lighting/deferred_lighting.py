@@ -1,0 +1,24 @@
+"""Lighting of a G-buffer, all lights at once."""
+
+from __future__ import annotations
+
+from rendergraph.api import Output, Radiance, Steps
+
+from ._image_lighting import ImageLighting
+
+
+class DeferredLighting(ImageLighting):
+    """Radiance of a G-buffer's surfaces under all lights of the scene, in one full-screen pass.
+
+    Each pixel is shaded once, whatever the geometry behind it: the cost is that of the geometry plus pixels times
+    lights. The picture is `forward_lighting`'s, but for surfaces with alpha blending, which a G-buffer does not hold.
+    """
+
+    radiance = Output(
+        Radiance, format="rgba16f", doc="Scene-linear radiance; alpha is 1 where a surface is and 0 where nothing is."
+    )
+
+    def record(self, steps: Steps) -> None:
+        """One step, which reads what the shading model and the wanted terms need."""
+        reads = {**self.surface(steps), **self.shadows(steps), **self.ambient_light(steps)}
+        steps.fullscreen("deferred_lighting.frag", out=self.radiance, **reads)

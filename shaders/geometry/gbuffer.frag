@@ -1,0 +1,63 @@
+// The surface under a fragment, as it is kept for later passes; `gbuffer_surface.glsl` reads it back.
+#include <pass_view.glsl>
+#include <textured_surface.glsl>
+
+#ifdef WRITES_ALBEDO
+out vec4 albedo;  // base colour; 1
+#endif
+#ifdef WRITES_NORMAL
+out vec4 normal;  // for shading, world space; 0
+#endif
+#ifdef WRITES_MATERIAL
+out vec4 material;  // metallic, roughness, occlusion; 1 where lights reach, 0 unlit
+#endif
+#ifdef WRITES_EMISSIVE
+out vec4 emissive;
+#endif
+#ifdef WRITES_SPECULAR
+out vec4 specular;  // of what is not metal: root of f0, for 0.04 is then a whole number of 255ths; f90
+#endif
+#ifdef WRITES_GRAIN
+out vec4 grain;  // direction, world space; strength
+#endif
+#ifdef WRITES_PHONG_DIFFUSE
+out vec4 phong_diffuse;
+#endif
+#ifdef WRITES_PHONG_SPECULAR
+out vec4 phong_specular;
+#endif
+#ifdef WRITES_PHONG_AMBIENT
+out vec4 phong_ambient;
+#endif
+
+void main() {
+    Surface s = surface_here(PASS_VIEW);
+#ifdef WRITES_ALBEDO
+    albedo = vec4(s.base_color, 1.0);
+#endif
+#ifdef WRITES_NORMAL
+    normal = vec4(s.normal, 0.0);
+#endif
+#ifdef WRITES_MATERIAL
+    material = vec4(s.metallic, s.roughness, s.occlusion, s.lit);
+#endif
+#ifdef WRITES_EMISSIVE
+    emissive = vec4(s.emissive, 1.0);
+#endif
+#ifdef WRITES_SPECULAR
+    specular = vec4(sqrt(s.dielectric.rgb), s.dielectric.a);
+#endif
+#ifdef WRITES_GRAIN
+    grain = vec4(s.tangent, s.anisotropy);
+#endif
+    empirical_reflectance(s, materials[MATERIAL_INDEX(v_material)]);
+#ifdef WRITES_PHONG_DIFFUSE
+    phong_diffuse = vec4(s.diffuse, 1.0);
+#endif
+#ifdef WRITES_PHONG_SPECULAR
+    phong_specular = vec4(s.f0, 1.0);
+#endif
+#ifdef WRITES_PHONG_AMBIENT
+    phong_ambient = vec4(s.ambient, 1.0);
+#endif
+}
