@@ -6,7 +6,8 @@
 //
 // The offset: a receiver at the angle a to the light's plane is deeper by w tan(a) at the distance w in the map. Moving
 // the point by w sin(a) along its normal lifts it by just that much, so the offset vanishes where light falls straight
-// on. A face turned away from the light is moved away from it, and so lies behind what it belongs to.
+// on. The kernel is a square: along its diagonal it is wider, which the sum of the normal's leans along both sides says.
+// A face turned away from the light is moved away from it, and so lies behind what it belongs to.
 #ifndef MAP_VIEWS
 #define MAP_VIEWS shadow_map_views
 #define MAP_LIGHTS shadow_map_lights
@@ -23,8 +24,9 @@ bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out ve
     vec2 sides = view.viewport.zw / vec2(view.projection[0][0], view.projection[1][1]);
     float texel = 2.0 * w * max(sides.x, sides.y);  // metres across at this distance
     float cosine = dot(normal, to_light);
-    float sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    vec3 moved = position + texel * (normal * (normal_offset * MAP_HALF_WIDTH * sine) + to_light * bias);
+    vec3 lean = abs(mat3(view.view) * (normal - to_light * cosine));
+    float offset = normal_offset * MAP_HALF_WIDTH * (lean.x + lean.y + lean.z);
+    vec3 moved = position + texel * (normal * offset + to_light * bias);
     vec4 clip = view.view_projection * vec4(moved, 1.0);
     place = clip.xyz / clip.w * 0.5 + 0.5;
     place.z = min(place.z, 1.0);

@@ -3,7 +3,11 @@
 // tests come with one gather. One tap is the plain test of one texel.
 uniform sampler2DArrayShadow shadow_map;
 
-#define MAP_HALF_WIDTH (0.5 * float(TAPS) + (TAPS > 1 ? 0.5 : 0.25))
+#if TAPS == 1
+#define MAP_HALF_WIDTH 0.5
+#else
+#define MAP_HALF_WIDTH (0.5 * float(TAPS + 1))
+#endif
 
 #if TAPS == 1
 float map_visibility(int layer, vec3 place) {
