@@ -1,31 +1,27 @@
 // Tone mapping: exposure, a shoulder, then the sRGB transfer function (IEC 61966-2-1).
-// Shoulders: Khronos Group, "PBR Neutral Tone Mapper", 2024; K. Narkowicz, "ACES Filmic Tone Mapping Curve", 2015;
-// E. Reinhard et al., "Photographic Tone Reproduction for Digital Images", 2002.
-uniform sampler2D radiance;  // scene-linear
-uniform float exposure;      // stops
-out vec4 color;              // display-referred
+#include <tone_curves.glsl>
 
-// Takes off what a dielectric's 4 % reflection adds, keeps hues up to 0.8 - 0.04, then compresses the brightest channel
-// and lets the colour fade to white.
-vec3 neutral(vec3 c) {
-    const float start = 0.8 - 0.04;
-    const float fade = 0.15;
-    float least = min(c.r, min(c.g, c.b));
-    c -= least < 0.08 ? least - 6.25 * least * least : 0.04;
-    float peak = max(c.r, max(c.g, c.b));
-    if (peak < start) return c;
-    float room = 1.0 - start;
-    float compressed = 1.0 - room * room / (peak + room - start);
-    return mix(vec3(compressed), c * (compressed / peak), 1.0 / (fade * (peak - compressed) + 1.0));
-}
+uniform sampler2D radiance;  // scene-linear
+#ifdef HAS_GAIN
+uniform sampler2D gain;      // one texel: a factor beside the stops
+#endif
+uniform float exposure;      // stops
+uniform float white;         // luminance after exposure
+out vec4 color;              // display-referred
 
 vec3 shoulder(vec3 c) {
 #if CURVE == CURVE_NEUTRAL
-    return neutral(c);
+    return neutral_curve(c);
 #elif CURVE == CURVE_ACES
-    return c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14);
+    return aces_curve(c);
 #elif CURVE == CURVE_REINHARD
-    return c / (1.0 + c);
+    return reinhard_curve(c);
+#elif CURVE == CURVE_REINHARD_LUMINANCE
+    return reinhard_luminance_curve(c);
+#elif CURVE == CURVE_REINHARD_EXTENDED
+    return reinhard_extended_curve(c, white);
+#elif CURVE == CURVE_HABLE
+    return hable_curve(c);
 #else
     return c;
 #endif
@@ -37,5 +33,8 @@ vec3 srgb(vec3 c) {
 
 void main() {
     vec3 scene = max(texelFetch(radiance, ivec2(gl_FragCoord.xy), 0).rgb, 0.0) * exp2(exposure);
+#ifdef HAS_GAIN
+    scene *= texelFetch(gain, ivec2(0), 0).r;
+#endif
     color = vec4(srgb(clamp(shoulder(min(scene, 1e9)), 0.0, 1.0)), 1.0);
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,28 @@ def aces(c: Floats) -> Floats:
     return np.asarray(c * (2.51 * c + 0.03) / (c * (2.43 * c + 0.59) + 0.14))
 
 
-CURVES: dict[str, Any] = {"neutral": neutral, "aces": aces, "reinhard": lambda c: c / (1 + c), "none": lambda c: c}
+def luminance(c: Floats) -> Floats:
+    return np.asarray((c @ [0.2126, 0.7152, 0.0722])[..., None])
+
+
+def extended(c: Floats, white: float = 4.0) -> Floats:
+    y = luminance(c)
+    return np.asarray(c * (1 + y / white**2) / (1 + y))
+
+
+def hable(c: Floats) -> Floats:
+    """((x(Ax + CB) + DE) / (x(Ax + B) + DF)) - E/F, twice the input, over the same at 11.2."""
+
+    def film(x: Any) -> Any:
+        return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.5) + 0.06) - 0.02 / 0.30
+
+    return np.asarray(film(2 * c) / film(11.2))
+
+
+CURVES: dict[str, Any] = {
+    "neutral": neutral, "aces": aces, "reinhard": lambda c: c / (1 + c), "none": lambda c: c, "hable": hable,
+    "reinhard_luminance": lambda c: c / (1 + luminance(c)), "reinhard_extended": extended,
+}  # fmt: skip
 
 
 def srgb(c: Floats) -> Floats:
@@ -58,3 +80,60 @@ def test_grey_below_the_shoulder_stays_what_it_is() -> None:
     """Neutral keeps a base colour under light that adds the 4 % of a dielectric: c + 0.04 comes out as c."""
     grey = np.linspace(0.05, 0.7, 20)[:, None] * np.ones(3)
     np.testing.assert_allclose(neutral(grey + 0.04), grey, atol=1e-12)
+
+
+# --- with floats, exposed by the picture's own average ----------------------------------------------------------------
+
+EXPOSED = """  eye: {{type: exposure, inputs: {{radiance: picture.radiance}}}}
+  display: {{type: float_tonemap, inputs: {{radiance: picture.radiance, gain: eye.gain}}, params: {{{0}}}}}
+outputs: {{image: display.color}}"""
+PLAIN = """  display: {{type: float_tonemap, inputs: {{radiance: picture.radiance}}, params: {{{0}}}}}
+outputs: {{image: display.color}}"""
+REFERENCE = {
+    "reinhard": "reinhard_channel", "reinhard_luminance": "reinhard_luminance", "aces": "aces_fit", "hable": "hable",
+    "reinhard_extended": "reinhard_extended_luminance", "none": "exposed",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("curve", REFERENCE)
+def test_reference_picture(draw: Callable[..., rg.Frame], reference: dict[str, npt.NDArray[Any]], curve: str) -> None:
+    """Log average, key, curve and transfer function of the reference picture at once, to float32's few digits."""
+    image = draw(reference["picture"], EXPOSED.format(f"curve: {curve}, white: 3"))["image"]
+    expected = srgb(reference[REFERENCE[curve]].astype(np.float64))
+    np.testing.assert_allclose(image[..., :3], expected, atol=5e-6)
+    if curve == "reinhard_luminance":
+        np.testing.assert_allclose(image[..., :3], reference["srgb_of_reinhard_luminance"], atol=5e-6)
+
+
+@pytest.mark.parametrize("curve", CURVES)
+def test_a_brighter_scene_looks_the_same_under_automatic_exposure(draw: Callable[..., rg.Frame], curve: str) -> None:
+    rng = np.random.default_rng(5)
+    picture = np.exp(rng.normal(0, 2, (12, 20, 3))).astype(np.float32)
+    text = EXPOSED.replace("}}}}\n  display", "}}, params: {{delta: 1e-9}}}}\n  display").format(f"curve: {curve}")
+    once, more = (draw(picture * np.float32(factor), text)["image"] for factor in (1, 50))
+    np.testing.assert_allclose(more, once, atol=1e-5)
+
+
+@pytest.mark.parametrize("curve", CURVES)
+def test_more_light_is_never_darker_and_never_past_white(draw: Callable[..., rg.Frame], curve: str) -> None:
+    ramp = np.concatenate([[0], np.geomspace(1e-4, 1e9, 255)]).reshape(1, 256, 1)
+    image = draw(ramp, PLAIN.format(f"curve: {curve}"))["image"][0, :, 0]
+    assert abs(image[0]) < 1e-6
+    assert np.all(np.diff(image) >= -2e-7)
+    assert 0.99 < image[-1] <= 1
+
+
+def test_the_white_point_becomes_white(draw: Callable[..., rg.Frame]) -> None:
+    greys = np.array([0.5, 1.99, 2.0, 9.0]).reshape(1, 4, 1)
+    text = PLAIN.format("curve: reinhard_extended, white: 2")
+    image = draw(greys, text)["image"][0, :, 0]
+    np.testing.assert_allclose(image[2:], 1, atol=1e-6)
+    assert image[1] < 1 - 1e-3
+
+
+def test_gain_multiplies_beside_the_stops(draw: Callable[..., rg.Frame]) -> None:
+    """A grey picture comes out at the key, and one stop more at twice the key."""
+    text = EXPOSED.replace("}}}}\n  display", "}}, params: {{key: 0.2, delta: 1e-9}}}}\n  display")
+    for stops in (0, 1, -3):
+        image = draw(np.full((5, 9, 1), 37.5), text.format(f"curve: none, exposure: {stops}"))["image"]
+        np.testing.assert_allclose(image[..., :3], srgb(np.full((5, 9, 3), 0.2 * 2.0**stops)), rtol=1e-5)

@@ -1,0 +1,16 @@
+"""What this family shares: the semantic of an exposure, and the size of mip chains that begin at half size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rendergraph.api import Facts, Semantic
+
+ExposureGain = Semantic("exposure_gain", "Factor that brings scene radiance to the display's range; one texel.")
+
+
+def half_of_radiance(_node: Any, facts: Facts) -> tuple[int, int]:
+    """Half the size of the input `radiance`, rounded down as levels of a mip chain are; at least one texel."""
+    desc = facts.input("radiance").desc
+    assert desc is not None
+    return desc.mip_size(1)

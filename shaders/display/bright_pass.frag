@@ -1,0 +1,30 @@
+// What is above a luminance, at full size or averaged to half.
+#include <luminance.glsl>
+#include "halving.glsl"
+
+uniform sampler2D radiance;  // scene-linear
+#ifdef HAS_GAIN
+uniform sampler2D gain;      // one texel: the exposure that the threshold is measured after
+#endif
+uniform float threshold;
+out vec4 bright;
+
+vec4 halving_tap(ivec2 texel) {
+    vec4 here = texelFetch(radiance, texel, 0);
+    float exposed = luminance_of(here.rgb);
+#ifdef HAS_GAIN
+    exposed *= texelFetch(gain, ivec2(0), 0).r;
+#endif
+    // Written so that what is not a number goes out, which a blur would spread.
+    float share = exposed > threshold ? 1.0 - threshold / exposed : 0.0;
+    return vec4(share > 0.0 ? min(here.rgb * share, 60000.0) : vec3(0.0), here.a);
+}
+
+void main() {
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+#if HALVE
+    bright = halved(texel, textureSize(radiance, 0));
+#else
+    bright = halving_tap(texel);
+#endif
+}

@@ -1,0 +1,121 @@
+"""Feeding a fixed picture to the nodes that work on radiance."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from rendergraph.nodes.display.bloom import Bloom
+from rendergraph.nodes.display.bright_pass import BrightPass
+from rendergraph.nodes.display.exposure import Exposure
+from rendergraph.nodes.display.gaussian_blur import GaussianBlur
+from rendergraph.nodes.display.tonemap import Tonemap
+
+import rendergraph as rg
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import DisplayColor, Facts, Frame, Internal, Node, Output, Radiance, Steps
+from rendergraph.catalog import Catalog
+from rendergraph.images import read
+from rendergraph.resources import folder
+
+Floats = npt.NDArray[Any]
+Draw = Callable[..., rg.Frame]
+
+
+class Picture(Node):
+    """The test's picture: `given` of the frame's number, shape (height, width, 4), top row first."""
+
+    given: ClassVar[Callable[[int], Floats]]
+    radiance = Output(Radiance, format="rgba32f", doc="The picture.")
+    texels = Internal(AnyTexel, kind="buffer", bytes=lambda node, facts: node.bytes(facts))
+
+    def bytes(self, facts: Facts) -> int:
+        return 16 * facts.viewport[0] * facts.viewport[1]
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("picture.frag", texels=self.texels, out=self.radiance, width=steps.facts.viewport[0])
+
+    def update(self, frame: Frame) -> None:
+        frame.write(self.texels, type(self).given(frame.index)[::-1].astype(np.float32))
+
+
+class FloatTonemap(Tonemap):
+    """The same, written as floats."""
+
+    shader: ClassVar[str | None] = "tonemap.frag"
+    color = Output(DisplayColor, format="rgba32f", doc="Display-referred colour.")
+
+
+SHOW = """layout(std430) readonly buffer texels { vec4 given[]; };
+uniform int width;
+out vec4 radiance;
+void main() { radiance = given[int(gl_FragCoord.y) * width + int(gl_FragCoord.x)]; }
+"""
+NODES = (Picture, FloatTonemap, Tonemap, Exposure, BrightPass, GaussianBlur, Bloom)
+
+
+@pytest.fixture(scope="session")
+def session() -> Iterator[rg.Session]:
+    """A session for this folder; `gl` is a bare context here."""
+    with rg.Session() as made:
+        yield made
+
+
+@pytest.fixture
+def draw(tmp_path: Path, session: rg.Session) -> Draw:
+    """`draw(picture, text)`: the nodes of `text`, which read `picture.radiance`.
+
+    The picture is an array (height, width, 1, 3 or 4 channels; alpha 1 where missing), or a function of the frame.
+    """
+    shutil.copytree(folder("rendergraph.shaders") / "display", tmp_path / "shaders")
+    (tmp_path / "shaders/picture.frag").write_text(SHOW)
+    catalog = Catalog.of(*NODES, shaders=tmp_path / "shaders")
+
+    def run(picture: Floats | Callable[[int], Floats], text: str, **options: Any) -> rg.Frame:
+        moving = picture if callable(picture) else lambda _frame: picture
+        Picture.given = staticmethod(lambda frame: with_alpha(moving(frame)))
+        height, width = with_alpha(moving(1)).shape[:2]
+        (tmp_path / "test.yaml").write_text(
+            f"rendergraph: 1\nsize: [{width}, {height}]\nnodes:\n  picture: {{type: picture}}\n{text}\n"
+        )
+        pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=catalog)
+        frame = session.render(pipeline, **options)
+        with session.device.current():
+            assert session.device.raw.error() is None
+        return frame
+
+    return run
+
+
+def with_alpha(picture: Floats) -> Floats:
+    channels = picture.shape[-1]
+    if channels == 4:
+        return picture
+    color = np.repeat(picture, 3, axis=-1) if channels == 1 else picture
+    return np.concatenate([color, np.ones((*picture.shape[:-1], 1), picture.dtype)], axis=-1)
+
+
+@pytest.fixture(scope="session")
+def reference(shared: Path) -> dict[str, Floats]:
+    """The reference picture as `picture`, and what was computed from it."""
+    folder = shared / "reference/b7_post"
+    return dict(np.load(folder / "image_96x64.npz")) | {"picture": read(folder / "image_96x64.exr")[..., :3]}
+
+
+@pytest.fixture
+def noise() -> Callable[..., Floats]:
+    """`noise(width, height)`: a picture of wide dynamic range with black pixels, shape (height, width, 3)."""
+
+    def make(width: int, height: int, seed: int = 1) -> Floats:
+        rng = np.random.default_rng(seed)
+        picture = np.exp(rng.normal(-1, 2, (height, width, 3)))
+        picture[rng.random((height, width)) < 0.1] = 0
+        return picture.astype(np.float32)
+
+    return make
