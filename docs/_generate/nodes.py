@@ -75,7 +75,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
     return page(
         f"`{found.name}`",
         f"*{found.family}* — {prose(first)}",
-        "\n\n".join(filter(None, pictures)),
+        _row([picture for picture in pictures if picture]),
         prose(rest.strip()),
         f"## In a file\n\n{block(example(node), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
@@ -100,12 +100,16 @@ def _picture(found: NodeType, port: dict[str, Any], studio: Studio) -> str:
     return f"```{{figure}} {Path(file).name}\n:alt: {tap} of {pipeline.name}\n\n{caption}\n```"
 
 
+def _row(pictures: list[str]) -> str:
+    return ":::{container} pictures\n" + "\n\n".join(pictures) + "\n:::" if pictures else ""
+
+
 def _meaning(port: dict[str, Any]) -> str:
     return str(port["semantic"] or f"like {port['like']}")
 
 
 def _input_facts(port: dict[str, Any]) -> str:
-    words = [] if port["kind"] == "texture2d" else [code(port["kind"])]
+    words = [] if port["kind"] in ("texture2d", port["semantic"]) else [code(port["kind"])]
     words += ["optional"] if port["optional"] else []
     words += ["one or a list"] if port.get("many") else []
     words += ["continued"] if port.get("continues") else []

@@ -1,0 +1,117 @@
+"""What travels in the distribution: the four folders, whole, under one import name."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = {  # where it lies: where it is installed, and what of it travels
+    "rendergraph": ("rendergraph", {".py", ".yaml", ".typed"}),
+    "nodes": ("rendergraph/nodes", {".py"}),
+    "shaders": ("rendergraph/shaders", {".py", ".glsl", ".vert", ".geom", ".frag", ".comp"}),
+    "pipelines": ("rendergraph/pipelines", {".py", ".yaml"}),
+}
+
+
+def expected() -> Iterator[str]:
+    for folder, (home, suffixes) in FOLDERS.items():
+        for file in (ROOT / folder).rglob("*"):
+            if file.is_file() and "__pycache__" not in file.parts:
+                assert file.suffix in suffixes or file.name == "py.typed", f"{file}: does it travel?"
+                yield f"{home}/{file.relative_to(ROOT / folder).as_posix()}"
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built wheel; from a copy, so that nothing is left behind in the checkout."""
+    if find_spec("setuptools") is None:
+        pytest.skip("building without network needs setuptools beside the tests")
+    import setuptools
+
+    if int(setuptools.__version__.split(".")[0]) < 77:
+        pytest.skip(f"setuptools {setuptools.__version__} is older than what the build asks for")
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        (source / name).write_bytes((ROOT / name).read_bytes())
+    for folder in FOLDERS:
+        for file in (ROOT / folder).rglob("*"):
+            if file.is_file() and "__pycache__" not in file.parts:
+                copy = source / file.relative_to(ROOT)
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                copy.write_bytes(file.read_bytes())
+    words = ["pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir", str(out), str(source)]
+    done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (built,) = out.glob("*.whl")
+    return built
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_every_file(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+    wanted = set(expected())
+    assert {
+        "rendergraph/py.typed",
+        "rendergraph/nodes/display/tonemap.py",
+        "rendergraph/pipelines/forward.yaml",
+    } <= wanted
+    assert names == wanted
+
+
+@pytest.mark.slow
+def test_the_wheel_draws(wheel: Path, tmp_path: Path) -> None:
+    """Unpacked apart from the checkout, with the libraries of this environment."""
+    site, here = tmp_path / "site", tmp_path / "here"
+    here.mkdir()
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    libraries = PurePosixPath(Path(pytest.__file__).parents[1].as_posix())
+    program = (
+        "import sys, pathlib\n"
+        f"sys.path[:0] = [{str(site)!r}]; sys.path.append({str(libraries)!r})\n"
+        "import rendergraph; from rendergraph.cli import main\n"
+        f"assert pathlib.Path(rendergraph.__file__).is_relative_to({str(site)!r}), rendergraph.__file__\n"
+        "from rendergraph.catalog import Catalog\n"
+        f"assert pathlib.Path(Catalog.discover().get('tonemap').file).is_relative_to({str(site)!r})\n"
+        "sys.exit(main(['run', 'forward-prepass', '--size', '32x18', '-o', 'wheel.png']))\n"
+    )
+    words = [sys.executable, "-I", "-S", "-c", program]
+    done = subprocess.run(words, cwd=here, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (here / "wheel.png").stat().st_size > 100
+
+
+def test_the_standard_nodes_come_by_the_entry_point() -> None:
+    found = {entry.name: entry.value for entry in entry_points(group="rendergraph.nodes")}
+    assert found["builtin"] == "rendergraph.nodes"
+
+
+@pytest.mark.parametrize("folder", ["nodes", "shaders", "pipelines"])
+def test_installed_names_lead_to_the_folders(folder: str) -> None:
+    spec = find_spec(f"rendergraph.{folder}")
+    assert spec is not None
+    assert spec.submodule_search_locations
+    place = Path(next(iter(spec.submodule_search_locations)))
+    assert {file.name for file in place.iterdir()} >= {file.name for file in (ROOT / folder).glob("*/")} - {
+        "__pycache__"
+    }
+
+
+def test_versions_agree() -> None:
+    import tomllib
+
+    import rendergraph
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["version"] == rendergraph.__version__
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert "## Unreleased" in changelog or f"## {rendergraph.__version__}" in changelog
