@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rendergraph.api import (
     Albedo,
-    Any,
     Depth,
     Emissive,
     Input,
@@ -17,6 +18,7 @@ from rendergraph.api import (
     Visibility,
     param,
 )  # fmt: skip
+from rendergraph.api import Any as AnyTexel
 
 from ._lighting import Color, Lighting
 
@@ -32,11 +34,11 @@ class ImageLighting(Lighting):
     normal = Input(Normal, group="gbuffer", doc="Unit normal for shading.")
     material = Input(Material, group="gbuffer", doc="Metallic, roughness, occlusion, and 0 for unlit surfaces.")
     emissive = Input(Emissive, group="gbuffer", doc="Emitted radiance.")
-    specular = Input(Any, group="gbuffer", optional=True, doc="Reflectance of what is not metal; else 4 %.")
-    grain = Input(Any, group="gbuffer", optional=True, doc="Direction and strength of the grain; else none.")
-    phong_diffuse = Input(Any, group="gbuffer", optional=True, doc="kd of the empirical models; else derived.")
-    phong_specular = Input(Any, group="gbuffer", optional=True, doc="ks of the empirical models; else derived.")
-    phong_ambient = Input(Any, group="gbuffer", optional=True, doc="ka of the empirical models; else derived.")
+    specular = Input(AnyTexel, group="gbuffer", optional=True, doc="Reflectance of what is not metal; else 4 %.")
+    grain = Input(AnyTexel, group="gbuffer", optional=True, doc="Direction and strength of the grain; else none.")
+    phong_diffuse = Input(AnyTexel, group="gbuffer", optional=True, doc="kd of the empirical models; else derived.")
+    phong_specular = Input(AnyTexel, group="gbuffer", optional=True, doc="ks of the empirical models; else derived.")
+    phong_ambient = Input(AnyTexel, group="gbuffer", optional=True, doc="ka of the empirical models; else derived.")
     lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
     visibility = Input(
         Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
@@ -45,7 +47,7 @@ class ImageLighting(Lighting):
 
     background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance where nothing is, a number or RGB.")
 
-    def surface(self, steps: Steps) -> dict[str, Port]:
+    def surface(self, steps: Steps) -> dict[str, Any]:
         """What a shader that includes `gbuffer_surface.glsl` reads for this shading model."""
         ports: list[Port] = [self.depth, self.albedo]
         if self.shading != "unlit":
@@ -57,14 +59,14 @@ class ImageLighting(Lighting):
             ports.remove(self.specular)
         return _connected(steps, ports)
 
-    def shadows(self, steps: Steps) -> dict[str, Port]:
+    def shadows(self, steps: Steps) -> dict[str, Any]:
         """What `shadow()` is made of."""
         return _connected(steps, [self.lookup, self.visibility] if self.wants_lights else [])
 
-    def ambient_light(self, steps: Steps) -> dict[str, Port]:
+    def ambient_light(self, steps: Steps) -> dict[str, Any]:
         """What scales ambient light."""
         return _connected(steps, [self.occlusion] if self.terms in ("all", "ambient") else [])
 
 
-def _connected(steps: Steps, ports: list[Port]) -> dict[str, Port]:
+def _connected(steps: Steps, ports: list[Port]) -> dict[str, Any]:
     return {port.name: port for port in ports if steps.connected(port)}

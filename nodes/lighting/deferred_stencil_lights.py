@@ -1,0 +1,58 @@
+"""Lighting of a G-buffer, local lights only where they reach."""
+
+from __future__ import annotations
+
+from rendergraph.api import ADD, Depth, Internal, Output, Radiance, State, Stencil, StencilFace, Steps
+
+from ._image_lighting import ImageLighting
+
+_SEGMENTS, _RINGS = 12, 8
+_VERTICES = _SEGMENTS * _RINGS * 6
+
+
+class DeferredStencilLights(ImageLighting):
+    """Radiance of a G-buffer's surfaces, each point and spot light computed only on the pixels within its volume.
+
+    The volume is a sphere around a point light and a sector of one around a spot light, as far as the light's range;
+    without a range, as far as the picture reaches. Its faces behind the surface count up and down in the stencil, so
+    that what is left marks the surface inside it, wherever the eye is (z-fail, Bilodeau and Songy 1999); then its back
+    faces are drawn where that is not zero, and wipe it for the next light. Directional and ambient light take one pass
+    over the whole picture. The cost is V + sum of F': `deferred_lighting` draws the same picture for V + L F.
+    """
+
+    radiance = Output(
+        Radiance, format="rgba32f",
+        doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
+    )  # fmt: skip
+    marks = Internal(Depth, format="depth32f_stencil8", clear=1.0)
+
+    def record(self, steps: Steps) -> None:
+        """A pass for all that has no volume, then two draws a local light."""
+        surface, shadows = self.surface(steps), self.shadows(steps)
+        reads = {**surface, **shadows, **self.ambient_light(steps)}
+        steps.fullscreen("deferred_lighting.frag", out=self.radiance, defines={"DIRECTIONALS_ONLY": 1}, **reads)
+        local = [number for number, light in enumerate(steps.lights) if light.type != "directional"]
+        if not local or not self.wants_lights:
+            return
+        # The stencil needs a depth of its own: a texture must not be attached and sampled at once.
+        copied = State(depth_test=True, depth_func="always")
+        steps.fullscreen("copy_depth.frag", out=self.marks, state=copied, depth=self.depth)
+        marking = State(
+            cull="none", depth_write=False, depth_clamp=True,
+            stencil=Stencil(StencilFace(depth_fail="decr_wrap"), StencilFace(depth_fail="incr_wrap")),
+        )  # fmt: skip
+        marked = StencilFace(func="notequal", depth_pass="zero")
+        lighting = State(
+            cull="front", depth_test=False, depth_write=False, depth_clamp=True, blend=ADD, stencil=Stencil(marked)
+        )
+        shape = {"SEGMENTS": _SEGMENTS, "RINGS": _RINGS}
+        for light in local:
+            steps.draw(
+                None, vertex="light_volume.vert", vertices=_VERTICES, out=self.marks, state=marking, defines=shape,
+                light=light, depth=self.depth,
+            )  # fmt: skip
+            steps.draw(
+                "deferred_stencil_lights.frag", vertex="light_volume.vert", vertices=_VERTICES,
+                out={"radiance": self.radiance, "marks": self.marks}, state=lighting, defines=shape, light=light,
+                **surface, **shadows,
+            )  # fmt: skip
