@@ -68,7 +68,7 @@ def declaration_mistakes(cls: type[Node]) -> list[str]:
         for rule in ("needs", "reads"):
             mistakes += [
                 f"port '{name}' {rule} '{target}', which is no port"
-                for target in getattr(port, rule, ())
+                for target in getattr(port, "read_names" if rule == "reads" else rule, ())
                 if target not in ports
             ]
     for name, info in cls.parameters().items():

@@ -196,15 +196,21 @@ class Function(Port):
     Attributes:
         signature: the function it provides.
         shader: the file with the function's text, beside the node's shaders.
-        reads: names of the inputs and internals its text samples.
+        reads: the inputs and internals its text samples: names, or `port.sampled(…)`. An input that is not connected
+            and an internal that the node has not written are left out, and the text goes without `HAS_<NAME>`.
         doc: one line.
     """
 
     signature: Signature
     shader: str
-    reads: tuple[str, ...] = ()
+    reads: tuple[str | Part, ...] = ()
     needs: tuple[str, ...] = ()
     doc: str = ""
+
+    @property
+    def read_names(self) -> tuple[str, ...]:
+        """The names of the ports in `reads`."""
+        return tuple(read.port.name if isinstance(read, Part) else read for read in self.reads)
 
 
 PORT_TYPES = (Port, Input, Made, Output, InOut, Internal, History, Views, Function)

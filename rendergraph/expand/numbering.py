@@ -277,13 +277,15 @@ class Numbering:
         node = recorder.node
         reads = []
         ports = node.node.ports()
-        for name in port.reads:
+        for name, read in zip(port.read_names, port.reads, strict=True):
             source = ports[name]
             if isinstance(source, Input) and not recorder.links.get(name):
                 continue
             if not isinstance(source, Input) and is_empty(self.graph.textures.get(Endpoint(node.id, name))):
                 continue
-            reads += self._reads(recorder, name, Part(source))
+            if isinstance(source, Internal) and not self.written[self._own(recorder, source)]:
+                continue
+            reads += self._reads(recorder, name, read if isinstance(read, Part) else Part(source))
         present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
         return [
             FunctionBinding(

@@ -75,7 +75,7 @@ class Recorder:
         for request in self.requests:
             for _, target in self.reads_of(request):
                 port = target.port if isinstance(target, Part) else target
-                names |= {port.name, *(port.reads if isinstance(port, Function) else ())}
+                names |= {port.name, *(port.read_names if isinstance(port, Function) else ())}
             names |= {part.port.name for _, part in request.out if isinstance(part.port, InOut)}
             view = request.options.get("view")
             names |= {view.name} if isinstance(view, Input) else set()
@@ -84,7 +84,7 @@ class Recorder:
         for name in self.used_ports:
             used = ports.get(name)
             if isinstance(used, Function):
-                names.update(used.reads)
+                names.update(used.read_names)
         for name in names:
             yield from self.links.get(name, ())
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
 from rendergraph.api import (
     Depth,
@@ -22,6 +23,7 @@ from rendergraph.api import (
     ViewMatrices,
     Views,
     Visibility,
+    define,
     param,
 )
 
@@ -193,3 +195,45 @@ cameras: {main: {eye: [0, 0, 2], target: [0, 0, 0], fov_y_degrees: 90, near: 0.1
     expected = np.stack([x * 4, -y * 4, np.full_like(x, -2.0), np.ones_like(x)], axis=-1)  # front face, 4 m away
     np.testing.assert_allclose(frame["image"], expected, atol=2e-4)
     assert frame["d"].shape == (16, 16, 1)
+
+
+class Ramp(Node):
+    """A shadow that is read between two texels; a second texture is made only where it is asked for."""
+
+    two = Internal(format="r32f", size=(2, 1))
+    extra = Internal(format="r32f", size=(1, 1))
+    lookup = Function(ShadowLookup, "ramp.glsl", reads=(two.sampled("linear"), "extra"), doc="Between 0 and 1.")
+    more: bool = define(default=False, doc="Whether there is a second factor.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("two.frag", out=self.two)
+        if self.more:
+            steps.fullscreen("two.frag", out=self.extra)
+
+
+RAMP = {
+    "ramp.glsl": """uniform sampler2D two;
+        #ifdef HAS_EXTRA
+        uniform sampler2D extra;
+        #endif
+        float shadow(int light, vec3 position, vec3 normal) {
+            float value = texture(two, vec2(0.375, 0.5)).r;
+        #ifdef HAS_EXTRA
+            value += 1.0 + texelFetch(extra, ivec2(0), 0).r;
+        #endif
+            return value;
+        }""",
+    "two.frag": "out float two; void main() { two = floor(gl_FragCoord.x); }",
+}
+
+
+@pytest.mark.parametrize(("more", "value"), [(False, 0.25), (True, 1.25)])
+def test_a_function_reads_internals_with_samplers_and_as_far_as_they_are_written(
+    draw: Draw, more: bool, value: float
+) -> None:
+    text = f"""nodes:
+  r: {{type: ramp, params: {{more: {str(more).lower()}}}}}
+  l: {{type: lit, inputs: {{lookup: r.lookup}}}}
+outputs: {{image: l.color}}"""
+    frame = draw(text, Lit, Ramp, shaders=SHADERS | RAMP, scene=LIGHTS)
+    np.testing.assert_allclose(frame["image"][0, 0], value, atol=1 / 256)
