@@ -153,10 +153,10 @@ BOMBS = {
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_refused_at_once(name: str) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(InputError, match="RG0") as caught:
         parse(BOMBS[name], "bomb.yaml")
-    assert time.perf_counter() - start < 5.0  # a second where nothing else runs
+    assert time.process_time() - start < 20  # an attack takes minutes; a slow machine does not
     assert len(caught.value.problems) <= 100
     assert len(str(caught.value)) < 100_000
 

@@ -467,10 +467,10 @@ def sample(folder: Path, name: str) -> bytes:
 
 
 def refused(path: Path, capfd: pytest.CaptureFixture[str]) -> str:
-    started = time.monotonic()
+    started = time.process_time()
     with pytest.raises(InputError, match=r"RG35[1234] ") as caught:
         decode(ImageSource(path), srgb=False)
-    assert time.monotonic() - started < 2
+    assert time.process_time() - started < 20  # an attack takes minutes; a slow machine does not
     assert capfd.readouterr().err == ""  # libpng's own words would stand beside ours
     assert len(caught.value.problems) == 1
     return str(caught.value)
@@ -497,10 +497,10 @@ def test_damaged_files_never_crash(tmp_path: Path, name: str, capfd: pytest.Capt
         for position in rng.integers(4, len(data), 6):
             damaged[position] = rng.integers(0, 256)
         (tmp_path / f"bad{name[1:]}").write_bytes(damaged)
-        started = time.monotonic()
+        started = time.process_time()
         with contextlib.suppress(InputError):
             decode(ImageSource(tmp_path / f"bad{name[1:]}"), srgb=False)
-        assert time.monotonic() - started < 2
+        assert time.process_time() - started < 20  # an attack takes minutes; a slow machine does not
     assert capfd.readouterr().err == ""
 
 

@@ -391,10 +391,10 @@ HOSTILE = {
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_files_are_answered_soon(toy_catalog: Catalog, name: str) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     said = problems(HOSTILE[name], toy_catalog) if name != "long chain" else []
     graph = linked(HOSTILE[name], toy_catalog) if name == "long chain" else None
-    assert time.perf_counter() - start < 20.0  # a second or two where nothing else runs
+    assert time.process_time() - start < 20  # an attack takes minutes; a slow machine does not
     assert len(said) <= 200
     assert all(len(text) < 500 for text in said)
     assert graph is None or len(graph.nodes) == 5001

@@ -123,10 +123,11 @@ def test_the_selection_reaches_load(cli: Any, monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(rendergraph, "load", load, raising=False)
     words = "run x --scene s.glb --camera c --environment e.hdr --size 4x5 -s a.b=1 -s c=2 -p p.yaml --asset-root r"
-    assert cli(*words.split(), "--plugin", "n").code == 3
+    assert cli(*words.split(), "--plugin", "n", "--limit", "yaml-depth=9").code == 3
     assert seen == {
         "source": "x", "scene": "s.glb", "camera": "c", "environment": "e.hdr", "size": (4, 5),
         "sets": ["a.b=1", "c=2"], "patches": [Path("p.yaml")], "asset_roots": [Path("r")], "plugins": [Path("n")],
+        "limits": {"yaml-depth": 9},
     }  # fmt: skip
 
 

@@ -30,7 +30,7 @@ CALM = settings(
 
 def survives(path: Path) -> None:
     """Load, complete and pack; nothing but InputError may come out, and not late."""
-    start = time.perf_counter()
+    start = time.process_time()
     problems: tuple[Problem, ...] | None = None
     try:
         scene = animate.complete(load(path))
@@ -40,7 +40,7 @@ def survives(path: Path) -> None:
         problems = error.problems
     assert problems != ()
     assert all("\n" not in problem.text for problem in problems or ())
-    assert time.perf_counter() - start < 5, "2 s, and room for a busy machine"
+    assert time.process_time() - start < 20  # an attack takes minutes; a slow machine does not
 
 
 WORDS = st.sampled_from(
