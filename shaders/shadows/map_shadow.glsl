@@ -6,8 +6,8 @@
 //
 // The offset: a receiver at the angle a to the light's plane is deeper by w tan(a) at the distance w in the map. Moving
 // the point by w sin(a) along its normal lifts it by just that much, so the offset vanishes where light falls straight
-// on. The kernel is a square: along its diagonal it is wider, which the sum of the normal's leans along both sides says.
-// A face turned away from the light is moved away from it, and so lies behind what it belongs to.
+// on. The kernel is a square and wider along its diagonal, which the sum of the normal's leans along both sides says. A
+// face turned away from the light is moved away from it, and so lies behind what it belongs to.
 #ifndef MAP_VIEWS
 #define MAP_VIEWS shadow_map_views
 #define MAP_LIGHTS shadow_map_lights
