@@ -46,7 +46,6 @@ def _index(families: dict[str, list[NodeType]]) -> str:
 
 def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio) -> str:
     node = described[found.name]
-    pictures = [_picture(found, port, studio) for port in node["outputs"]]
     first, _, rest = node["doc"].partition("\n")
     inputs = table(
         ("input", "takes", "", "", "made by"),
@@ -75,8 +74,8 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
     return page(
         f"`{found.name}`",
         f"*{found.family}* — {prose(first)}",
-        _row([picture for picture in pictures if picture]),
         prose(rest.strip()),
+        _pictures(found, node["outputs"], studio),
         f"## In a file\n\n{block(example(node), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
         f"## Outputs\n\n{outputs}",
@@ -86,22 +85,22 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
     )
 
 
-def _picture(found: NodeType, port: dict[str, Any], studio: Studio) -> str:
-    if port["kind"] in ("view", "function", "buffer", "scene"):
+def _pictures(found: NodeType, outputs: list[dict[str, Any]], studio: Studio) -> str:
+    """What the outputs hold, each in the first shipped pipeline that can show it."""
+    figures, names = [], []
+    for port in outputs:
+        example_of = None if port["kind"] in ("view", "function", "buffer", "scene") else uses(found, port["name"])
+        if example_of is None:
+            continue
+        pipeline, tap = example_of
+        file = studio.draw(pipeline, f"nodes/{found.name}-{port['name']}.png", tap)
+        if file:
+            figures.append(f"```{{figure}} {Path(file).name}\n:alt: {tap} of {pipeline.name}\n\n`{tap}`\n```")
+            names.append(f"`{pipeline.name}`")
+    if not figures:
         return ""
-    example_of = uses(found, port["name"])
-    if example_of is None:
-        return ""
-    pipeline, tap = example_of
-    file = studio.draw(pipeline, f"nodes/{found.name}-{port['name']}.png", tap)
-    if file is None:
-        return ""
-    caption = f"`{tap}` of `{pipeline.name}`, scene `shadow_study`"
-    return f"```{{figure}} {Path(file).name}\n:alt: {tap} of {pipeline.name}\n\n{caption}\n```"
-
-
-def _row(pictures: list[str]) -> str:
-    return ":::{container} pictures\n" + "\n\n".join(pictures) + "\n:::" if pictures else ""
+    where = " and ".join(dict.fromkeys(names))
+    return ":::{container} pictures\n" + "\n\n".join(figures) + f"\n:::\n\nAs {where} makes it of `shadow_study`."
 
 
 def _meaning(port: dict[str, Any]) -> str:

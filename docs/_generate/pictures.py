@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 import rendergraph as rg
 from rendergraph.errors import DeviceError, InputError
@@ -46,7 +49,7 @@ class Studio:
             tap: a port, `node.port`.
 
         Returns:
-            The path, None where there is no picture.
+            The path, None where there is no picture, or nothing to see in it.
         """
         if self._session is None or self._folder is None:
             return None
@@ -54,6 +57,8 @@ class Studio:
         frame = self._session.render(
             pipeline.with_size(SIZE), outputs=[] if tap else ["image"], taps=[tap] if tap else [], warm_up=False
         )
+        if np.ptp(frame[name]) == 0:
+            return None
         path = self._folder / file
         path.parent.mkdir(parents=True, exist_ok=True)
         frame.save(path, name)
@@ -70,12 +75,18 @@ def shipped(scenes: bool = False) -> list[Path]:
     return sorted(files, key=lambda file: "\nextends:" in file.read_text(encoding="utf-8"))
 
 
+@cache
+def _studies() -> list[rg.Pipeline]:
+    """Every shipped pipeline with a scene that shows something, the smallest first."""
+    pipelines = [rg.load(file.stem).with_scene("shadow_study") for file in shipped()]
+    return sorted(pipelines, key=lambda pipeline: len(pipeline.graph.nodes))
+
+
 def uses(found: NodeType, port: str) -> tuple[rg.Pipeline, str] | None:
-    """The first shipped pipeline that can show a port of a node type, and where the port is in it."""
-    for file in shipped():
-        pipeline = rg.load(file.stem).with_scene("shadow_study")
+    """The smallest shipped pipeline that can show a port of a node type, and where the port is in it."""
+    needs = getattr(found.cls.outputs()[port], "needs", ())
+    for pipeline in _studies():
         for node in pipeline.graph.nodes:
-            needs = getattr(found.cls.outputs()[port], "needs", ())
             if node.type.name != found.name or not all(name in node.inputs for name in needs):
                 continue
             tap = f"{node.id}.{port}"
