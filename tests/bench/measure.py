@@ -130,7 +130,7 @@ def frame_loop(session: Any, pipeline: Any) -> Draw:
 
     def draw(frames: int) -> None:
         nonlocal number
-        with session.device.ctx:
+        with session.device.current():
             for _ in range(frames):
                 number += 1
                 runner.run(number, number / 30, 1 / 30, scene, camera)

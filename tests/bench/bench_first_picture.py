@@ -1,0 +1,128 @@
+"""From the start of the process to the first PNG: `python tests/bench/bench_first_picture.py`.
+
+One sphere at 640×360 with a shadow map, by `rendergraph run`, by the Python API, and by a hand-written program that
+imports moderngl and NumPy and writes its PNG itself. Goal: at most 0.3 s more. Driver caches are warm.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from measure import options
+
+SIZE = (640, 360)
+GOAL_S = 0.3
+SCENE = """\
+scene: 1
+objects:
+  ball: {shape: sphere, radius: 1, material: paint}
+materials:
+  paint: {base_color: [0.8, 0.3, 0.2], roughness: 0.5}
+lights:
+  sun: {type: directional, direction: [-1, -2, -1], intensity: 3}
+cameras:
+  main: {eye: [0, 1, 3], target: [0, 0, 0], fov_y_degrees: 45, near: 0.1, far: 10}
+"""
+API = """\
+import sys
+import rendergraph as rg
+rg.load("forward", scene=sys.argv[1], size=(640, 360)).render(outputs=["image"]).save(sys.argv[2])
+"""
+
+
+def by_hand(output: str) -> None:
+    """The hand-written program; run in a process of its own."""
+    import numpy as np
+    from forward_by_hand import Forward, look_at, perspective, sphere
+    from png import write_png
+
+    eye, to_light = (0.0, 1.0, 3.0), np.array([1.0, 2.0, 1.0]) / 6**0.5
+    camera = perspective(np.radians(45), SIZE[0] / SIZE[1], 0.1, 10.0) @ look_at(eye, (0, 0, 0))
+    program = Forward(
+        SIZE, sphere(64, 32), np.eye(4)[None], np.array([[0.8, 0.3, 0.2]]), np.array([[0.0, 0.5]]), camera, eye, to_light,
+        3.0, 2048, ((0, 0, 0), 1.1),
+    )  # fmt: skip
+    program.frames(1)
+    write_png(Path(output), np.ascontiguousarray(program.picture()[..., :3]))
+
+
+def commands(scene: Path, folder: Path) -> dict[str, list[str]]:
+    """What is run, by name; each writes a PNG of its name."""
+    python = sys.executable
+    size = f"{SIZE[0]}x{SIZE[1]}"
+    run = [python, "-m", "rendergraph.cli", "run", "forward", "--scene", str(scene), "--size", size]
+    return {
+        "by hand": [python, str(Path(__file__)), "--by-hand", str(folder / "by hand.png")],
+        "rendergraph run": [*run, "-o", str(folder / "rendergraph run.png")],
+        "Python API": [python, "-c", API, str(scene), str(folder / "Python API.png")],
+    }
+
+
+def timed(command: list[str]) -> tuple[float, float]:
+    """Seconds of wall and of CPU time of a process."""
+    wall, before = time.perf_counter(), os.times()
+    done = subprocess.run(command, capture_output=True, text=True)
+    after = os.times()
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    cpu = after.children_user + after.children_system - before.children_user - before.children_system
+    return time.perf_counter() - wall, cpu
+
+
+def check(folder: Path) -> None:
+    """The three PNGs show the same sphere."""
+    import OpenImageIO as oiio
+    from measure import check_pictures
+
+    pictures = {path.stem: oiio.ImageBuf(str(path)).get_pixels(oiio.UINT8)[..., :3] for path in folder.glob("*.png")}
+    for name in ("rendergraph run", "Python API"):
+        check_pictures(name, pictures[name], pictures["by hand"], bound=6, share=0.02)
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["--by-hand"]:
+        by_hand(sys.argv[2])
+        return
+    chosen = options(__doc__, runs=9)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(chosen.save or temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        scene = Path(temporary) / "ball.yaml"
+        scene.write_text(SCENE)
+        todo = commands(scene, folder)
+        taken: dict[str, list[tuple[float, float]]] = {name: [] for name in todo}
+        for command in todo.values():
+            timed(command)
+        check(folder)
+        for _ in range(chosen.runs):
+            for name, command in todo.items():
+                taken[name].append(timed(command))
+    rows = {}
+    for name, times in taken.items():
+        more = [a[0] - b[0] for a, b in zip(times, taken["by hand"], strict=True)]
+        rows[name] = {
+            "wall_s": statistics.median(wall for wall, _ in times), "cpu_s": statistics.median(cpu for _, cpu in times),
+            "more_wall_s": statistics.median(more), "more_wall_range_s": [min(more), max(more)],
+            "more_cpu_s": statistics.median(a[1] - b[1] for a, b in zip(times, taken["by hand"], strict=True)),
+        }  # fmt: skip
+    if chosen.json:
+        print(json.dumps({"goal_more_s": GOAL_S, "programs": rows}, indent=1))
+        return
+    print(f"{'':16}  wall s   CPU s   more wall (range)         more CPU   goal: <= {GOAL_S} s more")
+    for name, row in rows.items():
+        low, high = row["more_wall_range_s"]
+        print(
+            f"{name:16} {row['wall_s']:7.3f} {row['cpu_s']:7.3f}   {row['more_wall_s']:6.3f} ({low:.3f} to {high:.3f})"
+            f"   {row['more_cpu_s']:8.3f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
