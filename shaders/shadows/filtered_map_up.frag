@@ -1,0 +1,21 @@
+// The second axis of the filter over what a technique keeps of a shadow map: averages along columns.
+uniform sampler2D rows;
+uniform sampler2D covered_rows;
+uniform int radius;  // texels
+out vec4 filtered;
+out float covered;
+
+void main() {
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    int last = textureSize(rows, 0).y - 1;
+    filtered = vec4(0.0);
+    covered = 0.0;
+    for (int i = -radius; i <= radius; ++i) {
+        ivec2 other = ivec2(texel.x, clamp(texel.y + i, 0, last));
+        filtered += texelFetch(rows, other, 0);
+        covered += texelFetch(covered_rows, other, 0).r;
+    }
+    float taps = float(2 * radius + 1);
+    filtered /= taps;
+    covered /= taps;
+}
