@@ -74,9 +74,11 @@ def _made(name: str, port: Any) -> dict[str, Any]:
     semantic = port.semantic.name if port.semantic else None
     found = {"name": name, "kind": port.kind, "semantic": semantic, "like": port.like, "doc": port.doc}
     if port.like is None and port.kind != "buffer":
-        found |= {"format": _constant(port.format), "size": _size(port.size)}
+        found |= {"format": _constant(port.format or "rgba16f"), "size": _size(1.0 if port.size is None else port.size)}
         found |= {
-            key: _constant(getattr(port, key)) for key in ("mips", "layers", "samples") if getattr(port, key) != 1
+            key: _constant(getattr(port, key))
+            for key in ("mips", "layers", "samples")
+            if getattr(port, key) not in (None, 1)
         }
     if getattr(port, "needs", ()):
         found["needs"] = list(port.needs)

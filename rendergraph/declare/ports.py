@@ -103,12 +103,13 @@ class Made(Port):
 
     Attributes:
         semantic: what it means; None with `like`.
-        like: name of an input whose format, size, semantic, view and lights it takes over.
+        like: name of an input whose format, size, layers, semantic, view and lights it takes over, each where nothing
+            else is said.
         kind: kind of texture, or `buffer`.
-        format: a name in `textures.FORMATS`.
+        format: a name in `textures.FORMATS`; `rgba16f` by default.
         size: see `SizeRule`; the viewport by default.
         mips: levels; 0 means the full chain.
-        layers: array layers; a cube always has 6.
+        layers: array layers, 1 by default; a cube always has 6.
         samples: samples per texel.
         bytes: size of a `buffer`.
         clear: what it first holds; None discards, which is right where every texel is written.
@@ -122,10 +123,10 @@ class Made(Port):
     semantic: Semantic | None = None
     like: str | None = None
     kind: Kind = "texture2d"
-    format: Ruled[str] = "rgba16f"
-    size: SizeRule = 1.0
+    format: Ruled[str] | None = None
+    size: SizeRule | None = None
     mips: Ruled[int] = 1
-    layers: Ruled[int] = 1
+    layers: Ruled[int] | None = None
     samples: Ruled[int] = 1
     bytes: Ruled[int] = 0
     clear: float | tuple[float, ...] | Callable[[Any], float | tuple[float, ...]] | None = None

@@ -48,6 +48,7 @@ from rendergraph.textures import (
 
 CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
+DEFAULT_FORMAT = "rgba16f"
 _SAMPLES = (1, 2, 4, 8, 16)
 
 
@@ -213,16 +214,14 @@ class Infer:
         size = self._size(end, port, like)
         if size is None:
             return None
-        name = self._ruled(end, "format", port.format)
-        if like is not None and name == "rgba16f" and not callable(port.format):
-            name = like.format  # the declaration's default: it says nothing of its own
+        name = self._ruled(end, "format", port.format) or (like.format if like is not None else DEFAULT_FORMAT)
         if name not in FORMATS:
             self._say(end, "RG211", f"there is no format '{name}'")
             return None
         kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
         layers = self._ruled(end, "layers", port.layers)
-        if like is not None and layers == 1:
-            layers = like.layers
+        if layers is None:
+            layers = like.layers if like is not None else 1
         layers = 6 if kind == "texture_cube" else layers
         full = full_mip_count(*size)
         mips = self._ruled(end, "mips", port.mips) or full
@@ -239,7 +238,7 @@ class Infer:
         return None
 
     def _size(self, end: Endpoint, port: Made, like: TextureDesc | None) -> tuple[int, int] | None:
-        rule: Any = port.size
+        rule: Any = 1.0 if port.size is None else port.size
         bound = self.nodes[end.node]
         factor, base = 1.0, self.viewport
         if callable(rule):
@@ -257,7 +256,7 @@ class Infer:
             base = rule
         else:
             factor = float(rule)
-            base = like.size if like is not None and factor == 1.0 else base
+            base = like.size if like is not None and port.size is None else base
         width, height = (max(1, math.ceil(side * factor - 1e-9)) if factor != 1.0 else side for side in base)
         if min(width, height) < 1 or max(width, height) > MOST_SIDE:
             self._say(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")

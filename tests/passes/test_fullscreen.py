@@ -218,3 +218,26 @@ def test_a_tap_in_the_middle_of_a_chain_shows_its_own_version(draw: Draw) -> Non
 outputs: {image: c.color}"""
     frame = draw(text, Accumulate, shaders=CONSTANT, taps=["a.color", "b.color"], poison=True)
     assert [float(frame[name].mean()) for name in ("a.color", "b.color", "image")] == [3, 7, 12]
+
+
+def test_what_is_said_beside_like_wins(bench: Any) -> None:
+    class Half(Node):
+        """The same at half size in a format of its own, though that is the default one."""
+
+        source = Input(AnyTexel, size="any", doc="What to halve.")
+        same = Output(like="source", doc="As the source.")
+        own = Output(like="source", format="rgba16f", size=1.0, doc="As the picture.")
+
+        def record(self, steps: Steps) -> None:
+            steps.fullscreen("own.frag")
+
+    class Small(Node):
+        """A small texture."""
+
+        color = Output(Radiance, format="rgba32f", size=(4, 2), doc="Small.")
+
+    text = "nodes: {a: {type: small}, b: {type: half, inputs: {source: a.color}}}\noutputs: {image: b.same, o: b.own}"
+    graph = bench.pipeline(text, Small, Half).graph
+    described = {end.port: info.desc for end, info in graph.textures.items() if end.node == "b"}
+    assert (described["same"].format, described["same"].size) == ("rgba32f", (4, 2))
+    assert (described["own"].format, described["own"].size) == ("rgba16f", (16, 8))
