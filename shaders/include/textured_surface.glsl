@@ -53,7 +53,8 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
     tangent = u_plane * uv_across.x + v_plane * uv_up.x;
     bitangent = -(u_plane * uv_across.y + v_plane * uv_up.y);
     float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
-    if (longest < 1e-30) {  // no texture coordinates: any frame will do
+    float shortest = min(dot(tangent, tangent), dot(bitangent, bitangent));
+    if (shortest < max(1e-30, 1e-12 * longest)) {  // no texture coordinates, or all on a line: any frame will do
         tangent = normalize(cross(normal, abs(normal.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
         bitangent = cross(normal, tangent);
     } else {
