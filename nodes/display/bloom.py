@@ -23,9 +23,10 @@ from ._exposure import ExposureGain, half_of_radiance
 class Bloom(Node):
     """Add a soft glow around everything brighter than a threshold, as lenses and eyes scatter it.
 
-    Bright-pass, half size, Gaussian blur; then half of that again, blurred again, `levels` times (the pyramid of Kawase
-    2003). The mean of the levels is added to the radiance before tone mapping, so a glow keeps its hue and its shoulder
-    is the curve's. Away from the border the added light is `intensity` times what the bright-pass left.
+    Bright-pass, half size, separable Gaussian (James and O'Rorke 2004); then half of that again and blurred again,
+    `levels` times, so that small kernels reach far. The mean of the levels is added to the radiance before tone mapping:
+    a glow keeps its hue and goes through the curve. Away from the border the added light is `intensity` times what the
+    bright-pass left.
     """
 
     radiance = InOut(Radiance, doc="Scene-linear radiance; the glow is added to it, alpha stays.")
