@@ -18,7 +18,8 @@ from rendergraph.cli.words import click
 from rendergraph.errors import Problem, RendergraphError, suggestion
 
 VERBS = (
-    "run", "check", "plan", "graph", "config", "diff", "bench", "nodes", "explain", "schema", "doctor",
+    "run", "check", "plan", "graph", "config", "diff", "compare", "sweep", "bench", "nodes", "explain", "schema",
+    "doctor",
 )  # fmt: skip
 """In the order of `--help`; verb `x` is the function `command` in `rendergraph.cli.x`."""
 

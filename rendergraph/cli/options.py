@@ -185,6 +185,18 @@ def make(
     )  # fmt: skip
 
 
+def words(**selection: Any) -> list[str]:
+    """What was typed for `selection_options`, so that a report can say how to get it again."""
+    found = [
+        w for key in ("scene", "camera", "environment") if selection.get(key) for w in (f"--{key}", selection[key])
+    ]
+    if size := selection.get("size"):
+        found += ["--size", f"{size[0]}x{size[1]}"]
+    many = {"sets": "-s", "patches": "-p", "asset_roots": "--asset-root", "plugins": "--plugin"}
+    found += [word for key, option in many.items() for value in selection.get(key, ()) for word in (option, str(value))]
+    return [*found, *(word for name, most in selection.get("limits", ()) for word in ("--limit", f"{name}={most}"))]
+
+
 def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
     """Text to stdout; or to a file, whole or not at all, and then the file's path to stdout."""
     if output is None:

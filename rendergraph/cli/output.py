@@ -68,6 +68,30 @@ class Progress:
             sys.stderr.flush()
 
 
+class Bar:
+    """A bar that fills on a terminal, nothing elsewhere."""
+
+    _WIDTH = 30
+
+    def __init__(self, word: str) -> None:
+        self._word = word
+        self._on = sys.stderr is not None and sys.stderr.isatty()
+
+    def show(self, done: int, total: int) -> None:
+        """Say how many of how many are done."""
+        if self._on:
+            full = self._WIDTH * done // max(1, total)
+            bar = _printable("█" * full + "·" * (self._WIDTH - full), sys.stderr)
+            sys.stderr.write(f"\r{bar} {done} of {total} {self._word}")
+            sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Leave the line as it was."""
+        if self._on:
+            sys.stderr.write("\r" + " " * (self._WIDTH + 30) + "\r")
+            sys.stderr.flush()
+
+
 def table(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = ()) -> str:
     """Aligned columns, two blanks between; on a terminal the last one is wrapped to its width.
 

@@ -1,0 +1,225 @@
+"""`rendergraph compare`: pictures, times and memory of several pipelines."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.cli import options
+from rendergraph.cli.output import Bar, emit, emit_json, megabytes, say, table
+from rendergraph.cli.words import click
+from rendergraph.errors import Problem, UsageError, suggestion
+
+if TYPE_CHECKING:
+    import rendergraph as rg
+    from rendergraph.compare.values import Comparison, Result
+
+BEYOND = 4
+"""Exit code of a comparison beyond its threshold."""
+_LIMITED = ("flip", "rmse", "radiance_rmse")
+SOFTWARE = "times on a software rasteriser: no measure of a GPU"
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A metric and what it may not exceed."""
+
+    metric: str
+    most: float
+
+
+def _limit(text: str) -> Limit:
+    metric, equals, value = text.partition("=")
+    try:
+        most = float(value)
+    except ValueError:
+        most = -1.0
+    if not equals or not most >= 0:
+        raise ValueError(f"'{text}' is not METRIC=NUMBER, as in flip=0.02")
+    if metric in ("psnr", "ssim"):
+        raise ValueError(f"{metric} falls as errors grow; limit {', '.join(_LIMITED)}")
+    if metric not in _LIMITED:
+        raise ValueError(f"there is no metric '{metric}'{suggestion(metric, _LIMITED)}")
+    return Limit(metric, most)
+
+
+LIMIT = options.Parsed("METRIC=NUMBER", _limit)
+reference_option = click.option(
+    "--reference", metavar="FILE|PIPELINE", help="Measure against this picture or pipeline; the first by default."
+)
+at_option = click.option(
+    "--at",
+    "frame",
+    type=click.IntRange(1, 100_000),
+    default=1,
+    show_default=True,
+    help="Compare pictures of this frame.",
+)
+
+
+@click.command("compare", no_args_is_help=True)
+@click.argument("pipelines", nargs=-1, required=True)
+@reference_option
+@options.selection_options
+@click.option("-n", "--frames", type=click.IntRange(1, 10_000), default=10, show_default=True, help="Measured frames.")
+@at_option
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a report, HTML."
+)
+@click.option(
+    "--fail-above", "thresholds", multiple=True, type=LIMIT, help="Exit 4 where a metric is above: flip=0.02."
+)
+@options.json_option
+@options.device_option
+def command(
+    pipelines: tuple[str, ...],
+    reference: str | None,
+    frames: int,
+    frame: int,
+    output: Path | None,
+    thresholds: tuple[Limit, ...],
+    as_json: bool,
+    device: int | None,
+    **selection: Any,
+) -> None:
+    """Compare pictures, times and memory of pipelines.
+
+    All are drawn on one scene, with one camera and at one size: those of the first, or what the options say. Options
+    such as -s hold for all pipelines, not for the reference. Times are medians of frames that the pipelines take turns
+    to draw.
+
+    \b
+    Examples:
+      rendergraph compare forward forward-prepass
+      rendergraph compare forward shading-flat --size 640x360 -o report.html
+      rendergraph compare forward forward-prepass --reference forward --fail-above flip=0.02 --json
+    """
+    from rendergraph.compare import pictures
+
+    if len(pipelines) < 2 and reference is None:
+        text = "there is one pipeline and nothing to compare it with; name another, or a --reference"
+        raise UsageError(Problem("RG500", text))
+    if output is not None:
+        check_page(output)
+    loaded = [options.load(pipeline=name, **selection) for name in pipelines]
+    bar = Bar("steps")
+    found = pictures.compare(
+        loaded, load_reference(reference, selection), frames=frames, frame=frame, device=device, progress=bar.show
+    )
+    bar.clear()
+    for note in found.notes:
+        say(note)
+    beyond = exceeded(found.results, thresholds)
+    written: dict[str, Any] = {}
+    if output is not None:
+        from rendergraph.compare.report import comparison_page
+
+        words = ["compare", *pipelines, *options.words(**selection), *_reference_words(reference)]
+        words += ["-n", str(frames), *(["--at", str(frame)] if frame != 1 else []), "-o", str(output)]
+        options.write(comparison_page(found, typed(words)), output)
+        written["report"] = str(output)
+    if as_json:
+        emit_json(found.as_json() | written | {"exceeded": beyond})
+    else:
+        emit(_text(found))
+        if output is not None:
+            say(f"report: {output}")
+    for text in beyond:
+        say(text)
+    if beyond:
+        raise click.exceptions.Exit(BEYOND)
+
+
+def load_reference(reference: str | None, selection: Mapping[str, Any]) -> Path | rg.Pipeline | None:
+    """The reference: a picture's path, or a pipeline on the same scene, without the variants' settings."""
+    from rendergraph.compare.reference import is_picture
+
+    if reference is None:
+        return None
+    if is_picture(reference):
+        return Path(reference)
+    return options.load(pipeline=reference, **{**selection, "sets": (), "patches": ()})
+
+
+def check_page(output: Path) -> None:
+    """Say before anything is drawn that a report cannot be written there.
+
+    Raises:
+        UsageError: it is no name of a page.
+        InputError: the folder is missing or cannot be written to.
+    """
+    from rendergraph.images import check_target
+
+    if output.suffix.lower() not in (".html", ".htm"):
+        text = f"a report is an HTML page; name it '{output.with_suffix('.html')}'"
+        raise UsageError(Problem("RG501", text))
+    check_target(output)
+
+
+def exceeded(results: Sequence[Result], limits: Sequence[Limit]) -> list[str]:
+    """What is above its limit, in words; a figure that is no number is above every limit."""
+    found = []
+    for result in results:
+        values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse}
+        for limit in limits:
+            value = values[limit.metric]
+            if value is None or not value <= limit.most:
+                shown = "unknown" if value is None else f"{value:.6g}"
+                found.append(f"{result.name}: {limit.metric} is {shown}, above {limit.most:g}")
+    return found
+
+
+def typed(words: Sequence[str]) -> str:
+    """A command line as it can be typed again."""
+    return shlex.join(["rendergraph", *words])
+
+
+def _reference_words(reference: str | None) -> list[str]:
+    return [] if reference is None else ["--reference", reference]
+
+
+def summary_rows(results: Sequence[Result]) -> list[tuple[object, ...]]:
+    """A row a variant: errors, times, passes, bytes."""
+    rows: list[tuple[object, ...]] = []
+    for result in results:
+        m, times = result.metrics, result.times
+        psnr = "∞" if m.psnr is None else f"{m.psnr:.2f}"
+        gpu = f"{times.gpu_ms.median:.2f}" if times.gpu_ms else "–"
+        spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
+        size = megabytes(int(str(result.memory["allocated_bytes"])))
+        rows.append(
+            (result.name, f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}", gpu, spread,
+             f"{times.cpu_ms.median:.2f}", result.pass_count, size)
+        )  # fmt: skip
+    return rows
+
+
+HEADS = ("", "FLIP", "RMSE", "PSNR", "SSIM", "GPU ms", "10–90 %", "CPU ms", "passes", "textures")
+
+
+def _text(found: Comparison) -> str:
+    width, height = found.size
+    lines = [
+        f"{found.scene}, {width}×{height}, against {found.reference.name}, on {found.device.get('renderer')}",
+        table(summary_rows(found.results), HEADS, right=range(1, len(HEADS))),
+    ]
+    if found.software:
+        lines.append(SOFTWARE)
+    lines += [line for result in found.results if (line := _first(found, result))]
+    return "\n".join(lines)
+
+
+def _first(found: Comparison, result: Result) -> str:
+    base = found.base[0] if found.base else ""
+    if result.name == base or result.difference is None:
+        return ""
+    if result.first is None:
+        return f"{result.name}: every pass draws what it draws in {base}"
+    first = result.first
+    amount = (
+        "in size" if first.most is None else f"in {100 * first.share:.3g} % of its texels, by up to {first.most:.4g}"
+    )
+    return f"{result.name}: the first pass that differs from {base} is {first.node} ({first.port}), {amount}"

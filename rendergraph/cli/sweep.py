@@ -1,0 +1,122 @@
+"""`rendergraph sweep`: the product of axes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.cli import compare as shared
+from rendergraph.cli import options
+from rendergraph.cli.output import Bar, emit, emit_json, say, table
+from rendergraph.cli.words import click
+
+if TYPE_CHECKING:
+    from rendergraph.compare.axes import Axis
+    from rendergraph.compare.sweep import Sweep
+
+
+def _axis(text: str) -> Axis:
+    from rendergraph.compare.axes import parse_axis
+
+    return parse_axis(text)
+
+
+AXIS = options.Parsed("PATH=V,V,…", _axis)
+
+
+@click.command("sweep", no_args_is_help=True)
+@click.argument("pipeline")
+@click.option("-x", "--axis", "axes", multiple=True, type=AXIS, help="Go through these values of a path that -s takes.")
+@click.option(
+    "-o", "--output", "out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", required=True,
+    help="A folder for the runs, results.jsonl and report.html.",
+)  # fmt: skip
+@click.option("--resume", is_flag=True, help="Keep the runs that DIR has already.")
+@shared.reference_option
+@options.selection_options
+@click.option("-n", "--frames", type=click.IntRange(1, 10_000), help="Measured frames.  [default: 5]")
+@shared.at_option
+@click.option("--fail-above", "thresholds", multiple=True, type=shared.LIMIT, help="Exit 4 where a metric is above.")
+@options.json_option
+@options.device_option
+def command(
+    pipeline: str,
+    axes: tuple[Axis, ...],
+    out: Path,
+    resume: bool,
+    reference: str | None,
+    frames: int | None,
+    frame: int,
+    thresholds: tuple[shared.Limit, ...],
+    as_json: bool,
+    device: int | None,
+    **selection: Any,
+) -> None:
+    """Draw every combination of parameters, measure them, and show which are worth it.
+
+    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline`, `axes` and what else the options say; options win.
+    A path is what -s takes: a parameter, an input, a node's type. Commas inside brackets belong to a value. What
+    several runs have in common is drawn once.
+
+    \b
+    Examples:
+      rendergraph sweep forward -x shadows.taps=1,2,4 -x display.curve=aces,neutral -o out
+      rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr -o out --resume
+      rendergraph sweep my-sweep.yaml -o out --json
+    """
+    from rendergraph.compare.axes import is_sweep, read_sweep
+    from rendergraph.compare.report import sweep_page
+    from rendergraph.compare.sweep import sweep
+
+    words = ["sweep", pipeline, *(w for a in axes for w in ("-x", f"{a.path}={','.join(a.values)}"))]
+    words += options.words(**selection) + ([] if reference is None else ["--reference", reference])
+    words += ["-n", str(frames)] if frames else []
+    words += ["--at", str(frame)] if frame != 1 else []
+    if is_sweep(Path(pipeline)):
+        file = read_sweep(Path(pipeline))
+        named = {axis.path for axis in axes}
+        axes = (*(axis for axis in file.axes if axis.path not in named), *axes)
+        pipeline, reference, frames = file.pipeline, reference or file.reference, frames or file.frames
+        selection["scene"] = selection["scene"] or file.scene
+        selection["size"] = selection["size"] or file.size
+        selection["sets"] = (*file.sets, *selection["sets"])
+    bar = Bar("runs")
+    base = options.make(pipeline=pipeline, **selection)
+    found = sweep(
+        base, axes, out, shared.load_reference(reference, selection), frames=frames or 5, frame=frame, resume=resume,
+        device=device, progress=bar.show,
+    )  # fmt: skip
+    bar.clear()
+    page = out / "report.html"
+    options.write(sweep_page(found, shared.typed([*words, "-o", str(out)])), page)
+    if found.torn:
+        say(f"{found.torn} lines of the results were not whole; those runs were drawn again")
+    beyond = shared.exceeded(found.comparison.results, thresholds)
+    if as_json:
+        emit_json(found.as_json() | {"report": str(page), "exceeded": beyond})
+    else:
+        emit(_text(found))
+        emit(str(page))
+    for text in beyond:
+        say(text)
+    if beyond:
+        raise click.exceptions.Exit(shared.BEYOND)
+
+
+def _text(found: Sweep) -> str:
+    from rendergraph.compare.sweep import pareto
+
+    comparison = found.comparison
+    front = {result.name for result in pareto(comparison.results)}
+    rows = [
+        (*row, "front" if row[0] in front else "") for row in shared.summary_rows(comparison.results)
+    ]  # fmt: skip
+    heads = (*shared.HEADS, "Pareto")
+    lines = [
+        f"{len(rows)} runs against {comparison.reference.name}: {found.executed} passes drawn, {found.alone} one by one"
+        + (f"; {found.resumed} runs were there" if found.resumed else ""),
+        table(rows, heads, right=range(1, len(heads) - 1)),
+    ]
+    if comparison.software:
+        lines.append(shared.SOFTWARE)
+    return "\n".join(lines)

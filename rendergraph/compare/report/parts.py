@@ -1,0 +1,107 @@
+"""Pieces of the page: pictures as data, figures as text, SVG documents that keep their styles to themselves."""
+
+from __future__ import annotations
+
+import base64
+import math
+import re
+import tempfile
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.compare.timing import Spread
+from rendergraph.compare.values import Pixels
+from rendergraph.images import viewable, write
+from rendergraph.metrics import Encoding
+
+SOFTWARE = "software rasteriser: no measure of a GPU"
+# Black through purple and orange to pale yellow: brightness alone tells the order.
+_MAP = np.array([(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float64)
+
+
+def software_note(software: bool) -> str:
+    """The warning that stands wherever a time is shown."""
+    return f'<p class="software">Times on a {SOFTWARE}.</p>' if software else ""
+
+
+def png(pixels: npt.NDArray[np.uint8]) -> str:
+    """A picture as the address of itself."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        write(path, pixels)
+        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+
+
+def shown(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:
+    """A compared output as 8 bits."""
+    return viewable(pixels, "display_color" if encoding == "display" else "radiance")
+
+
+def heat(values: Pixels) -> npt.NDArray[np.uint8]:
+    """Values 0…1 as colours."""
+    place = np.clip(np.nan_to_num(values, nan=1.0), 0, 1) * (len(_MAP) - 1)
+    low = np.minimum(place.astype(int), len(_MAP) - 2)
+    part = (place - low)[..., np.newaxis]
+    mixed = _MAP[low] * (1 - part) + _MAP[low + 1] * part
+    return np.asarray(mixed + 0.5).astype(np.uint8)
+
+
+def img(identity: str, source: str, alt: str) -> str:
+    """A picture; an empty identity gives it none."""
+    own = f' id="{identity}"' if identity else ""
+    return f'<img{own} src="{source}" alt="{escape(alt)}">'
+
+
+def drawing(svg: str, label: str) -> str:
+    """An SVG document in a shadow tree: its style sheet stays its own."""
+    svg = re.sub(r"<svg ", f'<svg role="img" aria-label="{escape(label)}" ', svg, count=1)
+    return f'<div class="drawing"><template shadowrootmode="open">{svg}</template></div>'
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A figure with a few digits, `–` where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    return f"{value:.{digits}f}" if abs(value) >= 10 ** (1 - digits) else f"{value:.1e}"
+
+
+def milliseconds(spread: Spread | None, most: float = 0.0) -> str:
+    """A median with its spread beneath, and a bar where `most` is the longest."""
+    if spread is None:
+        return '<td class="num">–</td>'
+    bar = f'<span class="bar" style="width:{100 * spread.median / most:.1f}%"></span>' if most > 0 else ""
+    return f'<td class="num">{spread.median:.3f}{bar}<span class="spread">{spread.p10:.3f}–{spread.p90:.3f}</span></td>'
+
+
+def table(heads: Sequence[str], rows: Iterable[str], caption: str) -> str:
+    """A table; heads that begin with `#` are of figures, rows are ready."""
+    cells = "".join(
+        f'<th scope="col"{" class=num" if head.startswith("#") else ""}>{escape(head.lstrip("#"))}</th>'
+        for head in heads
+    )
+    body = "\n".join(rows)
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}"><table>'
+        f"<thead><tr>{cells}</tr></thead><tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def card(entries: Iterable[tuple[str, object]]) -> str:
+    """Terms with what they are."""
+    rows = "".join(f"<dt>{escape(key)}</dt><dd>{escape(str(value))}</dd>" for key, value in entries)
+    return f'<dl class="card">{rows}</dl>'
+
+
+def section(identity: str, title: str, *parts: str) -> str:
+    """A part of the page under a title of its own; nothing where there is nothing in it."""
+    body = "\n".join(part for part in parts if part)
+    if not body:
+        return ""
+    head = f'<h2 id="{identity}-title">{escape(title)}</h2>'
+    return f'<section id="{identity}" aria-labelledby="{identity}-title">{head}\n{body}\n</section>'

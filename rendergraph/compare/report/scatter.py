@@ -1,0 +1,111 @@
+"""Quality against time as an SVG picture: a point a variant, the Pareto front as a line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+WIDTH, HEIGHT = 760.0, 380.0
+LEFT, RIGHT, TOP, BOTTOM = 76.0, 24.0, 20.0, 52.0
+_STYLE = """
+.ink{fill:#1f2328}.fact{fill:#57606a}.grid{stroke:#7d8590;stroke-opacity:.25}.front{stroke:#2c9163;fill:none}
+.dot{fill:#3b7dd8}.best{fill:#2c9163}
+@media (prefers-color-scheme:dark){.ink{fill:#e6edf3}.fact{fill:#9aa4af}.dot{fill:#6ea8ff}.best{fill:#4fc08d}
+.front{stroke:#4fc08d}}
+"""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A variant: milliseconds with their spread, and its error; `best` ones form the front."""
+
+    name: str
+    ms: float
+    low: float
+    high: float
+    error: float
+    best: bool
+
+
+def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
+    """Points as a stand-alone SVG document, for light and dark pages; nearer to the lower left is better.
+
+    Args:
+        points: one a variant; those without a number are left out.
+        time, error: what the axes show.
+    """
+    points = [p for p in points if math.isfinite(p.ms) and math.isfinite(p.error)]
+    right, up = _ceiling(max((p.high for p in points), default=1)), _ceiling(max((p.error for p in points), default=1))
+
+    def x(ms: float) -> float:
+        return LEFT + (WIDTH - LEFT - RIGHT) * min(ms, right) / right
+
+    def y(value: float) -> float:
+        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * value / up
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:.0f} {HEIGHT:.0f}" width="{WIDTH:.0f}" '
+        f'height="{HEIGHT:.0f}" font-family="system-ui,\'DejaVu Sans\',sans-serif" font-size="12">',
+        f"<title>{escape(error)} against {escape(time)}</title>",
+        f"<style>{_STYLE}</style>",
+    ]
+    for part in range(6):
+        parts.append(_tick(x(right * part / 5), HEIGHT - BOTTOM, f"{right * part / 5:.3g}", upright=True))
+        parts.append(_tick(LEFT, y(up * part / 5), f"{up * part / 5:.3g}", upright=False))
+    middle = (TOP + HEIGHT - BOTTOM) / 2
+    parts.append(f'<text class="fact" x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 10:.0f}" text-anchor="middle">'
+                 f"{escape(time)}</text>")  # fmt: skip
+    parts.append(f'<text class="fact" transform="translate(18 {middle:.0f}) rotate(-90)" text-anchor="middle">'
+                 f"{escape(error)}</text>")  # fmt: skip
+    front = sorted((p for p in points if p.best), key=lambda p: p.ms)
+    if len(front) > 1:
+        path = f"M{x(front[0].ms):.1f} {y(front[0].error):.1f}"
+        path += "".join(f"H{x(p.ms):.1f}V{y(p.error):.1f}" for p in front[1:])
+        parts.append(f'<path class="front" d="{path}" stroke-width="1.5" stroke-dasharray="5 4"/>')
+    taken: list[tuple[float, float, float]] = []
+    for point in sorted(points, key=lambda p: (not p.best, p.ms)):
+        parts.append(_dot(point, x(point.ms), y(point.error), x(point.low), x(point.high), taken, len(points)))
+    return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def _dot(
+    point: Point, x: float, y: float, low: float, high: float, taken: list[tuple[float, float, float]], count: int
+) -> str:
+    kind = "best" if point.best else "dot"
+    told = f"{point.name}: {point.ms:.3g} ms ({point.low:.3g}–{point.high:.3g}), {point.error:.4g}"
+    drawn = (
+        f"<g><title>{escape(told)}</title>"
+        f'<path d="M{low:.1f} {y:.1f}H{high:.1f}" stroke="#7d8590" stroke-opacity=".6"/>'
+        f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>'
+    )
+    width = 6.6 * len(point.name)
+    if count <= 12 or point.best:
+        before = x + width + 10 > WIDTH
+        left = x - width - 10 if before else x + 10
+        for shift in (4.0, -10.0, 18.0, -24.0, 32.0):  # a label goes where no other one is, or nowhere
+            row = y + shift
+            if TOP < row < HEIGHT - 4 and not any(
+                abs(row - r) < 13 and left < b and a < left + width for a, b, r in taken
+            ):
+                taken.append((left, left + width, row))
+                drawn += f'<text class="ink" x="{left:.1f}" y="{row:.1f}">{escape(point.name)}</text>'
+                break
+    return drawn + "</g>"
+
+
+def _tick(x: float, y: float, text: str, *, upright: bool) -> str:
+    if upright:
+        line = f'<path class="grid" d="M{x:.1f} {TOP:.0f}V{y:.1f}"/>'
+        return line + f'<text class="fact" x="{x:.1f}" y="{y + 18:.1f}" text-anchor="middle">{text}</text>'
+    line = f'<path class="grid" d="M{x:.1f} {y:.1f}H{WIDTH - RIGHT:.0f}"/>'
+    return line + f'<text class="fact" x="{x - 8:.1f}" y="{y + 4:.1f}" text-anchor="end">{text}</text>'
+
+
+def _ceiling(value: float) -> float:
+    """The next number of 1, 1.5, 2, 3, 5 times a power of ten, so that ticks are round."""
+    if not value > 0 or not math.isfinite(value):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(step * power for step in (1, 1.5, 2, 3, 4, 5, 7.5, 10) if step * power >= value * 0.999)

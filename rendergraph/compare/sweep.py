@@ -1,0 +1,218 @@
+"""The product of axes: every combination drawn, measured and kept; what is there already is not drawn again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph import metrics
+from rendergraph.compare.axes import Axis, check_axes, combinations, pipelines, run_name
+from rendergraph.compare.divergence import passes
+from rendergraph.compare.ledger import Ledger
+from rendergraph.compare.pictures import Progress, light_error, opened
+from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, unique_names
+from rendergraph.compare.runs import Run, is_kept, keep, key_of, open_folder, restored
+from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw
+from rendergraph.compare.values import Comparison, Pixels, Reference, Result
+from rendergraph.metrics import Encoding
+
+if TYPE_CHECKING:
+    from rendergraph.session import Pipeline, Session
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What a sweep has found.
+
+    Attributes:
+        comparison: every run as a variant, in the order of the product.
+        axes: what was swept.
+        executed: passes that were drawn for the runs of this time.
+        alone: passes those runs would have drawn one by one.
+        resumed: runs that were there already.
+        torn: lines of the results that were not whole.
+    """
+
+    comparison: Comparison
+    axes: tuple[Axis, ...]
+    executed: int
+    alone: int
+    resumed: int
+    torn: int
+
+    def as_json(self) -> dict[str, Any]:
+        """The document of `sweep --json`."""
+        found = self.comparison.as_json()
+        runs = found.pop("variants")
+        front = {result.name for result in pareto(self.comparison.results)}
+        return found | {
+            "axes": {axis.path: list(axis.values) for axis in self.axes},
+            "executed_passes": self.executed,
+            "passes_one_by_one": self.alone,
+            "resumed": self.resumed,
+            "runs": [run | {"pareto": run["name"] in front} for run in runs],
+        }
+
+
+@dataclass(eq=False)
+class _Work:
+    """What goes from one part of a sweep to the next.
+
+    Attributes:
+        runs: all of them, in the order of the product.
+        encoding: of the output that is compared.
+        other: the reference, where it is a pipeline of its own.
+        ledger: where results go.
+        results: what is there, by the run's number.
+        device: what drew.
+        reference, light: what is measured against, once it is there.
+    """
+
+    runs: list[Run]
+    encoding: Encoding
+    other: Pipeline | None
+    ledger: Ledger
+    results: dict[int, Result] = field(default_factory=dict)
+    device: Mapping[str, object] = field(default_factory=dict)
+    reference: Reference | None = None
+    light: Pixels | None = None
+    executed: int = 0
+    alone: int = 0
+
+    @property
+    def missing(self) -> list[int]:
+        """Numbers of the runs that have no result."""
+        return [number for number in range(len(self.runs)) if number not in self.results]
+
+
+def sweep(
+    base: Pipeline,
+    axes: Sequence[Axis],
+    out: Path,
+    reference: Path | Pipeline | None = None,
+    *,
+    frames: int = 5,
+    frame: int = 1,
+    resume: bool = False,
+    most_bytes: int = MOST_BYTES,
+    session: Session | None = None,
+    device: int | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Draw every combination of the axes' values into a folder each, and measure it.
+
+    Args:
+        base: what the axes change.
+        axes: paths with values.
+        out: the folder; `results.jsonl` in it grows by a line a run.
+        reference: a picture or a pipeline that runs are measured against; the first run by default.
+        frames: how many frames are measured.
+        frame: number of the frame whose pictures are kept.
+        resume: keep runs that are in the results already.
+        most_bytes: of textures that variants drawn together may take.
+        session: where to draw; a private one by default.
+        device: GL device number where no session is given.
+        progress: told about the runs done.
+
+    Raises:
+        InputError: an axis names nothing, a value does not fit, or the folder has results already.
+        RenderError: it failed while drawing or writing.
+        DeviceError: there is no usable GL device.
+    """
+    check_axes(axes)
+    settings = combinations(axes)
+    variants = pipelines(base, settings)
+    other = None if reference is None or isinstance(reference, Path) else reference
+    staged, notes = on_one_stage([*variants, *([other] if other else [])])
+    variants, other = staged[: len(variants)], staged[-1] if other else None
+    names = unique_names([run_name(run) for run in settings])
+    picture = read_picture(reference, variants[0].graph.size, names[0]) if isinstance(reference, Path) else None
+    output, encoding = compared_output(staged, picture[1] if picture else None)
+    against = str(reference) if picture else key_of(other or variants[0], frame, "")
+    ledger, records, torn = open_folder(out, resume=resume)
+    runs = [
+        Run(name, run, pipeline, output, key_of(pipeline, frame, against), out / name)
+        for name, run, pipeline in zip(names, settings, variants, strict=True)
+    ]
+    work = _Work(runs, encoding, other, ledger)
+    if picture:
+        work.reference = Reference(str(reference), "file", *picture)
+    for number, run in enumerate(runs):
+        if run.key in records and is_kept(run, records[run.key]):
+            work.results[number] = restored(run, records[run.key], encoding)
+            work.device = records[run.key]["device"]
+    resumed = len(work.results)
+    if work.missing or other:
+        with opened(session, device) as session:
+            _draw_missing(work, session, frames, frame, most_bytes, progress or (lambda done, total: None))
+    results = tuple(work.results[number] for number in range(len(runs)))
+    first = variants[0]
+    comparison = Comparison(
+        results=results,
+        reference=work.reference or Reference(names[0], "variant", results[0].pixels, encoding),
+        base=(names[0], first.graph),
+        scene=first.spec.scene.stem if first.spec.scene else first.scene.name,
+        camera=first.camera,
+        size=first.graph.size,
+        frame=frame,
+        device=work.device,
+        notes=tuple(notes),
+    )
+    return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, torn)
+
+
+def pareto(results: Sequence[Result]) -> list[Result]:
+    """The results than which none is both quicker and better, quickest first; quality is FLIP."""
+    found: list[Result] = []
+    for result in sorted(results, key=lambda r: (r.times.headline.median, r.metrics.flip)):
+        flip = result.metrics.flip
+        if math.isfinite(flip) and (not found or flip < found[-1].metrics.flip):
+            found.append(result)
+    return found
+
+
+def _draw_missing(
+    work: _Work, session: Session, frames: int, frame: int, most_bytes: int, progress: Progress
+) -> None:  # fmt: skip
+    """Draw, measure and keep the runs that are not there; the reference first, where it is not the first of them."""
+    output = work.runs[0].output
+    if work.reference is None and (work.other or 0 not in work.missing):
+        pipeline = work.other or work.runs[0].pipeline
+        shown = session.render(pipeline, frames=range(1, frame + 1))
+        if work.other:
+            work.reference = Reference(work.other.name, "pipeline", shown[output], work.encoding)
+        else:
+            work.reference = Reference(work.runs[0].name, "variant", shown[output], work.encoding)
+        work.light, work.device = shown.get("radiance"), shown.device
+    variants = [run.pipeline for run in work.runs]
+    for batch in batches(variants, work.missing, most_bytes):
+        work.executed += batch.pass_count
+        for drawn in draw(session, variants, batch, frames, frame):
+            run = work.runs[drawn.number]
+            work.device = drawn.device
+            if work.reference is None:
+                work.reference = Reference(run.name, "variant", drawn.arrays[output], work.encoding)
+                work.light = drawn.arrays.get("radiance")
+            result = _measured(run, drawn, work.reference, work.light)
+            keep(run, result, drawn.arrays, drawn.device, work.ledger)
+            work.alone += result.pass_count
+            work.results[drawn.number] = result
+            progress(len(work.results), len(work.runs))
+
+
+def _measured(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None) -> Result:
+    pixels, own = drawn.arrays[run.output], drawn.arrays.get("radiance")
+    found, map_ = metrics.SAME, None
+    if reference.pixels is not pixels:
+        names = (run.name, reference.name)
+        found, map_ = metrics.measure(pixels, reference.pixels, encoding=reference.encoding, names=names)
+    plan = run.pipeline.plan()
+    return Result(
+        name=run.name, source=run.pipeline.source, pixels=pixels, encoding=reference.encoding, metrics=found,
+        times=drawn.times, memory=plan.memory.as_json(), pass_count=len(passes(plan)), settings=run.settings,
+        radiance_rmse=light_error(own, light),
+        flip_map=map_, graph=run.pipeline.graph, plan=plan,
+    )  # fmt: skip

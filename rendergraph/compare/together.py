@@ -1,0 +1,114 @@
+"""Many variants of one pipeline drawn together: passes that compute the same are drawn once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+from rendergraph.compare.divergence import passes
+from rendergraph.compare.merge import Merged, MergedPipeline, merge
+from rendergraph.compare.timing import Times, times_within
+from rendergraph.compare.values import Pixels
+from rendergraph.errors import InputError
+from rendergraph.session import Pipeline
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rendergraph.allocate import ResourcePlan
+    from rendergraph.session import Session
+
+MOST_BYTES = 512 << 20
+"""Textures of one batch; the outputs of all its variants are alive at once."""
+MOST_VIEWS = 48
+"""View tables of one batch: each has a binding point of its own, and OpenGL promises 84."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Variants that are drawn in the same frames.
+
+    Attributes:
+        numbers: which of the variants.
+        pipeline: all of them as one.
+        plan: the plan of that.
+    """
+
+    numbers: tuple[int, ...]
+    pipeline: MergedPipeline
+    plan: ResourcePlan
+
+    @property
+    def merged(self) -> Merged:
+        """The graphs as one."""
+        assert self.pipeline.merged is not None
+        return self.pipeline.merged
+
+    @property
+    def pass_count(self) -> int:
+        """Passes it draws."""
+        return len(passes(self.plan))
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """One variant of a batch: its outputs by name, and the times of the passes it needs."""
+
+    number: int
+    arrays: Mapping[str, Pixels]
+    times: Times
+    device: Mapping[str, object]
+
+
+def batches(variants: Sequence[Pipeline], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
+    """The variants in as few batches as fit.
+
+    Args:
+        variants: all with one scene, camera and size.
+        numbers: which of them.
+        most_bytes: of textures in a batch; a single variant may have more.
+    """
+    if not numbers:
+        return []
+    chosen = [variants[number] for number in numbers]
+    merged = merge([variant.graph for variant in chosen])
+    base = {f.name: getattr(chosen[0], f.name) for f in fields(Pipeline)}
+    pipeline = MergedPipeline(**base, merged=merged)
+    try:
+        expansion, plan = pipeline.expansion(), pipeline.plan()
+        small = plan.memory.allocated_bytes <= most_bytes and len(expansion.views) <= MOST_VIEWS
+        if small or len(numbers) == 1:
+            return [Batch(tuple(numbers), pipeline, plan)]
+    except InputError:
+        # Each graph has a legal order and all of them together have none: readers of two continued textures wait for
+        # each other across graphs. So rare that the way out is the plain one.
+        if len(numbers) == 1:
+            raise
+    half = len(numbers) // 2
+    return [*batches(variants, numbers[:half], most_bytes), *batches(variants, numbers[half:], most_bytes)]
+
+
+def draw(session: Session, variants: Sequence[Pipeline], batch: Batch, frames: int, frame: int) -> Iterator[Drawn]:
+    """Draw a batch and hand out its variants.
+
+    Args:
+        session: where.
+        variants: all of them.
+        batch: which ones.
+        frames: how many frames are measured.
+        frame: number of the frame whose pictures are wanted.
+    """
+    drawn = session.render(batch.pipeline, frames=range(1, frame + 1))
+    times = drawn.times
+    if frames > len(times):
+        times = session.render(batch.pipeline, frames=range(1, frames + 1)).times
+    for place, number in enumerate(batch.numbers):
+        graph = variants[number].graph
+        own = {name: batch.merged.names[place][name] for name in passes(variants[number].plan())}
+        yield Drawn(
+            number=number,
+            arrays={name: drawn[batch.merged.output(place, name)] for name in graph.outputs},
+            times=times_within(times, own, {node.id: node.type.name for node in graph.nodes}),
+            device=drawn.device,
+        )
