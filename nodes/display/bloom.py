@@ -24,9 +24,9 @@ class Bloom(Node):
     """Add a soft glow around everything brighter than a threshold, as lenses and eyes scatter it.
 
     Bright-pass, half size, separable Gaussian (James and O'Rorke 2004); then half of that again and blurred again,
-    `levels` times, so that small kernels reach far. The mean of the levels is added to the radiance before tone mapping:
-    a glow keeps its hue and goes through the curve. Away from the border the added light is `intensity` times what the
-    bright-pass left.
+    `levels` times, so that small kernels reach far. The mean of the levels is added to the radiance before tone
+    mapping: a glow keeps its hue and goes through the curve. Away from the border the added light is `intensity` times
+    what the bright-pass left.
     """
 
     radiance = InOut(Radiance, doc="Scene-linear radiance; the glow is added to it, alpha stays.")
