@@ -6,7 +6,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
-from importlib.metadata import entry_points
+from importlib.metadata import entry_points, version
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 
@@ -34,10 +34,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built wheel; from a copy, so that nothing is left behind in the checkout."""
     if find_spec("setuptools") is None:
         pytest.skip("building without network needs setuptools beside the tests")
-    import setuptools
-
-    if int(setuptools.__version__.split(".")[0]) < 77:
-        pytest.skip(f"setuptools {setuptools.__version__} is older than what the build asks for")
+    if int(version("setuptools").split(".")[0]) < 77:
+        pytest.skip(f"setuptools {version('setuptools')} is older than what the build asks for")
     source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         (source / name).write_bytes((ROOT / name).read_bytes())

@@ -104,7 +104,7 @@ def _signature(thing: Any, *, method: bool = False) -> str:
 
 
 def _parameter(parameter: inspect.Parameter) -> str:
-    stars = {parameter.VAR_POSITIONAL: "*", parameter.VAR_KEYWORD: "**"}.get(parameter.kind, "")
+    stars = "*" * ((parameter.kind is parameter.VAR_POSITIONAL) + 2 * (parameter.kind is parameter.VAR_KEYWORD))
     text = f"{stars}{parameter.name}"
     if parameter.annotation is not parameter.empty:
         text += f": {parameter.annotation}"

@@ -72,8 +72,5 @@ def _documented(of: str, limits: Any) -> list[tuple[str, str, int]]:
     """The fields of a class of limits, as its docstring explains them."""
     doc = re.sub(r"\n {8,}", " ", inspect.getdoc(limits) or "")
     about = dict(re.findall(r"^ +(\w+): (.*)$", doc, re.MULTILINE))
-    return [
-        (of, about[field.name].rstrip("."), field.default)
-        for field in dataclasses.fields(limits)
-        if field.name in about
-    ]
+    values = {field.name: getattr(limits, field.name) for field in dataclasses.fields(limits)}
+    return [(of, about[name].rstrip("."), most) for name, most in values.items() if name in about]
