@@ -1,0 +1,193 @@
+"""Deferred against forward: the same picture, by another way through the graph."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import rendergraph as rg
+from rendergraph.resources import shipped_scenes
+
+Floats = npt.NDArray[np.float64]
+FULL = "gbuffer.precision=full"
+SCENES = ["cornell_box", "spheres", "shadow_study", "stairs", "many_lights"]
+ASSETS = ["gltf/DamagedHelmet.glb", "sponza/Sponza.gltf", "gltf/UnlitTest.glb", "gltf/AnisotropyStrengthTest.glb"]
+MODELS = ["unlit", "phong", "blinn_phong", "anisotropic", "pbr"]
+
+# Window depth in float32 places a point to about 1e-5 of its distance; only narrow highlights of curved metal show it.
+FEW = 3e-4
+CLOSE = 8.0
+
+
+def same(off: Floats, share: float = FEW, most: float = CLOSE) -> None:
+    """All but a small share of the pixels lie within a step, and those within a few."""
+    assert (off > 1.001).mean() <= share, f"{(off > 1.001).mean():.3%} of the pixels are off, by up to {off.max():.1f}"
+    assert off.max() <= most
+
+
+def mixture(folder: Path) -> Path:
+    """Every kind of surface that a G-buffer must hold: textures would add nothing, their values do."""
+    (folder / "mixture.yaml").write_text("""scene: 1
+objects:
+  floor: {shape: plane, size: [6, 6], material: floor}
+  ball: {shape: sphere, radius: 0.5, at: [-1.5, 0.5, 0], material: gem}
+  glow: {shape: sphere, radius: 0.4, at: [-0.4, 0.5, 0.4], material: glow}
+  flat: {shape: box, size: [0.6, 0.6, 0.6], at: [0.6, 0.5, 0], material: flat}
+  sheet: {shape: plane, size: [1, 1], at: [1.6, 0.6, 0], rotate_degrees: [-70, 20, 0], material: sheet}
+  brushed: {shape: torus, radius: 0.4, tube: 0.15, at: [0.5, 0.2, 1.2], material: brushed}
+materials:
+  floor: {base_color: [0.6, 0.6, 0.6], roughness: 0.7}
+  gem: {base_color: [0.1, 0.3, 0.6], roughness: 0.25, ior: 2.4, specular: 0.8, specular_color: [1, 0.6, 0.3]}
+  glow: {base_color: [0.2, 0.2, 0.2], emissive: [2, 0.4, 0.1]}
+  flat: {base_color: [0.9, 0.5, 0.1], unlit: true}
+  sheet: {base_color: [0.2, 0.8, 0.3], double_sided: true}
+  brushed: {base_color: [0.9, 0.8, 0.6], metallic: 1, roughness: 0.4, anisotropy_strength: 0.8, anisotropy_rotation: 0.6}
+lights:
+  sun: {type: directional, direction: [-0.5, -1, -0.6], intensity: 2}
+  lamp: {type: point, at: [0, 2, 1.5], intensity: 4, range: 6}
+  beam: {type: spot, at: [-2, 2, 1], direction: [1, -1.4, -0.8], intensity: 9, inner_degrees: 10, outer_degrees: 30}
+cameras: {main: {eye: [0.5, 2, 4.2], target: [0, 0.4, 0.2], fov_y_degrees: 42, near: 0.1, far: 30}}
+""")
+    return folder / "mixture.yaml"
+
+
+# --- full precision: the same picture --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_full_precision_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
+    """Visibility from the pre-pass's depth is that of the G-buffer's, so that shadow edges are the same too."""
+    same(steps_off(radiance("deferred", scene, FULL), radiance("forward-prepass", scene)))
+
+
+@pytest.mark.parametrize("scene", ASSETS)
+def test_full_precision_draws_the_forward_picture_of_assets(
+    radiance: Any, steps_off: Any, shared: Path, scene: str
+) -> None:
+    file = shared / "assets" / scene
+    same(steps_off(radiance("deferred", file, FULL), radiance("forward-prepass", file)))
+
+
+@pytest.mark.parametrize("shading", MODELS)
+def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shading: str) -> None:
+    scene, model = mixture(tmp_path), f"light.shading={shading}"
+    same(steps_off(radiance("deferred", scene, FULL, model), radiance("forward-prepass", scene, model)))
+
+
+def test_the_fast_visibility(radiance: Any, steps_off: Any) -> None:
+    pictures = [radiance(name, "spheres", "light.smith=fast", *more) for name, more in
+                (("deferred", [FULL]), ("forward-prepass", []))]  # fmt: skip
+    same(steps_off(*pictures))
+
+
+@pytest.mark.parametrize("shading", ["phong", "pbr"])
+def test_an_obj_with_its_own_coefficients(radiance: Any, steps_off: Any, shared: Path, shading: str) -> None:
+    """Ka, Kd, Ks and Ns of an MTL, textured: what the empirical targets are there for."""
+    file, model = shared / "assets" / "sponza" / "sponza.obj", f"light.shading={shading}"
+    same(steps_off(radiance("deferred", file, FULL, model), radiance("forward-prepass", file, model)))
+
+
+@pytest.mark.parametrize("term", ["ambient", "diffuse", "specular", "emissive"])
+def test_each_term_alone(radiance: Any, steps_off: Any, tmp_path: Path, term: str) -> None:
+    scene, terms = mixture(tmp_path), f"light.terms={term}"
+    same(steps_off(radiance("deferred", scene, FULL, terms), radiance("forward-prepass", scene, terms)))
+
+
+def test_shadows_looked_up_in_place_or_in_screen_space(radiance: Any) -> None:
+    """The geometric normal comes from depth in both; against forward, where it is the triangle's, edges are aside."""
+    screen = radiance("deferred", "shadow_study", size=(320, 180))
+    place = radiance(
+        "deferred", "shadow_study", "light.visibility=null", "light.lookup=shadows.lookup", size=(320, 180)
+    )
+    forward = radiance("forward", "shadow_study", size=(320, 180))
+    assert np.mean(np.abs(screen - place).max(-1) > 2e-3) < 1e-3
+    assert np.mean(np.abs(place - forward).max(-1) > 0.02) < 0.01
+    bare = radiance("deferred", "shadow_study", "light.visibility=null", size=(320, 180))
+    assert screen[..., :3].mean() < 0.98 * bare[..., :3].mean()
+
+
+def test_textures_masks_and_both_sides(radiance: Any, steps_off: Any, shared: Path) -> None:
+    """Alpha-masked and two-sided surfaces; those with alpha blending are not in a G-buffer."""
+    file = shared / "assets" / "gltf" / "AlphaBlendModeTest.glb"
+    off = steps_off(radiance("deferred", file, FULL), radiance("forward-prepass", file))
+    blended = radiance("forward", file, "light.terms=ambient") != radiance(
+        "deferred", file, FULL, "light.terms=ambient"
+    )
+    assert 0 < blended.any(-1).mean() < 0.1
+    same(off[~blended.any(-1)])
+
+
+def test_blended_surfaces_are_left_out(radiance: Any, steps_off: Any, tmp_path: Path) -> None:
+    """`glass` without its panes is what forward draws of it with none there."""
+    lines = shipped_scenes()["glass"].read_text().splitlines()
+    opaque = [line for line in lines if "pane:" not in line and "bubble:" not in line]
+    assert len(lines) - len(opaque) == 4
+    (tmp_path / "opaque.yaml").write_text("\n".join(opaque))
+    same(steps_off(radiance("deferred", "glass", FULL), radiance("forward-prepass", tmp_path / "opaque.yaml")))
+
+
+def test_background_and_coverage(radiance: Any) -> None:
+    picture = radiance("deferred", "spheres", "light.background=[0.25, 0.5, 2]")
+    nothing = picture[..., 3] == 0
+    assert np.array_equal(nothing, radiance("forward", "spheres")[..., 3] == 0)
+    assert np.all(picture[nothing][:, :3] == [0.25, 0.5, 2])
+
+
+# --- compact: a stated bound -----------------------------------------------------------------------------------------
+
+
+def encode(linear: Floats) -> Floats:
+    return np.asarray(np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055))
+
+
+def decode(encoded: Floats) -> Floats:
+    return np.asarray(np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4))
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_compact_is_off_by_half_a_step_of_eight_bit_base_colour(session: rg.Session, scene: str) -> None:
+    """Radiance without emission is linear in base colour, so no pixel can be off by more than base colour is.
+
+    That is 0.6 step of the sRGB code (half, and what OpenGL allows the conversion). 0.5 % more for all that has 16
+    bits, where highlights multiply it; emission has 6 bits behind the point in red and green, 5 in blue.
+    """
+    draw = {
+        precision: session.render(
+            rg.load("deferred", scene=scene, size=(120, 90), sets=[f"gbuffer.precision={precision}"]),
+            outputs=["radiance"], taps=["gbuffer.albedo", "gbuffer.emissive"],
+        )
+        for precision in ("compact", "full")
+    }  # fmt: skip
+    full, compact = (np.asarray(draw[name]["radiance"], np.float64)[..., :3] for name in ("full", "compact"))
+    base = np.asarray(draw["full"]["gbuffer.albedo"], np.float64)[..., :3]
+    emitted = np.asarray(draw["full"]["gbuffer.emissive"], np.float64)[..., :3]
+    coarser = decode(np.minimum(encode(base) + 0.6 / 255, 1)) - base
+    allowed = full * (coarser / np.maximum(base, 1e-6) + 0.005) + emitted / [64, 64, 32] + 2e-5
+    assert np.all(np.abs(compact - full) <= allowed)
+    relative = np.abs(compact - full) / np.maximum(full, 0.01 * full.mean())
+    assert np.percentile(relative, 99) <= 0.02
+
+
+# --- the graph -------------------------------------------------------------------------------------------------------
+
+
+def drawn(*sets: str) -> set[str]:
+    plan = rg.load("deferred", scene="cornell_box", size=(64, 48), sets=sets).plan()
+    return {name.partition(".")[2] for name in plan.resources if name.startswith("gbuffer.")}
+
+
+def test_only_what_the_shading_model_reads_is_drawn() -> None:
+    assert drawn("light.shading=unlit") == {"depth", "albedo"}
+    common = {"depth", "albedo", "normal", "material", "emissive"}
+    assert drawn() == common | {"specular"}
+    assert drawn("light.shading=anisotropic") == common | {"specular", "grain"}
+    assert drawn("light.shading=phong") == common | {"phong_diffuse", "phong_specular", "phong_ambient"}
+
+
+def test_an_unlit_picture_casts_no_shadow() -> None:
+    steps = rg.load("deferred", sets=["light.shading=unlit"]).plan().schedule.steps
+    assert {step.node for step in steps} == {"gbuffer", "light", "display"}
