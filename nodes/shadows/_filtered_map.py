@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rendergraph.api import Facts, Internal, Node, Steps, param
+from rendergraph.api import Internal, Steps, param
 
-from ._map_technique import MapTechnique
-
-
-def _layers(node: Node, facts: Facts) -> int:
-    desc = facts.input("shadow_map").desc if facts.connected("shadow_map") else None
-    return desc.layers if desc is not None else 0
+from ._map_technique import MapTechnique, map_layers
 
 
 class FilteredMap(MapTechnique):
@@ -27,10 +22,10 @@ class FilteredMap(MapTechnique):
     texel: ClassVar[str] = "rg32f"
 
     filtered = Internal(
-        kind="texture2d_array", format=lambda node, facts: node.texel, size="shadow_map", layers=_layers,
+        kind="texture2d_array", format=lambda node, facts: node.texel, size="shadow_map", layers=map_layers,
         view="shadow_map", lights="shadow_map",
     )  # fmt: skip
-    covered = Internal(kind="texture2d_array", format="r16", size="shadow_map", layers=_layers)
+    covered = Internal(kind="texture2d_array", format="r16", size="shadow_map", layers=map_layers)
     rows = Internal(format=lambda node, facts: node.texel, size="shadow_map")
     covered_rows = Internal(format="r16", size="shadow_map")
 
@@ -40,7 +35,7 @@ class FilteredMap(MapTechnique):
 
     def record(self, steps: Steps) -> None:
         """Two steps a layer, which share the texture between them."""
-        for layer in range(_layers(self, steps.facts)):
+        for layer in range(steps.desc(self.filtered).layers):
             steps.fullscreen(
                 self.across, out={"filtered": self.rows, "covered": self.covered_rows},
                 shadow_map=self.shadow_map.layer(layer).sampled(), defines={"LAYER": layer},

@@ -12,6 +12,12 @@ def shadowed_lights(facts: Facts) -> tuple[int, ...]:
     return tuple(dict.fromkeys(facts.input("shadow_map").lights)) if facts.connected("shadow_map") else ()
 
 
+def map_layers(node: Node, facts: Facts) -> int:
+    """How many layers a connected shadow map has."""
+    desc = facts.input("shadow_map").desc if facts.connected("shadow_map") else None
+    return desc.layers if desc is not None else 0
+
+
 class MapTechnique(Node):
     """Base of the techniques that read a shadow map.
 

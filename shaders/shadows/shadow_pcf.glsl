@@ -1,6 +1,5 @@
-// Percentage-closer filtering (Reeves, Salesin and Cook 1987): TAPS x TAPS depth tests one texel apart, each weighted
-// bilinearly, which is (TAPS + 1) x (TAPS + 1) texels with the outer ones counted by the part that is covered. Four
-// tests come with one gather. One tap is the plain test of one texel.
+// Percentage-closer filtering (Reeves, Salesin and Cook 1987): the mean of depth tests around a place in the map, each
+// weighted bilinearly. Four tests come with one gather. One tap is the plain test of one texel.
 uniform sampler2DArrayShadow shadow_map;
 
 #if TAPS == 1
@@ -10,16 +9,26 @@ uniform sampler2DArrayShadow shadow_map;
 #endif
 
 #if TAPS == 1
-float map_visibility(int layer, vec3 place) {
+float filtered_tests(int layer, vec3 place) {
     return texture(shadow_map, vec4(place.xy, float(layer), place.z));
 }
+
+#elif KERNEL == KERNEL_BOX || KERNEL == KERNEL_TENT
+// TAPS x TAPS tests one texel apart are (TAPS + 1) x (TAPS + 1) texels, the outer ones counted in part.
+float weight(int tap) {
+#if KERNEL == KERNEL_TENT
+    return float(max(min(tap + 1, TAPS - tap), 0));
 #else
-// How much of texel `index` of TAPS + 1 the kernel covers, beginning at the fraction `start` of the first.
-float covered(int index, float start) {
-    return index == 0 ? 1.0 - start : index == TAPS ? start : index > TAPS ? 0.0 : 1.0;
+    return tap >= 0 && tap < TAPS ? 1.0 : 0.0;
+#endif
 }
 
-float map_visibility(int layer, vec3 place) {
+// How much texel `index` counts where the kernel begins at the fraction `start` of the first.
+float share(int index, float start) {
+    return mix(weight(index), weight(index - 1), start);
+}
+
+float filtered_tests(int layer, vec3 place) {
     vec2 size = vec2(textureSize(shadow_map, 0).xy);
     vec2 corner = place.xy * size - 0.5 * float(TAPS);
     vec2 first = floor(corner);
@@ -30,12 +39,59 @@ float map_visibility(int layer, vec3 place) {
             vec2 middle = (first + vec2(x + 1, y + 1)) / size;
             // Upper left, upper right, lower right, lower left.
             vec4 lit = textureGather(shadow_map, vec3(middle, float(layer)), place.z);
-            vec2 columns = vec2(covered(x, start.x), covered(x + 1, start.x));
-            vec2 rows = vec2(covered(y, start.y), covered(y + 1, start.y));
-            sum += dot(lit, vec4(columns.xyyx) * rows.yyxx);
+            vec2 columns = vec2(share(x, start.x), share(x + 1, start.x));
+            vec2 rows = vec2(share(y, start.y), share(y + 1, start.y));
+            sum += dot(lit, columns.xyyx * rows.yyxx);
         }
     }
-    return sum / float(TAPS * TAPS);
+#if KERNEL == KERNEL_TENT
+    const int total = ((TAPS + 1) / 2) * ((TAPS + 2) / 2);
+#else
+    const int total = TAPS;
+#endif
+    return sum / float(total * total);
+}
+
+#else
+#include "poisson_disc.glsl"
+
+float filtered_tests(int layer, vec3 place) {
+    vec2 size = vec2(textureSize(shadow_map, 0).xy);
+    mat2 turn = mat2(0.5 * float(TAPS));
+#if KERNEL == KERNEL_ROTATED
+    // Noise in which neighbouring pixels differ most (J. Jimenez, "Next Generation Post Processing in Call of Duty:
+    // Advanced Warfare", 2014).
+    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+    float angle = 6.28318531 * noise;
+    turn *= mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
+#endif
+    float sum = 0.0;
+    for (int i = 0; i < SAMPLES; ++i) {
+        vec2 corner = place.xy * size + turn * poisson_disc[i] - 0.5;
+        vec2 first = floor(corner);
+        vec2 start = corner - first;
+        vec4 lit = textureGather(shadow_map, vec3((first + 1.0) / size, float(layer)), place.z);
+        vec2 row = mix(lit.wx, lit.zy, start.x);
+        sum += mix(row.x, row.y, start.y);
+    }
+    return sum / float(SAMPLES);
+}
+#endif
+
+#ifdef HAS_EDGES
+uniform sampler2DArray edges;  // the least and the largest depth a kernel may meet that is centred in a tile
+
+float map_visibility(int layer, vec3 place) {
+    vec2 tiles = vec2(textureSize(edges, 0).xy);
+    ivec2 tile = ivec2(min(place.xy * tiles, tiles - 1.0));
+    vec2 range = texelFetch(edges, ivec3(tile, layer), 0).rg;
+    if (place.z <= range.x) return 1.0;
+    if (place.z > range.y) return 0.0;
+    return filtered_tests(layer, place);
+}
+#else
+float map_visibility(int layer, vec3 place) {
+    return filtered_tests(layer, place);
 }
 #endif
 

@@ -1,8 +1,9 @@
-"""Percentage-closer filtering: the function's text against brute force, the pipeline against ray-cast masks."""
+"""Percentage-closer filtering: every kernel against brute force, the pipeline against ray-cast masks."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,62 +12,79 @@ import numpy.typing as npt
 import pytest
 
 import rendergraph as rg
-from rendergraph.resources import folder
 
 Floats = npt.NDArray[np.float64]
+Bilinear = Callable[..., Floats]
 
 
-def brute_force(depth: Floats, u: float, v: float, receiver: float, taps: int) -> float:
-    """The mean of taps × taps bilinear comparisons one texel apart around (u, v), clamped at the border."""
-    lit = (receiver <= depth).astype(float)
-    size = depth.shape[0]
-    total = 0.0
-    for j in range(taps):
-        for i in range(taps):
-            x = u * size - 0.5 + i - (taps - 1) / 2
-            y = v * size - 0.5 + j - (taps - 1) / 2
-            x0, y0 = int(np.floor(x)), int(np.floor(y))
-            for dy, wy in ((0, 1 - (y - y0)), (1, y - y0)):
-                for dx, wx in ((0, 1 - (x - x0)), (1, x - x0)):
-                    total += wx * wy * lit[np.clip(y0 + dy, 0, size - 1), np.clip(x0 + dx, 0, size - 1)]
-    return total / taps**2
+def brute_force(
+    bilinear: Bilinear, depth: Floats, places: Floats, offsets: Floats, weights: Floats | None = None
+) -> Floats:
+    """The mean of bilinear tests at offsets in texels, (n, 2) or (…, n, 2)."""
+    each = [
+        bilinear(depth, places[..., 0] + o[..., 0] / depth.shape[1], places[..., 1] + o[..., 1] / depth.shape[0],
+                 np.minimum(places[..., 2], 1.0))
+        for o in np.moveaxis(offsets, -2, 0)
+    ]  # fmt: skip
+    return np.average(each, axis=0, weights=weights)
 
 
-def look_up(gl: Any, depth: Floats, places: Floats, taps: int) -> Floats:
-    """`map_visibility` of shadow_pcf.glsl at (u, v, receiver), in a compute shader."""
-    import moderngl
+def grid(taps: int) -> Floats:
+    """Offsets of taps × taps tests one texel apart."""
+    along = np.arange(taps) - (taps - 1) / 2
+    return np.stack(np.meshgrid(along, along), -1).reshape(-1, 2)
 
-    text = (folder("rendergraph.shaders") / "shadows" / "shadow_pcf.glsl").read_text().split("#include")[0]
-    source = f"""#version 450 core
-#define TAPS {taps}
-{text}
-layout(local_size_x = 1) in;
-layout(std430) buffer data_block {{ vec4 data[]; }};
-void main() {{
-    uint i = gl_GlobalInvocationID.x;
-    data[i].w = map_visibility(0, data[i].xyz);
-}}
-"""
-    # One layer: the same text over a plain depth texture, which moderngl can make.
-    for array, plain in (("sampler2DArrayShadow", "sampler2DShadow"), ("vec3(middle, float(layer))", "middle")):
-        assert array in source
-        source = source.replace(array, plain)
-    source = source.replace("vec4(place.xy, float(layer), place.z)", "place")
-    with gl:
-        program = gl.compute_shader(source)
-        texture = gl.depth_texture(depth.shape[::-1], depth.astype(np.float32).tobytes())
-        texture.compare_func = "<="
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        texture.repeat_x = texture.repeat_y = False
-        texture.use(0)
-        data = gl.buffer(np.concatenate([places, np.zeros((len(places), 1))], 1).astype(np.float32).tobytes())
-        data.bind_to_storage_buffer(0)
-        program.run(len(places))
-        gl.finish()
-        found = np.frombuffer(data.read(), np.float32).reshape(-1, 4)[:, 3].astype(np.float64)
-        for thing in (program, texture, data):
-            thing.release()
-    return found
+
+@pytest.mark.parametrize(("taps", "name"), [(1, "bilinear_2x2"), (3, "bilinear_3x3")])
+def test_brute_force_is_the_reference(shared: Path, bilinear: Bilinear, taps: int, name: str) -> None:
+    """What the node is compared with below is itself compared with numbers made by somebody else."""
+    folder = shared / "reference" / "b7_post"
+    depth = np.load(folder / "shadow_maps.npz")["pcf_depth"].astype(float)
+    for case in json.loads((folder / "values.json").read_text())["pcf"]["cases"]:
+        place = np.array([case["u"], case["v"], case["receiver"]])
+        assert brute_force(bilinear, depth, place, grid(taps)) == pytest.approx(case[name], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kernel", "taps", "edges"),
+    [("box", 2, "false"), ("box", 3, "true"), ("box", 4, "false"), ("box", 16, "true"), ("tent", 2, "false"),
+     ("tent", 5, "true"), ("tent", 16, "false"), ("poisson", 4, "false"), ("poisson", 16, "true"),
+     ("rotated", 3, "true"), ("rotated", 12, "false")],
+)  # fmt: skip
+def test_each_kernel_is_the_mean_of_its_tests(
+    look: Any, bilinear: Bilinear, poisson_disc: Floats, kernel: str, taps: int, edges: str
+) -> None:
+    sets = [f"shadows.{name}" for name in (f"taps={taps}", f"kernel={kernel}", "samples=24", f"edges_only={edges}")]
+    seen = look("shadow-pcf", *sets)
+    weights = None
+    offsets = grid(taps)
+    if kernel == "tent":
+        along = np.minimum(np.arange(taps) + 1, taps - np.arange(taps))
+        weights = np.outer(along, along).ravel()
+    elif kernel == "poisson":
+        offsets = poisson_disc[:24] * taps / 2
+    elif kernel == "rotated":
+        y, x = np.mgrid[0:64, 0:96] + 0.5
+        angle = 2 * np.pi * np.mod(52.9829189 * np.mod(0.06711056 * x + 0.00583715 * y, 1), 1)
+        turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], -1).reshape(64, 96, 2, 2)
+        offsets = np.einsum("yxij,nj->yxni", turn, poisson_disc[:24] * taps / 2)
+    expected = brute_force(bilinear, seen.depth, seen.places, offsets, weights)
+    ground = seen.seen & (np.abs(seen.position[..., 1]) < 1e-3)  # it is not in the map, so it does not meet itself
+    soft = ground & (expected > 0.01) & (expected < 0.99)
+    assert soft.sum() > 40
+    wrong = np.abs(seen.visibility - expected)[ground]
+    assert np.mean(wrong > 1e-3) < 2e-3  # a test may fall otherwise in single precision
+    assert np.mean(wrong) < 2e-4
+
+
+def test_points_on_the_disc_are_spread(poisson_disc: Floats) -> None:
+    assert poisson_disc.shape == (64, 2)
+    assert np.linalg.norm(poisson_disc, axis=1).max() <= 1
+    for n in (4, 8, 16, 24, 32, 48, 64):
+        some = poisson_disc[:n]
+        apart = np.linalg.norm(some[:, None] - some[None], axis=-1) + 9 * np.eye(n)
+        assert apart.min() * np.sqrt(n) > 1.4
+        assert np.linalg.norm(some.mean(0)) < 1.5 / n
 
 
 # --- pictures against ray casting ------------------------------------------------------------------------------------
