@@ -45,7 +45,7 @@ materials:
   glow: {base_color: [0.2, 0.2, 0.2], emissive: [2, 0.4, 0.1]}
   flat: {base_color: [0.9, 0.5, 0.1], unlit: true}
   sheet: {base_color: [0.2, 0.8, 0.3], double_sided: true}
-  brushed: {base_color: [0.9, 0.8, 0.6], metallic: 1, roughness: 0.4, anisotropy_strength: 0.8, anisotropy_rotation: 0.6}
+  brushed: {base_color: [0.9, 0.8, 0.6], metallic: 1, roughness: 0.4, anisotropy_strength: 0.8, anisotropy_rotation: 1}
 lights:
   sun: {type: directional, direction: [-0.5, -1, -0.6], intensity: 2}
   lamp: {type: point, at: [0, 2, 1.5], intensity: 4, range: 6}

@@ -105,7 +105,9 @@ def fragments(session: rg.Session, pipeline: rg.Pipeline) -> list[int]:
     return counts
 
 
-@pytest.mark.parametrize("name", ["a point light before the eye", "the eye on the volume's face", "a spot light"])
+@pytest.mark.parametrize(
+    "name", ["a point light before the eye", "the eye on the volume's face", "a spot light", "several and the sun"]
+)
 def test_a_light_is_computed_where_it_reaches(session: rg.Session, tmp_path: Path, name: str) -> None:
     """The pixels whose surface lies in the ball or cone, counted in NumPy, and few more: the volume has flat faces."""
     pipeline = rg.load("deferred-stencil-lights", scene=room(tmp_path, LIGHTS[name]), size=SIZE, sets=[FULL])
@@ -115,17 +117,19 @@ def test_a_light_is_computed_where_it_reaches(session: rg.Session, tmp_path: Pat
     y = 1 - (np.arange(SIZE[1]) + 0.5) / SIZE[1] * 2
     clip = np.stack([*np.meshgrid(x, y), depth * 2 - 1, np.ones_like(depth)], -1)
     world = clip @ np.linalg.inv(view.projection @ view.view).T
-    (light,) = pipeline.scene.lights
-    towards = world[..., :3] / world[..., 3:] - light.position
-    distance = np.linalg.norm(towards, axis=-1)
-    assert light.range is not None
-    reached = (distance < light.range) & (depth < 1)
-    if light.type == "spot":
-        reached &= towards @ np.asarray(light.direction) > distance * np.cos(light.outer)
-    everywhere, copied, _, shaded = fragments(session, pipeline)
+    everywhere, copied, *draws = fragments(session, pipeline)
     assert everywhere == copied == SIZE[0] * SIZE[1]
-    assert 200 < reached.sum() <= shaded <= 1.3 * reached.sum() + 20
-    assert shaded < 0.6 * SIZE[0] * SIZE[1]
+    local = [light for light in pipeline.scene.lights if light.type != "directional"]
+    assert len(draws) == 2 * len(local)
+    for light, shaded in zip(local, draws[1::2], strict=True):
+        towards = world[..., :3] / world[..., 3:] - light.position
+        distance = np.linalg.norm(towards, axis=-1)
+        assert light.range is not None
+        reached = (distance < light.range) & (depth < 1)
+        if light.type == "spot":
+            reached &= towards @ np.asarray(light.direction) > distance * np.cos(light.outer)
+        assert 200 < reached.sum() <= shaded <= 1.3 * reached.sum() + 20
+        assert shaded < 0.6 * SIZE[0] * SIZE[1]
 
 
 def test_two_draws_a_local_light() -> None:
