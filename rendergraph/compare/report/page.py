@@ -224,8 +224,8 @@ def _viewer(comparison: Comparison) -> str:
     )
     return f"""<div class="viewer" role="group" aria-label="Two pictures against each other">
 <div class="controls">
-<label>A <select data-a>{options(0)}</select></label>
-<label>B <select data-b>{options(min(1, len(pictures) - 1))}</select></label>
+<label>A <select data-a aria-label="Picture A">{options(0)}</select></label>
+<label>B <select data-b aria-label="Picture B">{options(min(1, len(pictures) - 1))}</select></label>
 <span class="group" role="group" aria-label="What is shown">{buttons}</span>
 <label>times <select data-gain>{gains}</select></label>
 <label>zoom <select data-zoom>{zooms}</select></label>

@@ -1,0 +1,108 @@
+"""`compare` and `sweep` as they are typed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SMALL = ("--size", "48x27", "-s", "sun.resolution=64")
+
+
+def test_compare_prints_a_table_and_writes_a_page(cli: Any, tmp_path: Path) -> None:
+    found = cli("compare", "forward", "forward-prepass", *SMALL, "-n", "2", "-o", "it's.html")
+    assert found.code == 0
+    assert "forward-prepass" in found.out
+    assert "FLIP" in found.out
+    assert "report: it's.html" in found.err
+    page = (tmp_path / "it's.html").read_text()
+    command = (
+        "rendergraph compare forward forward-prepass --size 48x27 -s sun.resolution=64 -n 2 -o &#x27;it&#x27;&quot;"
+    )
+    assert command in page
+
+
+def test_compare_speaks_json(cli: Any) -> None:
+    told = cli("compare", "forward", "forward", *SMALL, "-n", "1", "--json").json
+    assert [variant["name"] for variant in told["variants"]] == ["forward", "forward-2"]
+    for variant in told["variants"]:
+        assert (variant["rmse"], variant["psnr"], variant["ssim"], variant["flip"]) == (0, None, 1, 0)
+        assert "software rasteriser" not in json.dumps(variant)
+
+
+def test_beyond_a_threshold_is_exit_code_4(cli: Any) -> None:
+    words = ("compare", "forward", "shading-unlit", *SMALL, "-n", "1")
+    within = cli(*words, "--fail-above", "flip=0.9")
+    assert within.code == 0
+    beyond = cli(*words, "--fail-above", "flip=0.001", "--fail-above", "rmse=0.001", "--json")
+    assert beyond.code == 4
+    assert len(beyond.json["exceeded"]) == 2
+    assert "shading-unlit: flip is" in beyond.err
+    assert "above 0.001" in beyond.err
+    itself = cli("compare", "forward", "forward", *SMALL, "-n", "1", "--fail-above", "flip=0")
+    assert itself.code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("compare", "forward"), 2, "there is one pipeline and nothing to compare it with"),
+        (("compare", "forward", "forwrad"), 3, "RG015"),
+        (
+            ("compare", "forward", "forward", "--fail-above", "flpi=1"),
+            2,
+            "there is no metric 'flpi'; did you mean 'flip'?",
+        ),
+        (("compare", "forward", "forward", "--fail-above", "psnr=30"), 2, "psnr falls as errors grow"),
+        (("compare", "forward", "forward", "--fail-above", "flip=x"), 2, "is not METRIC=NUMBER, as in flip=0.02"),
+        (("compare", "forward", "forward", "-o", "page.pdf"), 2, "name it 'page.html'"),
+        (("compare", "forward", "forward", "-o", "none/page.html"), 3, "there is no folder 'none'"),
+        (("compare", "forward", "--reference", "missing.png"), 3, "RG350"),
+        (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
+        (("sweep", "forward", "-x", "shadows.taps=1"), 2, "Missing option".lower()),
+        (("sweep", "forward", "-x", "shadows.taps=", "-o", "out"), 2, "axis 'shadows.taps' has no values"),
+        (("sweep", "forward", "-x", "shadows.tap=1", "-o", "out"), 3, "did you mean 'taps'?"),
+    ],
+)
+def test_mistakes(cli: Any, words: tuple[str, ...], code: int, message: str) -> None:
+    found = cli(*words)
+    assert found.code == code
+    assert message in found.err
+
+
+def test_sweep_draws_keeps_and_resumes(cli: Any, tmp_path: Path) -> None:
+    words = (
+        "sweep",
+        "forward",
+        *SMALL,
+        "-x",
+        "shadows.taps=1,3",
+        "-x",
+        "display.curve=aces,none",
+        "-o",
+        "out",
+        "-n",
+        "1",
+    )
+    first = cli(*words)
+    assert first.code == 0
+    assert "4 runs against shadows.taps=1,display.curve=aces: 7 passes drawn, 12 one by one" in first.out
+    assert first.out.splitlines()[-1] == "out/report.html"
+    assert "Pareto front" in (tmp_path / "out" / "report.html").read_text()
+    assert cli(*words).code == 3
+    again = cli(*words, "--resume", "--json").json
+    assert (again["executed_passes"], again["resumed"], len(again["runs"])) == (0, 4, 4)
+    assert sum(run["pareto"] for run in again["runs"]) >= 1
+
+
+def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(
+        "sweep: 1\npipeline: forward\nsize: [48, 27]\nframes: 1\nset: {sun.resolution: 64}\n"
+        "axes: {shadows.taps: [1, 3]}\n"
+    )
+    told = cli("sweep", "study.yaml", "-x", "display.curve=aces,none", "-o", "out", "--json").json
+    assert told["axes"] == {"shadows.taps": ["1", "3"], "display.curve": ["aces", "none"]}
+    assert told["size"] == [48, 27]
+    assert len((tmp_path / "out" / "results.jsonl").read_text().splitlines()) == 4

@@ -1,0 +1,139 @@
+"""Graphs as one: what is the same is drawn once, and every picture is the one it was."""
+
+from __future__ import annotations
+
+import copy
+import random
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rendergraph as rg
+from rendergraph.compare.divergence import passes
+from rendergraph.compare.merge import merge
+from rendergraph.compare.together import batches, draw
+from rendergraph.link import Graph
+
+
+def distinct(graphs: Sequence[Graph]) -> int:
+    """Passes that differ in type, parameters or what they read, counted by writing all of it out; no cycles."""
+
+    def key(graph: Graph, name: str) -> tuple[Any, ...]:
+        node = graph[name]
+        reads = tuple(
+            (port, tuple((key(graph, end.node), end.port) for end in ends))
+            for port, ends in sorted(node.inputs.items())
+        )
+        return node.type.name, node.node.model_dump_json(), reads
+
+    return len({key(graph, name) for graph in graphs for name in needed(graph)})
+
+
+def needed(graph: Graph) -> set[str]:
+    """Nodes that are drawn."""
+    from rendergraph.allocate import allocate
+    from rendergraph.expand import expand
+    from rendergraph.schedule import schedule
+
+    return set(passes(allocate(schedule(expand(graph)))))
+
+
+def pictures(
+    session: rg.Session, variants: Sequence[rg.Pipeline], frame: int = 1, most_bytes: int = 1 << 30
+) -> list[Any]:
+    """Every variant's picture, drawn together."""
+    drawn: dict[int, Any] = {}
+    for batch in batches(variants, range(len(variants)), most_bytes):
+        for each in draw(session, variants, batch, 1, frame):
+            drawn[each.number] = each.arrays["radiance"]
+    return [drawn[number] for number in range(len(variants))]
+
+
+def alone(session: rg.Session, variants: Sequence[rg.Pipeline], frame: int = 1) -> list[Any]:
+    return [session.render(variant, frames=range(1, frame + 1))["radiance"] for variant in variants]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_variants_draw_each_distinct_pass_once_and_the_same_pictures(
+    make: Any, gl: rg.Session, seed: int
+) -> None:
+    chooser = random.Random(seed)
+    nodes = make.random_nodes(seed, 7)
+    variants = []
+    for _ in range(4):
+        other = copy.deepcopy(nodes)
+        for name in chooser.sample(list(nodes), 2):
+            if nodes[name]["type"] == "mix":
+                other[name].setdefault("params", {})["gain"] = chooser.choice([0.2, 0.8])
+        variants.append(make(other, f"{list(nodes)[-1]}.color"))
+    (batch,) = batches(variants, range(4))
+    assert batch.pass_count == distinct([variant.graph for variant in variants])
+    for together, own in zip(pictures(gl, variants, 3), alone(gl, variants, 3), strict=True):
+        np.testing.assert_array_equal(together, own)
+
+
+def test_ids_do_not_matter(make: Any) -> None:
+    a = make({"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}, "q.color")
+    b = make({"x": {"type": "pattern"}, "y": {"type": "mix", "inputs": {"a": "x.color"}}}, "y.color")
+    merged = merge([a.graph, b.graph])
+    assert [node.id for node in merged.graph.nodes] == ["p", "q"]
+    assert merged.names == ({"p": "p", "q": "q"}, {"x": "p", "y": "q"})
+    assert {str(end) for end in merged.graph.outputs.values()} == {"q.color"}
+
+
+def test_a_texture_that_two_continue_is_made_for_each(make: Any, gl: rg.Session) -> None:
+    def nodes(amount: float | None) -> dict[str, Any]:
+        found: dict[str, Any] = {
+            "p": {"type": "pattern"},
+            "early": {"type": "mix", "inputs": {"a": "p.color"}},
+            "late": {"type": "mix", "inputs": {"a": "early.color"}},
+        }
+        if amount is not None:
+            found["stamp"] = {"type": "stamp", "inputs": {"color": "p.color"}, "params": {"amount": amount}}
+            found["late"] = {"type": "mix", "inputs": {"a": "stamp.color", "b": "early.color"}}
+        return found
+
+    variants = [make(nodes(amount), "late.color") for amount in (0.25, 0.5, None, 0.25)]
+    merged = merge([variant.graph for variant in variants])
+    assert sum(node.type.name == "pattern" for node in merged.graph.nodes) == 3
+    for together, own in zip(pictures(gl, variants), alone(gl, variants), strict=True):
+        np.testing.assert_array_equal(together, own)
+
+
+def test_last_frame_closes_circles(make: Any, gl: rg.Session) -> None:
+    def nodes(gain: float) -> dict[str, Any]:
+        return {
+            "p": {"type": "pattern"},
+            "loop": {"type": "mix", "inputs": {"a": "p.color", "b": "loop.color@previous"}},
+            "end": {"type": "mix", "inputs": {"a": "loop.color"}, "params": {"gain": gain}},
+        }
+
+    variants = [make(nodes(gain), "end.color") for gain in (0.2, 0.8)]
+    (batch,) = batches(variants, range(2))
+    assert batch.pass_count == 4
+    for together, own in zip(pictures(gl, variants, 4), alone(gl, variants, 4), strict=True):
+        np.testing.assert_array_equal(together, own)
+
+
+def test_little_memory_means_several_batches(make: Any, gl: rg.Session) -> None:
+    nodes = {"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}
+    base = make(nodes, "q.color")
+    variants = [base.set("q.gain", gain / 10) for gain in range(6)]
+    few = batches(variants, range(6), most_bytes=4 * 8 * 8 * 16)
+    assert len(few) > 1
+    assert sorted(number for batch in few for number in batch.numbers) == list(range(6))
+    for together, own in zip(pictures(gl, variants, most_bytes=1), alone(gl, variants), strict=True):
+        np.testing.assert_array_equal(together, own)
+
+
+def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> None:
+    base = rg.load("forward-prepass", size=(48, 27))
+    variants = [base.set("sun.resolution", size).set("shadows.taps", taps) for size in (64, 256) for taps in (1, 3)]
+    forms = [rg.load("forward", size=(48, 27)).set("sun.resolution", size) for size in (64, 256)]
+    variants += [form.set("shadows.taps", 1) for form in forms]
+    (batch,) = batches(variants, range(6))
+    assert batch.pass_count == 1 + 2 + 4 + 4 + 4 + 2 + 2  # prepass, sun, shadows, light and display twice
+    for together, own in zip(pictures(gl, variants), alone(gl, variants), strict=True):
+        np.testing.assert_array_equal(together, own)

@@ -1,0 +1,172 @@
+"""The page: nothing to fetch, nothing that a name could break, and a viewer that works in a browser."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rendergraph as rg
+from rendergraph.compare.pictures import compare
+from rendergraph.compare.report import comparison_page
+from rendergraph.compare.report.scatter import Point, scatter_svg
+from rendergraph.compare.values import Comparison
+
+VOID = {"meta", "link", "img", "input", "path", "rect", "circle", "br"}
+
+
+@pytest.fixture(scope="module")
+def comparison(gl: rg.Session) -> Comparison:
+    base = rg.load("forward", size=(96, 54)).set("sun.resolution", 64)
+    return compare([base, base.set("shadows.taps", 1), rg.load("forward-prepass", size=(96, 54))], frames=2, session=gl)
+
+
+class Reader(HTMLParser):
+    """Collects what a page refers to, and whether its tags close each other."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.refers: list[str] = []
+        self.identities: list[str] = []
+        self.scripts = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.refers += [found[key] or "" for key in ("src", "href", "data", "action") if key in found]
+        self.identities += [found["id"] or ""] if "id" in found else []
+        self.scripts += tag == "script"
+        assert not any(name.startswith("on") for name in found)
+        if tag == "img":
+            assert "alt" in found
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert tag in VOID or self.open.pop() == tag
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    assert reader.open == []
+    return reader
+
+
+def test_the_page_holds_everything_it_shows(comparison: Comparison) -> None:
+    page = comparison_page(comparison, "rendergraph compare a b")
+    reader = read(page)
+    assert all(reference.startswith(("data:", "#")) for reference in reader.refers)
+    assert set(re.findall(r"https?://[^\"'\s)]+", page)) <= {"http://www.w3.org/2000/svg"}
+    assert len(reader.identities) == len(set(reader.identities))
+    for reference in reader.refers:
+        if reference.startswith("#"):
+            assert reference[1:] in reader.identities
+    assert reader.scripts == 1
+    for text in ("rendergraph compare a b", "light.radiance", "taps 3 → 1", "least peak", "FLIP against forward"):
+        assert text in page
+
+
+def test_software_times_say_so_wherever_they_stand(comparison: Comparison) -> None:
+    soft = comparison_page(replace(comparison, device={"renderer": "x", "software": True}), "c")
+    for identity in ("summary", "passes", "quality", "machine"):
+        part = soft.partition(f'<section id="{identity}"')[2].partition("</section>")[0]
+        assert "software rasteriser: no measure of a GPU" in part, identity
+    hard = comparison_page(replace(comparison, device={"renderer": "x", "software": False}), "c")
+    assert "rasteriser" not in hard
+
+
+HOSTILE = "</script><script>alert(1)</script>\"'&<b>"
+
+
+def test_names_are_text_everywhere(comparison: Comparison) -> None:
+    assert comparison.base is not None
+    results = [replace(result, name=f"{HOSTILE}{number}") for number, result in enumerate(comparison.results)]
+    graph = replace(comparison.base[1], name=HOSTILE)
+    hostile = replace(
+        comparison, results=tuple(results), base=(HOSTILE, graph), scene=HOSTILE, camera=HOSTILE, notes=(HOSTILE,),
+        device={HOSTILE: HOSTILE}, reference=replace(comparison.reference, name=HOSTILE, kind="file"),
+    )  # fmt: skip
+    page = comparison_page(hostile, HOSTILE)
+    assert "alert(1)</script>" not in page
+    assert "<b>" not in page
+    assert read(page).scripts == 1
+
+
+def test_a_scatter_shows_all_points_inside_and_the_front() -> None:
+    import xml.etree.ElementTree as ET
+
+    points = [Point(f"n{i}", 1.0 + i, 0.9 + i, 1.2 + i, 0.3 / (1 + i), i % 2 == 0) for i in range(20)]
+    root = ET.fromstring(scatter_svg([*points, Point("nan", 1, 1, 1, float("nan"), False)], "time", "error"))
+    dots = list(root.iter("{http://www.w3.org/2000/svg}circle"))
+    assert len(dots) == 20
+    assert all(0 < float(dot.attrib["cx"]) < 760 and 0 < float(dot.attrib["cy"]) < 380 for dot in dots)
+    assert sum(dot.attrib["class"] == "best" for dot in dots) == 10
+    ET.fromstring(scatter_svg([], "time", "error"))
+    ET.fromstring(scatter_svg([Point("zero", 0, 0, 0, 0, True)], "time", "error"))
+
+
+# --- in a browser ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    found = shutil.which("chromium") or shutil.which("chromium-headless-shell")
+    if found is None:
+        pytest.skip("no Chromium")
+    with sync_api.sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        yield started
+        started.close()
+
+
+@pytest.mark.slow
+def test_the_viewer_works_offline(comparison: Comparison, browser: Any, tmp_path: Path) -> None:
+    file = tmp_path / "report.html"
+    file.write_text(comparison_page(comparison, "rendergraph compare a b"), encoding="utf-8")
+    context = browser.new_context(offline=True, viewport={"width": 1200, "height": 900})
+    page = context.new_page()
+    said: list[str] = []
+    asked: list[str] = []
+    page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    over = page.locator("[data-over]")
+    slider = page.get_by_role("slider", name="Where A ends and B begins")
+    page.wait_for_function("document.querySelector('[data-over]').style.clipPath !== ''")
+    assert "50%" in over.evaluate("image => image.style.clipPath")
+    slider.focus()
+    for _ in range(20):
+        page.keyboard.press("ArrowRight")
+    assert slider.input_value() == "60"
+    assert "40%" in over.evaluate("image => image.style.clipPath")
+    assert slider.get_attribute("aria-valuetext") == "60 % A"
+    pile = page.locator("[data-frame]").bounding_box()
+    page.mouse.click(pile["x"] + pile["width"] * 0.25, pile["y"] + pile["height"] * 0.5)
+    assert float(slider.input_value()) == pytest.approx(25, abs=1)
+    page.get_by_role("button", name="Difference").click()
+    pixels = "c => [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data].filter((v, i) => i % 4 < 3 && v)"
+    canvas = page.locator("[data-canvas]")
+    assert canvas.is_visible()
+    assert slider.is_disabled()
+    assert len(canvas.evaluate(pixels)) > 0
+    page.get_by_label("Picture B").select_option("pic-0")
+    assert len(canvas.evaluate(pixels)) == 0
+    page.locator("body").press("b")
+    assert not over.is_visible()
+    page.locator("body").press("s")
+    assert over.is_visible()
+    assert page.locator(".drawing").first.evaluate("box => box.shadowRoot.querySelector('svg') !== null")
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert width <= 1200
+    assert said == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+    context.close()

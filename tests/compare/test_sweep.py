@@ -1,0 +1,218 @@
+"""The product of axes: what is drawn, what is kept, what is found again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rendergraph as rg
+from rendergraph.compare.axes import (
+    Axis,
+    check_axes,
+    combinations,
+    is_sweep,
+    parse_axis,
+    pipelines,
+    read_sweep,
+    run_name,
+)
+from rendergraph.compare.ledger import Ledger, checksum
+from rendergraph.compare.report import sweep_page
+from rendergraph.compare.sweep import pareto, sweep
+from rendergraph.errors import InputError
+from rendergraph.images import read
+
+AXES = tuple(parse_axis(x) for x in ("shadows.taps=1,3", "light.shading=pbr,phong", "display.curve=aces,none,neutral"))
+
+
+@pytest.fixture
+def base() -> rg.Pipeline:
+    return rg.load("forward", size=(48, 27)).set("sun.resolution", 128)
+
+
+def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
+    base: rg.Pipeline, gl: rg.Session, tmp_path: Path
+) -> None:
+    found = sweep(base, AXES, tmp_path / "out", frames=1, session=gl)
+    assert (found.executed, found.alone) == (1 + 2 * 2 + 2 * 2 * 3, 3 * 12)
+    assert len(found.comparison.results) == 12
+    for result in found.comparison.results:
+        alone = base
+        for path, value in result.settings.items():
+            alone = alone.set(path, value)
+        np.testing.assert_array_equal(gl.render(alone)["image"], result.pixels)
+        np.testing.assert_array_equal(read(tmp_path / "out" / result.name / "image.png"), result.pixels[..., :3])
+        told = json.loads((tmp_path / "out" / result.name / "run.json").read_text())
+        assert told["settings"] == result.settings
+        assert told["flip"] == result.metrics.flip
+        assert "nodes:" in told["resolved"]
+    assert found.comparison.results[0].metrics.flip == 0
+    records, torn = Ledger(tmp_path / "out" / "results.jsonl").read()
+    assert ([record["name"] for record in records], torn) == ([r.name for r in found.comparison.results], 0)
+    front = pareto(found.comparison.results)
+    assert found.comparison.results[0].name in {result.name for result in front}
+    assert "Pareto front" in sweep_page(found, "rendergraph sweep")
+
+
+def test_resuming_draws_what_is_missing_and_nothing_else(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    few = (AXES[0], Axis("display.curve", ("aces",)))
+    first = sweep(base, few, tmp_path, frames=1, session=gl)
+    with pytest.raises(InputError, match=r"RG525 '.*' has results of a sweep; --resume adds what is missing"):
+        sweep(base, few, tmp_path, frames=1, session=gl)
+    again = sweep(base, few, tmp_path, frames=1, resume=True, session=gl)
+    assert (again.executed, again.resumed) == (0, 2)
+    assert [r.metrics for r in again.comparison.results] == [r.metrics for r in first.comparison.results]
+    assert [r.times for r in again.comparison.results] == [r.times for r in first.comparison.results]
+    more = sweep(base, (AXES[0], Axis("display.curve", ("aces", "none"))), tmp_path, frames=1, resume=True, session=gl)
+    assert (more.executed, more.resumed) == (1 + 2 + 2, 2)
+    (tmp_path / first.comparison.results[1].name / "image.png").write_bytes(b"spoilt")
+    assert sweep(base, few, tmp_path, frames=1, resume=True, session=gl).resumed == 1
+    other = sweep(base.set("light.ambient", 0.1), few, tmp_path, frames=1, resume=True, session=gl)
+    assert other.resumed == 0
+
+
+def test_a_torn_line_is_left_out_and_the_file_goes_on(tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path / "results.jsonl")
+    ledger.append({"key": "a", "ssim": 0.5})
+    ledger.append({"key": "b", "name": "ä"})
+    whole = ledger.path.read_bytes()
+    ledger.path.write_bytes(whole[:-7])
+    assert ledger.read() == ([{"key": "a", "ssim": 0.5, "sha256": checksum({"key": "a", "ssim": 0.5})}], 1)
+    ledger.append({"key": "c"})
+    records, torn = ledger.read()
+    assert ([record["key"] for record in records], torn) == (["a", "c"], 1)
+    ledger.path.write_bytes(ledger.path.read_bytes().replace(b"0.5", b"0.6"))
+    assert ledger.read()[1] == 2
+    assert ledger.path.read_bytes().startswith(whole[:10])
+
+
+def test_batches_that_do_not_fit_are_split(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    together = sweep(base, AXES[:2], tmp_path / "a", frames=1, session=gl)
+    split = sweep(base, AXES[:2], tmp_path / "b", frames=1, most_bytes=1, session=gl)
+    assert split.executed == split.alone > together.executed
+    assert [r.metrics for r in split.comparison.results] == [r.metrics for r in together.comparison.results]
+
+
+def test_a_pipeline_or_a_picture_is_the_reference(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    truth = base.set("shadows.taps", 3)
+    gl.render(truth).save(tmp_path / "truth.png")
+    references: list[rg.Pipeline | Path] = [truth, tmp_path / "truth.png"]
+    for number, reference in enumerate(references):
+        found = sweep(base, AXES[:1], tmp_path / str(number), reference, frames=1, session=gl)
+        assert [result.metrics.flip == 0 for result in found.comparison.results] == [False, True]
+
+
+def test_types_are_an_axis(base: rg.Pipeline) -> None:
+    axes = [parse_axis("display.type=tonemap"), parse_axis("display.exposure=0,1")]
+    assert len(pipelines(base, combinations(axes))) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "axis"),
+    [
+        ("ao.samples=8,16, 32", Axis("ao.samples", ("8", "16", "32"))),
+        ("light.ambient=[0, 0, 0],0.1", Axis("light.ambient", ("[0, 0, 0]", "0.1"))),
+        ("a.b='x,y',\"z]\"", Axis("a.b", ("'x,y'", '"z]"'))),
+        ("samples=4", Axis("samples", ("4",))),
+        ("light.lookup=null,shadows.lookup", Axis("light.lookup", ("null", "shadows.lookup"))),
+    ],
+)
+def test_axes_are_read(text: str, axis: Axis) -> None:
+    assert parse_axis(text) == axis
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ao.samples", "is not PATH=VALUE,VALUE"),
+        ("=3", "is not PATH=VALUE,VALUE"),
+        ("ao.samples=", "axis 'ao.samples' has no values"),
+        ("ao.samples=1,,2", "has an empty value in '1,,2'"),
+        ("ao.samples=1,2,1", "has the value 1 twice"),
+    ],
+)
+def test_malformed_axes_are_told(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        parse_axis(text)
+
+
+def test_axes_as_a_whole_are_checked() -> None:
+    with pytest.raises(InputError, match="RG524 the sweep has no axis"):
+        check_axes([])
+    with pytest.raises(InputError, match=r"two axes are called 'a.b'"):
+        check_axes([Axis("a.b", ("1",)), Axis("a.b", ("2",))])
+    with pytest.raises(InputError, match="make 12000 runs, more than 10000"):
+        check_axes([Axis("a", tuple(map(str, range(120)))), Axis("b", tuple(map(str, range(100))))])
+
+
+def test_an_axis_that_names_nothing_is_told_once_with_the_right_name(base: rg.Pipeline) -> None:
+    axes = [parse_axis("shadows.tap=1,2,3"), parse_axis("dispaly.curve=aces"), parse_axis("light.shading=pbr,phnog")]
+    with pytest.raises(InputError) as caught:
+        pipelines(base, combinations(axes))
+    assert [str(problem) for problem in caught.value.problems] == [
+        "-x dispaly.curve=aces: RG109 there is no node 'dispaly'; did you mean 'display'?",
+        "-x shadows.tap=1: RG103 node 'shadows' (shadow_pcf) has no param or input 'tap'; did you mean 'taps'?",
+        "-x light.shading=phnog: RG104 'light.shading' takes one of unlit, phong, blinn_phong, anisotropic, pbr, "
+        "this is 'phnog'; did you mean 'phong'?",
+    ]
+
+
+def test_folders_have_names_that_every_system_takes() -> None:
+    assert run_name({"ao.samples": "8", "shadows.type": "shadow_vsm"}) == "ao.samples=8,shadows.type=shadow_vsm"
+    assert run_name({"a.b": "../../x y"}) == "a.b=.._.._x_y"
+    assert run_name({"": "//"}) == "="
+
+
+def test_a_sweep_is_a_file_too(tmp_path: Path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(
+        "sweep: 1\npipeline: forward\nscene: spheres\nsize: [48, 27]\nframes: 2\nreference: ./truth.png\n"
+        "set: {light.ambient: 0.1}\naxes:\n  shadows.taps: [1, 3]\n  light.shading: [pbr, phong]\n"
+    )
+    found = read_sweep(path)
+    assert is_sweep(path)
+    assert (found.pipeline, found.scene, found.size, found.frames) == ("forward", "spheres", (48, 27), 2)
+    assert found.reference == str(tmp_path / "truth.png")
+    assert found.sets == ("light.ambient=0.1",)
+    assert found.axes == (Axis("shadows.taps", ("1", "3")), Axis("light.shading", ("pbr", "phong")))
+
+
+def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text("sweep: 2\naxis: {a.b: [1]}\nsize: [48]\naxes: {a.b: [], c.d: 3, e.f: [1, 1]}\nframes: 0\n")
+    with pytest.raises(InputError) as caught:
+        read_sweep(path)
+    told = [f"{p.place.line if p.place else 0} {p.text}" for p in caught.value.problems]
+    assert told == [
+        "2 a sweep has no key 'axis'; did you mean 'axes'?",
+        "1 a sweep begins with 'sweep: 1'",
+        "1 the sweep names no pipeline; add pipeline: NAME",
+        "4 axis 'a.b' takes a list of values, this is an empty list",
+        "4 axis 'c.d' takes a list of values, this is a number",
+        "4 axis 'e.f' has the value 1 twice",
+        "3 'size' takes [WIDTH, HEIGHT], this is a list",
+        "5 'frames' takes a whole number from 1 up, this is a number",
+    ]
+
+
+def test_what_is_no_sweep_is_none(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("rendergraph: 1\n")
+    (tmp_path / "bad.yaml").write_text("{")
+    assert not any(is_sweep(tmp_path / name) for name in ("p.yaml", "bad.yaml", "missing.yaml"))
+
+
+def fake(ms: float, flip: float) -> Any:
+    from types import SimpleNamespace
+
+    return SimpleNamespace(
+        times=SimpleNamespace(headline=SimpleNamespace(median=ms)), metrics=SimpleNamespace(flip=flip)
+    )
+
+
+def test_the_front_is_what_nothing_beats() -> None:
+    slow, quick, worse, broken = fake(3, 0.1), fake(1, 0.5), fake(2, 0.6), fake(0.5, float("nan"))
+    assert pareto([slow, quick, worse, broken]) == [quick, slow]
