@@ -156,7 +156,8 @@ class Runner:
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
-        views.set_frame(time, delta, index)
+        if executable.reads_frame:
+            views.set_frame(time, delta, index)
         views.set(CAMERA, (camera,))
         if self._scene is None or self._scene.scene is not scene:
             self._scene = FrameScene(scene)
@@ -166,11 +167,13 @@ class Runner:
             for sort in executable.sorters:
                 sort(views)
             views.changed = False
-        if executable.fresh or not executable.device.owned:
+        fresh = executable.fresh or not executable.device.owned
+        if fresh:
             self.activate()
         parity = index % len(executable.steps)
-        for call in executable.binds[parity]:
-            call()
+        if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
+            for call in executable.binds[parity]:
+                call()
         if not timed:
             for step in executable.steps[parity]:
                 for call in step.calls:

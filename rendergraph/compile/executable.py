@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.gl.programs import Program
@@ -37,6 +38,7 @@ class Draw:
         call: the draw itself.
         binds: texture and buffer binds of its own; textures only where the driver's units ran out.
         vertex_array: what `call` draws with, for geometry.
+        textures: sampled name to its texture in this parity and its sampler, where that is a plain 2D texture.
     """
 
     program: Program
@@ -45,6 +47,7 @@ class Draw:
     call: Call
     binds: list[Call] = field(default_factory=list)
     vertex_array: Any = None
+    textures: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -111,7 +114,7 @@ class Executable:
         timers: one a step.
         buffers: draw commands.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
-        fresh: `statics` have to be written before the next frame.
+        fresh: `statics` have to be written and everything bound before the next frame.
     """
 
     device: Device
@@ -126,6 +129,12 @@ class Executable:
     buffers: list[moderngl.Buffer] = field(default_factory=list)
     vertex_arrays: Call = bool
     fresh: bool = True
+
+    @cached_property
+    def reads_frame(self) -> bool:
+        """Whether any program looks at the frame block."""
+        draws = (draw for step in self.steps[0] for draw in step.all_draws)
+        return any("frame_block" in draw.program.blocks for draw in draws)
 
     def assemble(self) -> None:
         """Fill every step's flat list from its draws, leaving out what changes nothing."""

@@ -35,6 +35,7 @@ _TOPOLOGY = {
     "triangles_adjacency": moderngl.TRIANGLES_ADJACENCY,
 }  # fmt: skip
 _ALL_BARRIERS = 0xFFFFFFFF
+_TEXTURE_2D = 0x0DE1
 
 
 def compile_plan(
@@ -95,9 +96,8 @@ class _Compiler:
             [self._step(step, position, parity) for position, step in enumerate(self.plan.schedule.steps)]
             for parity in range(self.memory.parities)
         ]
-        binds: list[list[Call]] = [
-            [*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()
-        ]
+        self._keep_units(steps)
+        binds: list[list[Call]] = [[*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()]
         made = Executable(self.device, self.plan, self.memory, self.views, binds, steps)
         made.sorters = list(self.geometry.sorters)
         made.buffers = list(self.geometry.buffers)
@@ -123,7 +123,32 @@ class _Compiler:
         self._target(step, compiled, parity)
         vertex_array = self.programs.vertex_array(program, ("none",), [])
         call = partial(vertex_array.render, moderngl.TRIANGLES, 3, 0, 1)
-        compiled.draws.append(Draw(program, uniforms, self._state(step, depth_default=False), call, binds))
+        draw = Draw(program, uniforms, self._state(step, depth_default=False), call, binds)
+        for read in step.reads:
+            if read.use == "sample" and read.name in program.uniforms:
+                part = self.memory.part(read.resource, parity, read)
+                if part.target == _TEXTURE_2D:
+                    draw.textures[read.name] = part.glo, self.memory.sampler(read.sampler)
+        compiled.draws.append(draw)
+
+    def _keep_units(self, steps: list[list[CompiledStep]]) -> None:
+        """Give a name that draws of one program read different textures under a unit of its own (see `Units`)."""
+        draws = [draw for compiled in steps for step in compiled for draw in step.all_draws]
+        users: dict[tuple[int, str], list[Draw]] = {}
+        for draw in draws:
+            for name in draw.uniforms:
+                users.setdefault((draw.program.glo, name), []).append(draw)
+        for (_, name), using in users.items():
+            samplers = {draw.textures[name][1] for draw in using if name in draw.textures}
+            alike = len(samplers) == 1 and all(name in draw.textures for draw in using)
+            if not alike or len({draw.uniforms[name] for draw in using}) == 1:
+                continue
+            unit = self.units.changing(samplers.pop())
+            if unit is None:
+                return
+            for draw in using:
+                draw.uniforms[name] = unit
+                draw.binds.append(self.units.bind(draw.textures[name][0], unit))
 
     def _draw(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, {"PASS_VIEW_COUNT": str(self._view_count(step))})

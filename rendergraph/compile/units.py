@@ -1,6 +1,8 @@
 """Texture units: each pair of texture and sampler has its own, bound once a frame.
 
-Where a pipeline has more pairs than the driver has units, the last ones are shared and bound by the step itself.
+Where a pipeline has more pairs than the driver has units, the last ones are shared and bound by the step itself. Where
+full-screen draws of one program read different textures under one name (a chain of blurs), the name keeps its unit and
+the draw binds its texture there: drivers look a program over anew when its samplers move to other units.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 from rendergraph.gl.device import Device
 
@@ -22,6 +25,8 @@ class Units:
     device: Device
     parities: int
     _pairs: dict[tuple[tuple[int, ...], int], int] = field(default_factory=dict)
+    _changing: list[int] = field(default_factory=list)
+    _wrapped: dict[int, Any] = field(default_factory=dict)
 
     def unit(self, textures: tuple[int, ...], sampler: int, taken: list[Callable[[], object]]) -> int:
         """The unit of a texture (one name a parity) with a sampler.
@@ -31,7 +36,7 @@ class Units:
         pair = (textures, sampler)
         if pair in self._pairs:
             return self._pairs[pair]
-        own = self.device.limits["units"] - SHARED_UNITS
+        own = self._own
         if len(self._pairs) < own:
             self._pairs[pair] = len(self._pairs)
             return self._pairs[pair]
@@ -39,13 +44,32 @@ class Units:
         taken.append(_Rebind(self.device, unit, textures, sampler))
         return unit
 
+    @property
+    def _own(self) -> int:
+        return self.device.limits["units"] - SHARED_UNITS
+
+    def changing(self, sampler: int) -> int | None:
+        """A unit with a sampler whose texture the draws bind; None where all are taken. Ask after the last `unit`."""
+        if len(self._pairs) + len(self._changing) >= self._own:
+            return None
+        self._changing.append(sampler)
+        return len(self._pairs) + len(self._changing) - 1
+
+    def bind(self, texture: int, unit: int) -> Callable[[], object]:
+        """A call that binds a plain 2D texture; moderngl's costs a quarter of a raw one."""
+        if texture not in self._wrapped:
+            self._wrapped[texture] = self.device.ctx.external_texture(texture, (1, 1), 4, 0, "f1")
+        return partial(self._wrapped[texture].use, unit)
+
     def binds(self) -> list[list[Callable[[], object]]]:
         """The calls that bind everything, a list a parity."""
-        raw, count = self.device.raw, len(self._pairs)
+        raw = self.device.raw
+        pairs = [*self._pairs, *(((0,), sampler) for sampler in self._changing)]
+        count = len(pairs)
         result: list[list[Callable[[], object]]] = []
         for parity in range(self.parities):
-            names = (ctypes.c_uint * max(1, count))(*(t[parity % len(t)] for t, _ in self._pairs))
-            samplers = (ctypes.c_uint * max(1, count))(*(sampler for _, sampler in self._pairs))
+            names = (ctypes.c_uint * max(1, count))(*(t[parity % len(t)] for t, _ in pairs))
+            samplers = (ctypes.c_uint * max(1, count))(*(sampler for _, sampler in pairs))
             calls: list[Callable[[], object]] = []
             if count:
                 calls = [

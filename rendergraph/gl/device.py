@@ -114,7 +114,9 @@ def _system_loader() -> Callable[[str], int]:
             continue
         function.argtypes, function.restype = [ctypes.c_char_p], ctypes.c_void_p
         return lambda wanted: function(wanted.encode()) or 0
-    raise DeviceError(Problem("RG611", "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more"))
+    raise DeviceError(
+        Problem("RG611", "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more")
+    )
 
 
 def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
