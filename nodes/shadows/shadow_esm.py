@@ -1,0 +1,32 @@
+"""Exponential shadow maps."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rendergraph.api import Function, ShadowLookup, param
+
+from ._filtered_map import FilteredMap
+
+
+class ShadowESM(FilteredMap):
+    """Shadows from the mean of an exponential of depth (Annen, Mertens, Seidel, Flerackers and Kautz 2008).
+
+    The step of the depth test is replaced by `exp(exponent · (z - t))`, at most 1, for something at depth z before a
+    receiver at t. It is a product of a part for each, so the map's part is filtered once a frame, in a single channel.
+    Light leaks in close behind a caster, up to about 3 / `exponent` of the range, and where the filter sees something
+    farther off than the receiver the shadow's edge is eaten away.
+    """
+
+    across: ClassVar[str] = "shadow_esm_across.frag"
+    texel: ClassVar[str] = "r32f"
+
+    lookup = Function(
+        ShadowLookup, "shadow_esm.glsl",
+        reads=(FilteredMap.filtered.sampled("linear"), FilteredMap.covered.sampled("linear")),
+        doc="Visibility, for shaders to call.",
+    )  # fmt: skip
+
+    exponent: float = param(
+        default=80.0, min=1, max=80, doc="How steep, depth being 0 to 1 over the range of the light's view."
+    )
