@@ -19,6 +19,8 @@ from rendergraph.steps import Read, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 _TEXTURE_LABEL = 0x1702
+_STATUS = {0x8CD6: "INCOMPLETE_ATTACHMENT", 0x8CD7: "MISSING_ATTACHMENT", 0x8CDD: "UNSUPPORTED",
+           0x8D56: "INCOMPLETE_MULTISAMPLE", 0x8DA8: "INCOMPLETE_LAYER_TARGETS"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,12 @@ class Attachment:
     texture: GpuTexture
     mip: int = 0
     layer: int | None = None
+
+    def __str__(self) -> str:
+        desc = self.texture.desc
+        kind = desc.kind if self.layer is None else f"layer {self.layer} of a {desc.kind}"
+        samples = f", {desc.samples} samples" if desc.samples > 1 else ""
+        return f"a {desc.format} {kind} ({desc.width}×{desc.height}{samples})"
 
 
 @dataclass(eq=False)
@@ -138,7 +146,12 @@ class Memory:
                 raw.glNamedFramebufferTexture(made.glo, 0x8D00, 0, 0)
             self._attach(made.glo, 0x821A if stencil else 0x8D00, depth)
         status = raw.glCheckNamedFramebufferStatus(made.glo, 0x8D40)
-        assert status == 0x8CD5, f"framebuffer incomplete: {status:#x} for {colors} {depth}"
+        if status != 0x8CD5:
+            made.release()
+            every = " with ".join(str(target) for target in (*colors, depth) if target is not None)
+            text = (f"the driver does not draw to {every} ({_STATUS.get(status, hex(status))}); "
+                    "targets of one step are all layered or none, of one number of samples")  # fmt: skip
+            raise RenderError(Problem("RG617", text))
         made.viewport = (0, 0, *size)
         if colors:
             masks: Any = color_mask if len(colors) == 1 else (color_mask,) * len(colors)
@@ -200,14 +213,26 @@ def check_size(needed: int) -> None:
     if named.isdigit():
         limit = int(named) * 2**20
     else:
-        try:
-            limit = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") * 3 // 4
-        except (ValueError, OSError):
+        available = _available()
+        if available is None:
             return  # this system does not say
+        limit = available * 3 // 4
     if needed > limit:
         text = (f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used; a smaller "
                 "--size helps, RENDERGRAPH_MEMORY_LIMIT=MiB sets the limit")  # fmt: skip
         raise RenderError(Problem("RG616", text))
+
+
+def _available() -> int | None:
+    """Bytes of memory that can be had: what the system would give up of its file cache counts too."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError):
+        return None
 
 
 def _key(attachment: Attachment | None) -> tuple[object, ...] | None:

@@ -61,6 +61,8 @@ def declaration_mistakes(cls: type[Node]) -> list[str]:
                 mistakes.append(f"port '{name}' has an unknown format '{port.format}'")
             if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
                 mistakes.append(f"port '{name}' has neither a semantic nor `like`")
+            if isinstance(port, History) and port.kind == "buffer":
+                mistakes.append(f"'{name}' is a History of a buffer; only textures keep last frame's values")
             for rule in ("like", "view", "lights"):
                 target = getattr(port, rule)
                 if isinstance(target, str) and target not in ports:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +10,7 @@ from rendergraph.declare import Function, History, InOut, Input, Internal, Made,
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import Recorder, now
+from rendergraph.expand.recording import Recorder, author_line, author_problem, now
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -22,7 +22,7 @@ class Numbering:
     Attributes:
         version: resource id to its newest version so far.
         at_end: port to its resource and the version it has when its node is done.
-        written: resource id to the parts (mip, layer) written so far.
+        written: resource id to the parts (mip, layer or None for all) written so far.
     """
 
     def __init__(
@@ -34,29 +34,40 @@ class Numbering:
         self.wanted = wanted
         self.version: dict[str, int] = {}
         self.at_end: dict[Endpoint, tuple[str, int]] = {}
-        self.written: dict[str, set[tuple[int | None, int | None]]] = {}
+        self.written: dict[str, set[tuple[int, int | None]]] = {}
         self.resources: dict[str, Resource] = {}
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
+        self.passed = dict(_passed(graph, recorders))
 
     def expansion(self) -> Expansion:
         """Number everything that was recorded."""
-        for name, recorder in self.recorders.items():
-            self._declare(recorder)
-            before = len(self.steps)
-            for request in recorder.requests:
-                self.steps.append(self._step(recorder, request, len(self.steps) - before))
-            if len(self.steps) == before and not any(
-                isinstance(port, Function | Views) and port.name in recorder.used_ports
-                for port in recorder.node.node.outputs().values()
-            ):
-                self.idle[name] = "it recorded no step"
-            for port in recorder.node.node.ports().values():
-                if isinstance(port, Made):
-                    self._finish(recorder, port)
+        for recorder in self.recorders.values():
+            try:
+                self._node(recorder)
+            except InputError:
+                raise
+            except Exception as error:  # rules of ports (`clear`, `filter`, `count`) are the author's functions
+                if not author_line(recorder.node, error):
+                    raise
+                raise InputError(author_problem(recorder.node, error)) from error
         wanted = self._wanted()
         self._mark_roles(wanted)
         return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
+
+    def _node(self, recorder: Recorder) -> None:
+        self._declare(recorder)
+        before = len(self.steps)
+        for request in recorder.requests:
+            self.steps.append(self._step(recorder, request, len(self.steps) - before))
+        if len(self.steps) == before and not any(
+            isinstance(port, Function | Views) and port.name in recorder.used_ports
+            for port in recorder.node.node.outputs().values()
+        ):
+            self.idle[recorder.node.id] = "it recorded no step"
+        for port in recorder.node.node.ports().values():
+            if isinstance(port, Made):
+                self._finish(recorder, port)
 
     def _declare(self, recorder: Recorder) -> None:
         """Give every texture the node may write a resource; an `InOut` continues somebody's."""
@@ -70,7 +81,7 @@ class Numbering:
             if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recorder.links.get(port.name):
-                self.at_end[end] = self.at_end[now(recorder.links[port.name][0])]
+                self.at_end[end] = self.at_end[self._behind(recorder.links[port.name][0])]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -82,6 +93,23 @@ class Numbering:
             self.version[resource.id] = 0
             self.written[resource.id] = set()
             self.at_end[end] = (resource.id, 0)
+
+    def _behind(self, end: Endpoint) -> Endpoint:
+        """The port of this frame that a link leads to; through nodes that have nothing to add to what they continue."""
+        end = now(end)
+        while end in self.passed:
+            end = self.passed[end]
+        return end
+
+    def _maker(self, end: Endpoint) -> Endpoint:
+        """The port that first made what a port carries, however often it is continued between."""
+        end = now(end)
+        while True:
+            node = self.graph[end.node]
+            continued = isinstance(node.node.ports()[end.port], InOut) and node.inputs.get(end.port)
+            if not continued:
+                return end
+            end = now(continued[0])
 
     def _finish(self, recorder: Recorder, port: Made) -> None:
         end = Endpoint(recorder.node.id, port.name)
@@ -107,6 +135,8 @@ class Numbering:
             read, write = self._write(recorder, request, name, part, options.get("value"))
             reads += read
             writes.append(write)
+        for write in writes:
+            self._check_feedback(recorder, request, write, [*reads, *(read for f in functions for read in f.reads)])
         view, view_index = self._view(recorder, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = self._target_size(writes, reads)
@@ -161,7 +191,7 @@ class Numbering:
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: str, version: int | None = None
     ) -> Read:
-        resource, at_end = self.at_end[now(end)] if now(end) in self.at_end else (str(now(end)), 0)
+        resource, at_end = self.at_end.get(self._behind(end)) or (str(self._maker(end)), 0)
         desc = self._desc_of(end, resource)
         if isinstance(desc, BufferDesc):
             use = "buffer"
@@ -195,10 +225,9 @@ class Numbering:
         old = self.version[resource]
         self.version[resource] = old + 1
         continued = isinstance(port, InOut) and bool(recorder.links.get(port.name))
-        key = (part.mip, part.layer)
-        parts = self.written[resource]
-        fresh = not continued and not (key in parts or (None, None) in parts)
-        parts.add(key)
+        parts, touched = self.written[resource], _parts_written(request, part, desc)
+        fresh = not continued and not any(_overlap(one, other) for one in parts for other in touched)
+        parts |= touched
         clear = port.clear(recorder.node.node) if callable(port.clear) else port.clear
         if request.kind == "clear":
             load, clear = "clear", value
@@ -222,6 +251,20 @@ class Numbering:
         value = 0.0 if clear is None else clear
         write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
+
+    def _check_feedback(self, recorder: Recorder, request: Request, write: Write, reads: Iterable[Read]) -> None:
+        """What a step samples it must not write: drivers give old texels, new ones, or some of each."""
+        state = request.options.get("state")
+        if write.use == "depth" and state is not None and state.depth_write is False:
+            return
+        for read in reads:
+            if read.resource != write.resource or read.previous or read.use != "sample":
+                continue
+            if read.mip not in (None, write.mip or 0) or not _overlap((0, read.layer), (0, write.layer)):
+                continue
+            text = (f"node '{recorder.node.id}' samples '{read.resource}' in the step that writes it; "
+                    "blend, sample another mip or layer, or go through an `Internal`")  # fmt: skip
+            raise InputError(Problem("RG422", text, recorder.node.place))
 
     def _view(self, recorder: Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
         port = options.pop("view", None)
@@ -299,6 +342,7 @@ class Numbering:
     def _wanted(self) -> dict[str, str]:
         wanted: dict[str, str] = {}
         for name, end in self.wanted.items():
+            end = self._behind(end)
             if end not in self.at_end or end.node in self.idle:
                 reason = self.idle.get(end.node, "it makes no texture")
                 text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
@@ -319,7 +363,34 @@ class Numbering:
 
     def _mark_roles(self, wanted: dict[str, str]) -> None:
         previous = {read.resource for step in self.steps for read in step.all_reads if read.previous}
+        for end in self.graph.textures:
+            if str(end) in previous and str(end) not in self.resources:  # its node is idle: it stays as it first was
+                port, info = self.graph[end.node].node.ports()[end.port], self.graph.textures[end]
+                assert isinstance(port, Made) and info.desc is not None
+                self.resources[str(end)] = Resource(str(end), info.desc, "history", port.first, info.view, info.lights)
         for name in set(wanted.values()) | previous:
             resource = self.resources[name]
             role: Role = "history" if name in previous or resource.role == "history" else "output"
             self.resources[name] = replace(resource, role=role)
+
+
+def _passed(graph: Graph, recorders: Mapping[str, Recorder]) -> Iterator[tuple[Endpoint, Endpoint]]:
+    """What an idle node would continue, by its port: without it the texture is what it was."""
+    for node in graph.nodes:
+        for name, port in node.node.ports().items() if node.id not in recorders else ():
+            if isinstance(port, InOut) and node.inputs.get(name):
+                yield Endpoint(node.id, name), now(node.inputs[name][0])
+
+
+def _parts_written(request: Request, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
+    """Mips and layers a request leaves something in: a clear means the whole texture, a mip chain all but mip 0."""
+    mips = desc.mips if isinstance(desc, TextureDesc) else 1
+    if request.kind == "mipmaps":
+        return {(mip, None) for mip in range(1, mips)}
+    if request.kind == "clear" and part.mip is None:
+        return {(mip, part.layer) for mip in range(mips)}
+    return {(part.mip or 0, part.layer)}
+
+
+def _overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
+    return one[0] == other[0] and (one[1] == other[1] or None in (one[1], other[1]))

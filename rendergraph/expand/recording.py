@@ -126,15 +126,18 @@ def record_all(
         reason = _nothing_to_do(graph, node, used)
         if reason:
             idle[name] = reason
+            for port in used:  # what it would continue is passed on as it is
+                for end in node.inputs.get(port, ()):
+                    demanded[end.node].add(end.port)
             continue
         recorder = Recorder(graph, node, used)
         steps = Steps(node.node, name, node.type.name, recorder)
         try:
             node.node.record(steps)
-        except (InputError, AssertionError, KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(_author_problem(node, error)) from error
+        except InputError:
+            raise
+        except Exception as error:  # whatever a stranger's node raises is a mistake in that node
+            raise InputError(author_problem(node, error)) from error
         recorders[name] = recorder
         for end in recorder.demands():
             demanded[end.node].add(end.port)
@@ -154,11 +157,17 @@ def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
     return None
 
 
-def _author_problem(node: GraphNode, error: Exception) -> Problem:
+def author_line(node: GraphNode, error: Exception) -> str:
+    """The line of the node's own module that an error came through, as `file:line: `; empty where there is none."""
     import traceback
 
     frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(node.type.file)]
-    where = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
+    return f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
+
+
+def author_problem(node: GraphNode, error: Exception) -> Problem:
+    """What a node's own code raised, with the author's line."""
+    where = author_line(node, error)
     text = f"node '{node.id}' ({node.type.name}) failed while recording: {where}{type(error).__name__}: {error}"
     return Problem("RG420", text, node.place)
 

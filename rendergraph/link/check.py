@@ -47,7 +47,7 @@ class Checker:
         given, taken = kind_of(source, info), port.kind
         if isinstance(port, InOut) and port.like is not None and given in TEXTURE_KINDS:
             taken = given  # type: ignore[assignment]
-        if link.source.previous and (isinstance(port, InOut) or given in ("function", "view")):
+        if link.source.previous and (isinstance(port, InOut) or given in ("function", "view", "buffer")):
             what = "continues a texture of this frame" if isinstance(port, InOut) else f"takes a {given}"
             text = f"'{bound.spec.id}.{port.name}' {what}, which has no last frame's value; leave '@previous' out"
             self.problems.append(link.value.problem("RG127", text))
@@ -204,7 +204,7 @@ class Checker:
     def _resizing(self, info: TextureInfo) -> Accepts:
         return lambda cls: any(
             port.size == "any" and _means(port, info.semantic, any_too=True)
-            and any(_continues(out, port, info) and out.like is None and out.size == 1.0 for out in _outputs(cls))
+            and any(_continues(out, port, info) and out.like is None and out.size in (None, 1.0) for out in _outputs(cls))
             for port in _only_input(cls)
         )  # fmt: skip
 

@@ -48,6 +48,16 @@ class Backwards(Node):
         steps.fullscreen("a.frag", out=self.source)
 
 
+class Feedback(Node):
+    """Samples its target."""
+
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.clear(self.color)
+        steps.fullscreen("a.frag", source=self.color, out=self.color)
+
+
 class Viewless(Node):
     """Sets no view."""
 
@@ -61,7 +71,9 @@ class Viewless(Node):
         frame.set_views(self.views, [])
 
 
-@pytest.mark.parametrize(("code", "node"), [("RG420", Broken), ("RG421", Backwards), ("RG433", Viewless)])
+@pytest.mark.parametrize(
+    ("code", "node"), [("RG420", Broken), ("RG421", Backwards), ("RG422", Feedback), ("RG433", Viewless)]
+)
 def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
     shaders = {"a.frag": "out vec4 color; void main() { color = vec4(1.0); }"}
     text = f"nodes:\n        a: {{type: {node.__name__.lower()}}}\noutputs: {{image: a.color}}"
@@ -107,6 +119,20 @@ def test_devices_memory_and_threads(gl: rg.Session, monkeypatch: pytest.MonkeyPa
     thread.start()
     thread.join()
     assert errors == [page("RG615")["message"]]
+
+
+class Mixed(Node):
+    """Draws to a texture and an array at once."""
+
+    color = Output(AnyTexel, format="r32f", doc="One.")
+    layers = Output(AnyTexel, kind="texture2d_array", layers=2, format="r32f", doc="Two.")
+
+
+def test_targets_that_no_driver_draws_together(bench: Any) -> None:
+    shaders = {"mixed.frag": "out float color; out float layers; void main() { color = layers = 1.0; }"}
+    with pytest.raises(RendergraphError, match="RG617") as caught:
+        bench.draw("nodes: {m: {type: mixed}}\noutputs: {image: m.color, two: m.layers}", Mixed, shaders=shaders)
+    assert said(caught.value) == page("RG617")["message"]
 
 
 def test_every_code_that_is_raised_has_one_page_and_every_page_a_code() -> None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import History, Input, Luminance, Node, Output, Steps
+from rendergraph.api import ADD, History, InOut, Input, Luminance, Node, Output, State, Steps
+from rendergraph.declare import declaration_mistakes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,3 +71,83 @@ def test_history_starts_afresh_in_every_run(draw: Draw) -> None:
     first = draw(text, Counter, shaders=SHADERS, frames=range(1, 4))["image"]
     again = draw(text, Counter, shaders=SHADERS, frames=range(1, 4))["image"]
     np.testing.assert_array_equal(first, again)
+
+
+class Halve(Node):
+    """Half of what comes in."""
+
+    old = Input(AnyTexel, doc="What to halve.")
+    color = Output(AnyTexel, format="r32f", doc="Half.")
+
+
+class Plus(Node):
+    """Adds 1."""
+
+    color = InOut(AnyTexel, doc="One more.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("plus.frag", out=self.color, state=State(blend=ADD))
+
+
+CONTINUED = {
+    "halve.frag": """uniform sampler2D old; out float color;
+        void main() { color = texelFetch(old, ivec2(gl_FragCoord.xy), 0).r * 0.5; }""",
+    "plus.frag": "out float color; void main() { color = 1.0; }",
+}
+
+
+def test_the_last_frame_of_a_texture_that_nodes_further_down_continue(draw: Draw) -> None:
+    text = """nodes:
+  half: {type: halve, inputs: {old: plus.color@previous}}
+  plus: {type: plus, inputs: {color: half.color}}
+outputs: {image: plus.color}"""
+    assert np.all(draw(text, Halve, Plus, shaders=CONTINUED, frames=range(1, 4))["image"] == 1.75)
+
+
+class Nothing(Node):
+    """An array of no layers."""
+
+    layers = Output(AnyTexel, kind="texture2d_array", layers=lambda node, facts: 0, doc="None.")
+
+
+class Needy(Node):
+    """Continues a texture, or makes one, where there are layers to read."""
+
+    layers = Input(AnyTexel, kind="texture2d_array", size="any", doc="Layers.")
+    color = InOut(AnyTexel, optional=True, format="r32f", first=8.0, doc="What it continues.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("plus.frag", layers=self.layers, out=self.color)
+
+
+def test_a_node_with_nothing_to_read_passes_on_what_it_would_continue(draw: Draw) -> None:
+    text = """nodes:
+  none: {type: nothing}
+  first: {type: plus}
+  idle: {type: needy, inputs: {layers: none.layers, color: first.color}}
+  last: {type: plus, inputs: {color: idle.color}}
+outputs: {image: last.color, between: idle.color}"""
+    plain = text.replace("{type: plus}", "{type: halve, inputs: {old: last.color@previous}}")
+    frame = draw(plain, Nothing, Halve, Plus, Needy, shaders=CONTINUED, frames=range(1, 3))
+    assert np.all(frame["image"] == 1.5)
+    assert np.all(frame["between"] == 0.5)
+    assert frame.culled["idle"] == "none.layers has no layers: there is nothing to read"
+
+
+def test_last_frame_s_value_of_a_node_that_does_nothing_is_its_first(draw: Draw) -> None:
+    text = """nodes:
+  none: {type: nothing}
+  idle: {type: needy, inputs: {layers: none.layers}}
+  half: {type: halve, inputs: {old: idle.color@previous}}
+outputs: {image: half.color}"""
+    assert np.all(draw(text, Nothing, Halve, Needy, shaders=CONTINUED, frames=range(1, 3))["image"] == 4)
+
+
+def test_buffers_have_no_history() -> None:
+    class Tally(Node):
+        """Keeps a buffer."""
+
+        color = Output(AnyTexel, doc="Nothing.")
+        count = History(kind="buffer", bytes=16)
+
+    assert declaration_mistakes(Tally) == ["'count' is a History of a buffer; only textures keep last frame's values"]
