@@ -123,8 +123,6 @@ def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[An
     desc = texture.desc
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
-    if FORMATS[desc.format].srgb:
-        gl_type, dtype = _FLOAT, np.float32  # linear values, not the encoded bytes
     texels = np.empty((desc.layers, height, width, channels), dtype)
     device.ctx.finish()
     device.raw.glBindBuffer(0x88EB, 0)  # PIXEL_PACK_BUFFER: a borrowed context may have left one
@@ -137,6 +135,11 @@ def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[An
         raise RenderError(Problem("RG613", f"reading back a {desc.format} texture failed ({error})"))
     if FORMATS[desc.format].family == "depth_stencil":
         texels = texels[..., :1]
+    if FORMATS[desc.format].srgb:  # drivers hand out the encoded bytes; what the texels mean is linear
+        linear = np.arange(256) / 255
+        linear = np.where(linear <= 0.04045, linear / 12.92, ((linear + 0.055) / 1.055) ** 2.4)
+        colors, alpha = linear.astype(np.float32)[texels[..., :3]], texels[..., 3:] / np.float32(255)
+        texels = np.concatenate([colors, alpha], axis=-1)
     return texels[:, ::-1]
 
 
@@ -183,6 +186,9 @@ class Clear:
             values[0] = given[0]
         else:
             values[:] = given[:channels].astype(dtype) if np.issubdtype(dtype, np.floating) else given[:channels]
+        if FORMATS[desc.format].srgb:  # a clear stores what it is given, where drawing encodes it
+            color = np.clip(values[:3], 0.0, 1.0)
+            values[:3] = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
         self._values = values  # kept alive: the calls below hold its address
         self._clear = device.raw.glClearTexSubImage
         levels = range(desc.mips) if mip is None else (mip,)

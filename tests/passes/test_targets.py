@@ -271,3 +271,59 @@ def test_signed_normalised_texels_keep_their_sign_and_16_bits(draw: Draw) -> Non
     shaders = {"signed.frag": "out vec4 color; void main() { color = vec4(-1.0, -0.3, 0.7, 2.0); }"}
     image = draw("nodes: {s: {type: signed}}\noutputs: {image: s.color}", Signed, shaders=shaders)["image"]
     np.testing.assert_allclose(image[0, 0], [-1, -0.3, 0.7, 1], atol=0.5 / 32767 + 1e-7)
+
+
+class Levels(Node):
+    """Draws mip 0, and nothing into mip 1."""
+
+    color = Output(AnyTexel, format="r32f", mips=2, clear=3.0, doc="Two levels.")
+    shown = Output(AnyTexel, format="r32f", doc="Mip 1.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("one.frag", out={"r": self.color})
+        steps.fullscreen("none.frag", out={"r": self.color.mip(1)})
+        steps.fullscreen("first.frag", source=self.color.mip(1), out={"r": self.shown})
+
+
+def test_a_mip_that_is_drawn_to_first_is_cleared_like_the_port_says(draw: Draw) -> None:
+    shaders = {
+        "one.frag": "out float r; void main() { r = 1.0; }",
+        "none.frag": "out float r; void main() { discard; }",
+        "first.frag": "uniform sampler2D source; out float r; void main() { r = texelFetch(source, ivec2(0), 0).r; }",
+    }
+    image = draw("nodes: {a: {type: levels}}\noutputs: {image: a.shown}", Levels, shaders=shaders, poison=True)["image"]
+    assert np.all(image == 3)
+
+
+class Drawn(Node):
+    """A quarter, drawn."""
+
+    color = Output(AnyTexel, format="srgb8_a8", doc="A quarter.")
+
+
+class Cleared(Node):
+    """A quarter, by a step that clears."""
+
+    color = Output(AnyTexel, format="srgb8_a8", doc="A quarter.")
+
+    def record(self, steps: Steps) -> None:
+        steps.clear(self.color, 0.25)
+
+
+def test_srgb_texels_are_linear_however_they_come_about(draw: Draw) -> None:
+    shaders = {"drawn.frag": "out vec4 color; void main() { color = vec4(0.25); }"}
+    for node in (Drawn, Cleared):
+        text = f"nodes: {{a: {{type: {node.__name__.lower()}}}}}\noutputs: {{image: a.color}}"
+        np.testing.assert_allclose(draw(text, node, shaders=shaders)["image"], 0.25, atol=0.004)
+
+
+def test_srgb_texels_are_read_back_linear(draw: Draw) -> None:
+    class Encoded(Node):
+        """Linear values into a format that stores them encoded."""
+
+        color = Output(Radiance, format="srgb8_a8", doc="Four numbers.")
+
+    shaders = {"encoded.frag": "out vec4 color; void main() { color = vec4(0.5, 0.05, 0.001, 0.5); }"}
+    image = draw("nodes: {s: {type: encoded}}\noutputs: {image: s.color}", Encoded, shaders=shaders)["image"]
+    np.testing.assert_allclose(image[0, 0], [0.5, 0.05, 0.001, 0.5], atol=0.003)
+    assert abs(image[0, 0, 2] - 0.001) < 2e-4  # linear near black: a step is 1/255/12.92
