@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.errors import InputError, UsageError
+from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.gl.raw import RawGL
 
+FLAT = """
+from rendergraph.api import Any, Node, Output
+
+
+class Flat(Node):
+    \"\"\"One value.\"\"\"
+
+    color = Output(Any, format="r32f", doc="One value.")
+"""
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Program", "Query", "Renderbuffer")
 
 
@@ -110,6 +119,33 @@ def test_variants_drawn_in_turns_are_compiled_once_and_keep_their_pictures(gl: r
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a, b)
     assert not np.array_equal(first[0], first[2])
+
+
+def test_two_plugins_with_equal_names_keep_their_shaders(gl: rg.Session, tmp_path: Any) -> None:
+    values = []
+    for value in ("0.25", "0.75"):
+        folder = tmp_path / value
+        folder.mkdir()
+        (folder / "flat.py").write_text(FLAT)
+        (folder / "flat.frag").write_text(f"out float color; void main() {{ color = {value}; }}")
+        (folder / "flat.yaml").write_text("rendergraph: 1\nnodes: {a: {type: flat}}\noutputs: {image: a.color}")
+        frame = gl.render(rg.load(folder / "flat.yaml", size=(4, 4), plugins=[folder / "flat.py"]))
+        values.append(float(frame["image"].mean()))
+    assert values == [0.25, 0.75]
+
+
+def test_a_scene_that_fails_leaves_the_session_as_good_as_new(gl: rg.Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    small, other = (rg.load("forward", scene=scene, size=(16, 16)) for scene in ("cornell_box", "spheres"))
+    before = gl.render(small)["image"]
+
+    def broken(scene: object) -> None:
+        raise RenderError(Problem("RG612", "no memory"))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("rendergraph.scene.pack.pack", broken)
+        with pytest.raises(RenderError, match="no memory"):
+            gl.render(other)
+    np.testing.assert_array_equal(gl.render(small)["image"], before)
 
 
 def test_limits_are_raised_by_the_name_that_the_message_gives(tmp_path: Any) -> None:

@@ -160,13 +160,14 @@ class Session:
 
         expansion = pipeline.expansion(outputs, taps)
         scene = self._scene(pipeline)
-        key = (_structure(expansion), id(pipeline.scene), alias, poison, shuffle)
+        types = {node.id: node.type for node in pipeline.graph.nodes}
+        sources = tuple((name, found.file, found.shaders) for name, found in types.items())
+        key = (_structure(expansion), sources, id(pipeline.scene), alias, poison, shuffle)
         executable = self._kept.pop(key, None)
         if executable is None:
             while len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept))).release()
             plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
-            types = {node.id: node.type for node in pipeline.graph.nodes}
             executable = compile_plan(self.device, plan, types, expansion.views, scene, self.programs, poison=poison)
         else:
             executable.set_uniforms(expansion.steps)
@@ -180,6 +181,7 @@ class Session:
         if id(scene) not in self._scenes:
             for _, old in self._scenes.values():
                 old.release(self.programs)
+            self._scenes = {}  # what follows may fail, and a released scene must not be met again
             self._forget_executables()
             self._image_warnings = []
             allowed = pipeline.allowed("scene")
