@@ -19,7 +19,7 @@ import numpy.typing as npt
 from rendergraph.compile.executable import Call, Draw, SortedDraws
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
-from rendergraph.errors import Problem, RenderError
+from rendergraph.errors import InputError, Problem
 from rendergraph.expand import CAMERA
 from rendergraph.scene.model import Material, Mesh, Object, Texture
 from rendergraph.steps import Step, ViewMatrices
@@ -184,7 +184,7 @@ def select(objects: Iterable[Object], materials: tuple[Material, ...], step: Ste
     """The objects a step draws, in the scene's order.
 
     Raises:
-        RenderError: a name that no object has.
+        InputError: a name that no object has.
     """
     placed = list(objects)
     if isinstance(step.objects, tuple):
@@ -192,7 +192,7 @@ def select(objects: Iterable[Object], materials: tuple[Material, ...], step: Ste
         missing = [name for name in step.objects if name not in names]
         if missing:
             text = f"node '{step.node}' draws object '{missing[0]}', which the scene does not have"
-            raise RenderError(Problem("RG431", text))
+            raise InputError(Problem("RG431", text))
         return [names[name] for name in step.objects]
     tests: dict[str, Callable[[Object], bool]] = {
         "all": lambda p: True,
