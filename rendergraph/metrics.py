@@ -157,7 +157,7 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
         reference, test, hdr=int(hdr), maxluminance=0.0 if hdr else 2.0, ppd=PIXELS_PER_DEGREE
     )
     if found.has_error:
-        raise InputError(Problem("RG521", f"FLIP cannot be computed: {found.geterror()}"))
+        raise RuntimeError(f"FLIP cannot be computed: {found.geterror()}")
     return np.asarray(found.get_pixels(oiio.FLOAT), np.float32)[..., 0]
 
 

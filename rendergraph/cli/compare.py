@@ -93,9 +93,9 @@ def command(
 
     \b
     Examples:
-      rendergraph compare forward forward-prepass
-      rendergraph compare forward shading-flat --size 640x360 -o report.html
-      rendergraph compare forward forward-prepass --reference forward --fail-above flip=0.02 --json
+      rendergraph compare forward forward-prepass --size 320x180
+      rendergraph compare forward shading-flat --size 320x180 -n 20 -o report.html
+      rendergraph compare forward-prepass --reference forward --size 160x90 --fail-above flip=0.02 --json
     """
     from rendergraph.compare import pictures
 

@@ -52,17 +52,17 @@ def command(
     device: int | None,
     **selection: Any,
 ) -> None:
-    """Draw every combination of parameters, measure them, and show which are worth it.
+    """Draw and measure every combination of parameters.
 
-    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline`, `axes` and what else the options say; options win.
-    A path is what -s takes: a parameter, an input, a node's type. Commas inside brackets belong to a value. What
-    several runs have in common is drawn once.
+    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline` and `axes`, and `reference`, `scene`, `size`, `set`,
+    `frames` where these differ from the defaults; options win. A path is what -s takes: a parameter, an input, a node's
+    type. Commas inside brackets belong to a value. What several runs have in common is drawn once.
 
     \b
     Examples:
-      rendergraph sweep forward -x shadows.taps=1,2,4 -x display.curve=aces,neutral -o out
-      rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr -o out --resume
-      rendergraph sweep my-sweep.yaml -o out --json
+      rendergraph sweep forward -x shadows.taps=1,2,4 -x sun.resolution=512,2048 --size 320x180 -o out
+      rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr --size 160x90 -o models
+      rendergraph sweep forward -x light.ambient=0,[0.1,0.1,0.2] --size 160x90 -o models --resume --json
     """
     from rendergraph.compare.axes import is_sweep, read_sweep
     from rendergraph.compare.report import sweep_page

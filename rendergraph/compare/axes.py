@@ -196,18 +196,18 @@ def read_sweep(path: Path) -> SweepFile:
     for key, value in data.items():
         if key not in _KEYS:
             problems.append(
-                value.problem("RG526", f"a sweep has no key '{key}'{suggestion(str(key), _KEYS)}", key=True)
+                value.problem("RG030", f"a sweep has no key '{key}'{suggestion(str(key), _KEYS)}", key=True)
             )
     if (version := data.get("sweep")) is None or version.data != 1:
-        problems.append((version or root).problem("RG526", "a sweep begins with 'sweep: 1'"))
+        problems.append((version or root).problem("RG030", "a sweep begins with 'sweep: 1'"))
     pipeline = _text(data, "pipeline", problems)
     if pipeline is None and "pipeline" not in data:
-        problems.append(root.problem("RG526", "the sweep names no pipeline; add pipeline: NAME"))
+        problems.append(root.problem("RG030", "the sweep names no pipeline; add pipeline: NAME"))
     axes = _axes(data.get("axes"), root, problems)
     sets = data.get("set")
     given: dict[Any, Value] = {}
     if sets is not None and not isinstance(sets.data, dict):
-        problems.append(sets.problem("RG526", f"'set' takes a mapping of paths to values, this is {sets.kind}"))
+        problems.append(sets.problem("RG030", f"'set' takes a mapping of paths to values, this is {sets.kind}"))
     elif sets is not None and isinstance(sets.data, dict):
         given = sets.data
     size = _size(data.get("size"), problems)
@@ -215,7 +215,7 @@ def read_sweep(path: Path) -> SweepFile:
     if frames is not None and not (
         isinstance(frames.data, int) and not isinstance(frames.data, bool) and frames.data > 0
     ):
-        problems.append(frames.problem("RG526", f"'frames' takes a whole number from 1 up, this is {frames.kind}"))
+        problems.append(frames.problem("RG030", f"'frames' takes a whole number from 1 up, this is {frames.kind}"))
     reference, scene = _text(data, "reference", problems), _text(data, "scene", problems)
     if problems:
         raise InputError(problems)
@@ -239,7 +239,7 @@ def value_text(value: Value) -> str:
 def _axes(value: Value | None, root: Value, problems: list[Problem]) -> list[Axis]:
     if value is None or not isinstance(value.data, dict) or not value.data:
         text = "the sweep has no axes; add axes: {NODE.PARAM: [VALUE, VALUE]}"
-        problems.append((value or root).problem("RG526", text))
+        problems.append((value or root).problem("RG030", text))
         return []
     found = []
     for path, listed in value.data.items():
@@ -247,12 +247,12 @@ def _axes(value: Value | None, root: Value, problems: list[Problem]) -> list[Axi
             text = (
                 f"axis '{path}' takes a list of values, this is {'an empty list' if listed.data == [] else listed.kind}"
             )
-            problems.append(listed.problem("RG526", text))
+            problems.append(listed.problem("RG030", text))
             continue
         values = [value_text(part) for part in listed.data]
         twice = [part for number, part in enumerate(values) if part in values[:number]]
         if twice:
-            problems.append(listed.problem("RG526", f"axis '{path}' has the value {twice[0]} twice"))
+            problems.append(listed.problem("RG030", f"axis '{path}' has the value {twice[0]} twice"))
         found.append(Axis(str(path), tuple(values)))
     return found
 
@@ -262,7 +262,7 @@ def _text(data: Mapping[Any, Value], key: str, problems: list[Problem]) -> str |
     if value is None:
         return None
     if not isinstance(value.data, str):
-        problems.append(value.problem("RG526", f"'{key}' takes text, this is {value.kind}"))
+        problems.append(value.problem("RG030", f"'{key}' takes text, this is {value.kind}"))
         return None
     return value.data
 
@@ -273,7 +273,7 @@ def _size(value: Value | None, problems: list[Problem]) -> tuple[int, int] | Non
     sides = [part.data for part in value.data] if isinstance(value.data, list) else []
     if len(sides) == 2 and all(isinstance(side, int) and not isinstance(side, bool) and side > 0 for side in sides):
         return int(sides[0]), int(sides[1])  # type: ignore[arg-type]  # whole numbers, as just seen
-    problems.append(value.problem("RG526", f"'size' takes [WIDTH, HEIGHT], this is {value.kind}"))
+    problems.append(value.problem("RG030", f"'size' takes [WIDTH, HEIGHT], this is {value.kind}"))
     return None
 
 

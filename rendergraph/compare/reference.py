@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rendergraph.compare.values import Pixels
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, Place, Problem
 from rendergraph.metrics import Encoding, check_sizes
 
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ def read_picture(path: Path, size: tuple[int, int], name: str) -> tuple[Pixels, 
 
     pixels = read(path)
     if pixels.ndim != 3:
-        raise InputError(Problem("RG523", f"'{path}' has layers; a reference is one picture of R, G, B or Y"))
+        text = "the image has layers; a reference is one picture of R, G, B or Y"
+        raise InputError(Problem("RG354", text, Place(str(path))))
     check_sizes(np.empty((size[1], size[0])), pixels, (name, str(path)))
     return pixels, "linear" if np.issubdtype(pixels.dtype, np.floating) else "display"
 

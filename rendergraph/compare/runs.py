@@ -73,8 +73,8 @@ def open_folder(out: Path, *, resume: bool) -> tuple[Ledger, dict[str, dict[str,
     except OSError as error:
         raise InputError(Problem("RG504", f"cannot be written: {error.strerror}", Place(str(out)))) from error
     if ledger.path.exists() and not resume:
-        text = f"'{out}' has results of a sweep; --resume adds what is missing, or name another folder"
-        raise InputError(Problem("RG525", text))
+        text = "it has results of a sweep; --resume adds what is missing, or name another folder"
+        raise InputError(Problem("RG504", f"cannot be written: {text}", Place(str(out))))
     records, torn = ledger.read()
     return ledger, {record["key"]: record for record in records if "key" in record}, torn
 

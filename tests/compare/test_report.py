@@ -102,14 +102,14 @@ def test_names_are_text_everywhere(comparison: Comparison) -> None:
 def test_a_scatter_shows_all_points_inside_and_the_front() -> None:
     import xml.etree.ElementTree as ET
 
-    points = [Point(f"n{i}", 1.0 + i, 0.9 + i, 1.2 + i, 0.3 / (1 + i), i % 2 == 0) for i in range(20)]
-    root = ET.fromstring(scatter_svg([*points, Point("nan", 1, 1, 1, float("nan"), False)], "time", "error"))
+    points = [Point(f"n{i}", f"{i}", 1.0 + i, 0.9 + i, 1.2 + i, 0.3 / (1 + i), i % 2 == 0) for i in range(20)]
+    root = ET.fromstring(scatter_svg([*points, Point("nan", "n", 1, 1, 1, float("nan"), False)], "time", "error"))
     dots = list(root.iter("{http://www.w3.org/2000/svg}circle"))
     assert len(dots) == 20
     assert all(0 < float(dot.attrib["cx"]) < 760 and 0 < float(dot.attrib["cy"]) < 380 for dot in dots)
     assert sum(dot.attrib["class"] == "best" for dot in dots) == 10
     ET.fromstring(scatter_svg([], "time", "error"))
-    ET.fromstring(scatter_svg([Point("zero", 0, 0, 0, 0, True)], "time", "error"))
+    ET.fromstring(scatter_svg([Point("zero", "z", 0, 0, 0, 0, True)], "time", "error"))
 
 
 # --- in a browser ----------------------------------------------------------------------------------------------------

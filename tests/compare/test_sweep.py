@@ -61,7 +61,7 @@ def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
 def test_resuming_draws_what_is_missing_and_nothing_else(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
     few = (AXES[0], Axis("display.curve", ("aces",)))
     first = sweep(base, few, tmp_path, frames=1, session=gl)
-    with pytest.raises(InputError, match=r"RG525 '.*' has results of a sweep; --resume adds what is missing"):
+    with pytest.raises(InputError, match=r"RG504 cannot be written: it has results of a sweep; --resume adds"):
         sweep(base, few, tmp_path, frames=1, session=gl)
     again = sweep(base, few, tmp_path, frames=1, resume=True, session=gl)
     assert (again.executed, again.resumed) == (0, 2)
@@ -197,6 +197,21 @@ def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
         "3 'size' takes [WIDTH, HEIGHT], this is a list",
         "5 'frames' takes a whole number from 1 up, this is a number",
     ]
+
+
+def test_the_page_of_the_error_tells_the_truth(tmp_path: Path) -> None:
+    import yaml
+
+    from rendergraph.resources import folder
+
+    page = yaml.safe_load((folder("rendergraph.errors") / "RG030-sweep-file.yaml").read_text())
+    (tmp_path / "wrong.yaml").write_text(page["wrong"])
+    (tmp_path / "right.yaml").write_text(page["right"])
+    with pytest.raises(InputError) as caught:
+        read_sweep(tmp_path / "wrong.yaml")
+    (problem,) = caught.value.problems
+    assert str(problem).splitlines()[0].removeprefix(f"{tmp_path / 'wrong.yaml'}:") == page["message"]
+    assert read_sweep(tmp_path / "right.yaml").axes == (Axis("shadows.taps", ("1", "2")),)
 
 
 def test_what_is_no_sweep_is_none(tmp_path: Path) -> None:

@@ -309,7 +309,10 @@ def _scatter(comparison: Comparison, front: Sequence[Result]) -> str:
     for result in results:
         time = result.times.headline
         points.append(
-            Point(result.name, time.median, time.p10, time.p90, result.metrics.flip, result.name in best)
+            Point(
+                result.name, " · ".join(result.settings.values()) or result.name, time.median, time.p10, time.p90,
+                result.metrics.flip, result.name in best,
+            )
         )  # fmt: skip
     kind = "GPU" if results[0].times.gpu_ms else "frame"
     note = ", software rasteriser" if comparison.software else ""

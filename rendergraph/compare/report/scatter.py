@@ -9,6 +9,7 @@ from html import escape
 
 WIDTH, HEIGHT = 760.0, 380.0
 LEFT, RIGHT, TOP, BOTTOM = 76.0, 24.0, 20.0, 52.0
+MOST_LABELS = 24
 _STYLE = """
 .ink{fill:#1f2328}.fact{fill:#57606a}.grid{stroke:#7d8590;stroke-opacity:.25}.front{stroke:#2c9163;fill:none}
 .dot{fill:#3b7dd8}.best{fill:#2c9163}
@@ -19,9 +20,10 @@ _STYLE = """
 
 @dataclass(frozen=True)
 class Point:
-    """A variant: milliseconds with their spread, and its error; `best` ones form the front."""
+    """A variant: its name and a short one, milliseconds with their spread, its error; `best` ones form the front."""
 
     name: str
+    label: str
     ms: float
     low: float
     high: float
@@ -64,35 +66,45 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         path = f"M{x(front[0].ms):.1f} {y(front[0].error):.1f}"
         path += "".join(f"H{x(p.ms):.1f}V{y(p.error):.1f}" for p in front[1:])
         parts.append(f'<path class="front" d="{path}" stroke-width="1.5" stroke-dasharray="5 4"/>')
-    taken: list[tuple[float, float, float]] = []
+    # Labels go where neither a point nor another label is; those of the front choose first.
+    taken = [_Spot(x(p.ms) - 7, x(p.ms) + 7, y(p.error)) for p in points]
     for point in sorted(points, key=lambda p: (not p.best, p.ms)):
-        parts.append(_dot(point, x(point.ms), y(point.error), x(point.low), x(point.high), taken, len(points)))
+        told = f"{point.name}: {point.ms:.3g} ms ({point.low:.3g}–{point.high:.3g}), {point.error:.4g}"
+        at, height = x(point.ms), y(point.error)
+        parts.append(
+            f'<g><title>{escape(told)}</title><path d="M{x(point.low):.1f} {height:.1f}H{x(point.high):.1f}" '
+            f'stroke="#7d8590" stroke-opacity=".6"/>'
+            f'<circle class="{"best" if point.best else "dot"}" cx="{at:.1f}" cy="{height:.1f}" r="5"/>'
+        )
+        if point.best or len(points) <= MOST_LABELS:
+            parts.append(_label(point.label, at, height, taken))
+        parts.append("</g>")
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
-def _dot(
-    point: Point, x: float, y: float, low: float, high: float, taken: list[tuple[float, float, float]], count: int
-) -> str:
-    kind = "best" if point.best else "dot"
-    told = f"{point.name}: {point.ms:.3g} ms ({point.low:.3g}–{point.high:.3g}), {point.error:.4g}"
-    drawn = (
-        f"<g><title>{escape(told)}</title>"
-        f'<path d="M{low:.1f} {y:.1f}H{high:.1f}" stroke="#7d8590" stroke-opacity=".6"/>'
-        f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>'
-    )
-    width = 6.6 * len(point.name)
-    if count <= 12 or point.best:
-        before = x + width + 10 > WIDTH
-        left = x - width - 10 if before else x + 10
-        for shift in (4.0, -10.0, 18.0, -24.0, 32.0):  # a label goes where no other one is, or nowhere
-            row = y + shift
-            if TOP < row < HEIGHT - 4 and not any(
-                abs(row - r) < 13 and left < b and a < left + width for a, b, r in taken
-            ):
-                taken.append((left, left + width, row))
-                drawn += f'<text class="ink" x="{left:.1f}" y="{row:.1f}">{escape(point.name)}</text>'
-                break
-    return drawn + "</g>"
+@dataclass(frozen=True)
+class _Spot:
+    """A place that is taken: from left to right, around a height."""
+
+    left: float
+    right: float
+    y: float
+
+    def meets(self, other: _Spot) -> bool:
+        return abs(self.y - other.y) < 13 and self.left < other.right and other.left < self.right
+
+
+def _label(text: str, x: float, y: float, taken: list[_Spot]) -> str:
+    """The text beside a point, nothing where there is no room."""
+    width = 6.8 * len(text)
+    for shift in (0, -14, 14, -28, 28, -42, 42):
+        for left in (x + 10, x - width - 10):
+            spot = _Spot(left, left + width, y + shift)
+            inside = left > LEFT and left + width < WIDTH and TOP < spot.y < HEIGHT - BOTTOM - 4
+            if inside and not any(spot.meets(other) for other in taken):
+                taken.append(spot)
+                return f'<text class="ink" x="{left:.1f}" y="{spot.y + 4:.1f}">{escape(text)}</text>'
+    return ""
 
 
 def _tick(x: float, y: float, text: str, *, upright: bool) -> str:
