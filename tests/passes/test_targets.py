@@ -325,5 +325,5 @@ def test_srgb_texels_are_read_back_linear(draw: Draw) -> None:
 
     shaders = {"encoded.frag": "out vec4 color; void main() { color = vec4(0.5, 0.05, 0.001, 0.5); }"}
     image = draw("nodes: {s: {type: encoded}}\noutputs: {image: s.color}", Encoded, shaders=shaders)["image"]
-    np.testing.assert_allclose(image[0, 0], [0.5, 0.05, 0.001, 0.5], atol=0.003)
+    np.testing.assert_allclose(image[0, 0], [0.5, 0.05, 0.001, 0.5], atol=0.005)
     assert abs(image[0, 0, 2] - 0.001) < 2e-4  # linear near black: a step is 1/255/12.92
