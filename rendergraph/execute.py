@@ -119,6 +119,7 @@ class Runner:
     graph: Graph
     _updating: list[GraphNode] = field(default_factory=list)
     _scene: FrameScene | None = None
+    _parity: int = 0
 
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
@@ -159,18 +160,20 @@ class Runner:
         if executable.reads_frame:
             views.set_frame(time, delta, index)
         views.set(CAMERA, (camera,))
+        moved = False
         if self._scene is None or self._scene.scene is not scene:
-            self._scene = FrameScene(scene)
+            self._scene, moved = FrameScene(scene), True
         for node in self._updating:
             self._update(node, index, time, camera, self._scene)
-        if views.changed:
+        if views.changed or moved:
             for sort in executable.sorters:
                 sort(views)
             views.changed = False
         fresh = executable.fresh or not executable.device.owned
         if fresh:
             self.activate()
-        parity = index % len(executable.steps)
+        # Counted by frames drawn, not by their numbers: of every second frame, too, each has the one before as history.
+        parity = self._parity = (self._parity + 1) % len(executable.steps)
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
             for call in executable.binds[parity]:
                 call()
@@ -222,8 +225,8 @@ class Runner:
         if error:
             raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
-    def read(self, resource: str, index: int) -> npt.NDArray[Any]:
-        """A resource's texels after frame `index`: (height, width, channels), with layers before where it has them.
+    def read(self, resource: str) -> npt.NDArray[Any]:
+        """A resource's texels after the last frame: (height, width, channels), with layers before where it has them.
 
         The top row comes first.
         """
@@ -232,8 +235,7 @@ class Runner:
         if isinstance(desc, BufferDesc):
             executable.device.ctx.finish()
             return np.frombuffer(executable.memory.buffer(resource).read(), np.uint8)
-        parity = index % len(executable.steps)
-        texels = textures.read(executable.device, executable.memory.texture(resource, parity))
+        texels = textures.read(executable.device, executable.memory.texture(resource, self._parity))
         assert isinstance(desc, TextureDesc)
         return texels[0] if desc.kind == "texture2d" else texels
 

@@ -134,6 +134,18 @@ def test_two_plugins_with_equal_names_keep_their_shaders(gl: rg.Session, tmp_pat
     assert values == [0.25, 0.75]
 
 
+def test_closing_one_session_leaves_the_others_alone() -> None:
+    pipeline = rg.load("forward", size=(16, 16))
+    first = rg.Session()
+    with rg.Session() as second:
+        first.render(pipeline)
+        before = second.render(pipeline)["image"]
+        names = living(second.device.raw)
+        first.close()
+        assert living(second.device.raw) == names
+        np.testing.assert_array_equal(second.render(pipeline)["image"], before)
+
+
 def test_a_scene_that_fails_leaves_the_session_as_good_as_new(gl: rg.Session, monkeypatch: pytest.MonkeyPatch) -> None:
     small, other = (rg.load("forward", scene=scene, size=(16, 16)) for scene in ("cornell_box", "spheres"))
     before = gl.render(small)["image"]

@@ -18,7 +18,7 @@ from rendergraph.compile.memory import ClearTarget, Memory
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
-from rendergraph.errors import Problem, RenderError
+from rendergraph.errors import InputError, Problem
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
@@ -65,10 +65,13 @@ def compile_plan(
     """
     memory = Memory(device, plan)
     buffers = ViewBuffers(device, views)
+    compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
     try:
-        compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
         return compiler.executable()
     except BaseException:
+        programs.forget(id(memory))
+        for commands in compiler.geometry.buffers:
+            commands.release()
         memory.release()
         buffers.release()
         raise
@@ -114,6 +117,14 @@ class _Compiler:
             "fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw, "compute": self._compute,
             "clear": self._clear, "mipmaps": self._mipmaps, "copy": self._copy,
         }[step.kind](step, compiled, parity)  # fmt: skip
+        stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
+        compiled.before += [
+            partial(_clear_buffer, self.memory.buffer(write.resource))
+            for write in stored
+            if write.use == "buffer" and write.load == "clear"
+        ]
+        if stored and step.kind != "copy":  # what shaders store comes in no order by itself
+            compiled.after.append(partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS))
         if self.poison:
             compiled.after += self._poison(position, parity)
         return compiled
@@ -214,11 +225,8 @@ class _Compiler:
             if write.load == "clear" and write.use == "image":
                 texture = self.memory.texture(write.resource, parity)
                 compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
-            elif write.load == "clear" and write.use == "buffer":
-                compiled.before.append(partial(_clear_buffer, self.memory.buffer(write.resource)))
         call = partial(program.object.run, *step.groups)
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
-        compiled.after.append(partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS))
 
     def _clear(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         for write in step.writes:
@@ -300,7 +308,7 @@ class _Compiler:
                 files = ", ".join(file for _, file in step.shaders)
                 text = (f"node '{step.node}': {files} samples '{name}', but the step reads no texture of that name; "
                         f"it reads {', '.join(sorted(sampled)) or 'none'}")  # fmt: skip
-                raise RenderError(Problem("RG430", text))
+                raise InputError(Problem("RG430", text))
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         """Bind the framebuffer, clearing first what the step says."""

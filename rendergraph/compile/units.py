@@ -24,6 +24,7 @@ class Units:
 
     device: Device
     parities: int
+    parity: int = 0
     _pairs: dict[tuple[tuple[int, ...], int], int] = field(default_factory=dict)
     _changing: list[int] = field(default_factory=list)
     _wrapped: dict[int, Any] = field(default_factory=dict)
@@ -40,8 +41,8 @@ class Units:
         if len(self._pairs) < own:
             self._pairs[pair] = len(self._pairs)
             return self._pairs[pair]
-        unit = own + len(taken)
-        taken.append(_Rebind(self.device, unit, textures, sampler))
+        unit = own + sum(isinstance(call, _Rebind) for call in taken)
+        taken.append(_Rebind(self, unit, textures, sampler))
         return unit
 
     @property
@@ -76,18 +77,19 @@ class Units:
                     partial(raw.glBindTextures, 0, count, names),
                     partial(raw.glBindSamplers, 0, count, samplers),
                 ]
+            if self.parities > 1:
+                calls.append(partial(setattr, self, "parity", parity))
             result.append(calls)
         return result
 
 
 class _Rebind:
-    """Binds one pair to a shared unit; with history it alternates like the frames do."""
+    """Binds one pair to a shared unit: the texture of the frame's parity."""
 
-    def __init__(self, device: Device, unit: int, textures: tuple[int, ...], sampler: int) -> None:
-        self._device, self._unit, self._textures, self._sampler = device, unit, textures, sampler
-        self.parity = 0
+    def __init__(self, units: Units, unit: int, textures: tuple[int, ...], sampler: int) -> None:
+        self._units, self._unit, self._textures, self._sampler = units, unit, textures, sampler
 
     def __call__(self) -> None:
-        self._device.raw.glBindTextureUnit(self._unit, self._textures[self.parity % len(self._textures)])
-        self._device.raw.glBindSampler(self._unit, self._sampler)
-        self.parity += 1
+        raw = self._units.device.raw
+        raw.glBindTextureUnit(self._unit, self._textures[self._units.parity % len(self._textures)])
+        raw.glBindSampler(self._unit, self._sampler)

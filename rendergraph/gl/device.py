@@ -66,9 +66,10 @@ class Device:
     def release(self) -> None:
         """End the context if it is ours."""
         if self._idle is not None:
-            for attachment in self._idle.color_attachments:
-                attachment.release()
-            self._idle.release()
+            with self.current():  # names of another context that is current would be freed otherwise
+                for attachment in self._idle.color_attachments:
+                    attachment.release()
+                self._idle.release()
             self._idle = None
         if self.owned:
             self.ctx.release()

@@ -213,7 +213,7 @@ class Session:
     ) -> Frame:
         graph, plan = pipeline.graph, runner.executable.plan
         resources = plan.schedule.wanted
-        arrays = {name: runner.read(resources[name], number) for name in wanted}
+        arrays = {name: runner.read(resources[name]) for name in wanted}
         infos = {}
         for name, end in wanted.items():
             info = graph.textures[end]

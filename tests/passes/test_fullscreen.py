@@ -9,7 +9,7 @@ import pytest
 
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import InOut, Input, Internal, Node, Output, Radiance, Steps, define, param
-from rendergraph.errors import InputError, RenderError
+from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -200,7 +200,7 @@ def test_a_sampler_that_nothing_is_bound_to_is_named(draw: Draw) -> None:
         color = Output(Radiance, doc="Nothing good.")
 
     shader = {"wrong.frag": "uniform sampler2D depht; out vec4 color; void main() { color = texelFetch(depht, ivec2(0), 0); }"}
-    with pytest.raises(RenderError, match=r"node 'w': wrong.frag samples 'depht', but the step reads no texture"):
+    with pytest.raises(InputError, match=r"node 'w': wrong.frag samples 'depht', but the step reads no texture"):
         draw("nodes: {w: {type: wrong}}\noutputs: {image: w.color}", Wrong, shaders=shader)
 
 

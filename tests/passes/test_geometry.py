@@ -168,3 +168,16 @@ def test_ten_objects_and_a_thousand_take_the_same_calls(bench: Any) -> None:
         calls.append([len(step.calls) for step in executable.steps[0]])
         assert len(np.unique(frame["image"])) > 10
     assert calls[0] == calls[1]
+
+
+def test_objects_that_move_past_each_other_are_sorted_anew(draw: Draw) -> None:
+    scene = """objects:
+  a: {shape: box, size: [2, 2, 0.1], at: [0, 0, -1]}
+  b: {shape: box, size: [2, 2, 0.1], at: [0, 0, 0]}
+keyframes: {objects.a.at: {0: [0, 0, -1], 1: [0, 0, 1]}}
+cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 50}}
+"""
+    seen: list[float] = []
+    draw("nodes: {b: {type: blended}}\noutputs: {image: b.color}", Blended, shaders=BLEND, scene=scene, size=(8, 8),
+         frames=range(1, 3), fps=1.0, on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])))  # fmt: skip
+    np.testing.assert_allclose(seen, [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import ADD, History, InOut, Input, Luminance, Node, Output, State, Steps
@@ -71,6 +72,20 @@ def test_history_starts_afresh_in_every_run(draw: Draw) -> None:
     first = draw(text, Counter, shaders=SHADERS, frames=range(1, 4))["image"]
     again = draw(text, Counter, shaders=SHADERS, frames=range(1, 4))["image"]
     np.testing.assert_array_equal(first, again)
+
+
+@pytest.mark.parametrize("units", [None, 24])
+def test_history_goes_back_a_frame_whichever_are_drawn_and_however_few_units_there_are(
+    draw: Draw, gl: rg.Session, monkeypatch: pytest.MonkeyPatch, units: int | None
+) -> None:
+    if units is not None:
+        monkeypatch.setitem(gl.device.limits, "units", units)
+    seen: list[list[float]] = []
+    text = "nodes: {c: {type: counter}}\noutputs: {image: c.color}"
+    size = (8, 8 if units is None else 9)  # another plan, so that it is compiled anew
+    draw(text, Counter, shaders=SHADERS, size=size, frames=range(2, 9, 2),
+         on_frame=lambda frame: seen.append(frame["image"][0, 0].tolist()))  # fmt: skip
+    assert seen == [[6, 5], [7, 6], [8, 7], [9, 8]]
 
 
 class Halve(Node):
