@@ -9,6 +9,9 @@
 // on. The kernel is a square and wider along its diagonal, which the sum of the normal's leans along both sides says. A
 // face turned away from the light is moved away from it, and so lies behind what it belongs to.
 #ifndef MAP_VIEWS
+#if LIGHT_COUNT > 0 && LIGHT_DIRECTIONALS == LIGHT_COUNT
+#define MAP_PARALLEL  // every view is orthographic: w is 1, and all points lie in one direction from the light
+#endif
 #define MAP_VIEWS shadow_map_views
 #define MAP_LIGHTS shadow_map_lights
 #define MAP_LAYERS SHADOW_MAP_LAYERS
@@ -20,14 +23,19 @@ uniform float normal_offset;  // factor on what the slope asks for
 // The place of a moved point in one layer; false where the layer does not see it.
 bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out vec3 place) {
     View view = MAP_VIEWS[layer];
-    float w = (view.view_projection * vec4(position, 1.0)).w;
-    vec2 sides = view.viewport.zw / vec2(view.projection[0][0], view.projection[1][1]);
-    float texel = 2.0 * w * max(sides.x, sides.y);  // metres across at this distance
+    vec2 sides = view.viewport.zw * vec2(view.inverse_projection[0][0], view.inverse_projection[1][1]);
+    float texel = 2.0 * max(sides.x, sides.y);  // metres across at this distance
+#ifndef MAP_PARALLEL
+    texel *= (view.view_projection * vec4(position, 1.0)).w;
+#endif
     float cosine = dot(normal, to_light);
     vec3 lean = abs(mat3(view.view) * (normal - to_light * cosine));
     float offset = normal_offset * MAP_HALF_WIDTH * (lean.x + lean.y + lean.z);
     vec3 moved = position + texel * (normal * offset + to_light * bias);
     vec4 clip = view.view_projection * vec4(moved, 1.0);
+#ifdef MAP_PARALLEL
+    clip.w = 1.0;
+#endif
     place = clip.xyz / clip.w * 0.5 + 0.5;
     place.z = min(place.z, 1.0);
     return clip.w > 0.0 && all(greaterThanEqual(place, vec3(0.0))) && all(lessThanEqual(place.xy, vec2(1.0)));
@@ -37,7 +45,11 @@ bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out ve
 float shadow(int light, vec3 position, vec3 normal) {
     for (int layer = 0; layer < MAP_LAYERS; ++layer) {
         if (MAP_LIGHTS[layer] != light) continue;
+#ifdef MAP_PARALLEL
+        vec3 to_light = MAP_VIEWS[layer].eye.xyz;
+#else
         vec3 to_light = to_viewer(MAP_VIEWS[layer], position);
+#endif
         vec3 place;
         if (place_in_layer(layer, position, normal, to_light, place)) return map_visibility(layer, place);
     }

@@ -30,13 +30,14 @@ float share(int index, float start) {
 
 float filtered_tests(int layer, vec3 place) {
     vec2 size = vec2(textureSize(shadow_map, 0).xy);
+    vec2 texel = 1.0 / size;
     vec2 corner = place.xy * size - 0.5 * float(TAPS);
     vec2 first = floor(corner);
     vec2 start = corner - first;
     float sum = 0.0;
     for (int y = 0; y <= TAPS; y += 2) {
         for (int x = 0; x <= TAPS; x += 2) {
-            vec2 middle = (first + vec2(x + 1, y + 1)) / size;
+            vec2 middle = (first + vec2(x + 1, y + 1)) * texel;
             // Upper left, upper right, lower right, lower left.
             vec4 lit = textureGather(shadow_map, vec3(middle, float(layer)), place.z);
             vec2 columns = vec2(share(x, start.x), share(x + 1, start.x));
