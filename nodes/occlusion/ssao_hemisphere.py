@@ -1,0 +1,53 @@
+"""Ambient occlusion from points in a hemisphere."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rendergraph.api import Frame, Internal, Steps, define, param
+
+from ._kernel import spread_points
+from ._screen_space import ScreenSpaceOcclusion, reduced_size
+
+
+class SSAOHemisphere(ScreenSpaceOcclusion):
+    """How open each surface is, from points in the hemisphere above it that are projected back onto the depth.
+
+    The classic of 2007 (Mittring, "Finding Next Gen", 2007). A point that lies behind the surface seen at its place is
+    taken to be inside something, and its direction to be blocked; how much falls with the difference of depth, from 1
+    to 0 at four radii. Directions are spread by least energy, cosine-weighted, and reflected at a random vector of a
+    64×64 noise texture, another at every pixel; along each lie one point within a fifth of the radius and three up to
+    all of it. A blur that stays on its surface takes the noise away again.
+    """
+
+    noise = Internal(format="rgba16_snorm", size=(64, 64))
+    kernel = Internal(kind="buffer", bytes=lambda node, facts: 16 * (node.samples // 4))
+    across = Internal(format="r16", size=reduced_size)
+    blurred = Internal(format="r16", size=reduced_size)
+
+    samples: int = define(default=32, min=8, max=128, doc="Points looked at, four a direction; rounded down to fours.")
+    blur: int = param(default=4, unit="texels", min=0, max=16, doc="How far the blur reaches to each side, at `scale`.")
+    nearest: float = param(
+        default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."
+    )
+
+    def record(self, steps: Steps) -> None:
+        """Surfaces, noise, occlusion, the blur's two axes, full size."""
+        screen = self.screen(steps)
+        self.see(steps)
+        steps.fullscreen("noise.frag", out=self.noise)
+        steps.fullscreen(
+            "ssao_hemisphere.frag", out=self.rough, surfaces=self.surfaces, noise=self.noise, kernel=self.kernel,
+            screen=screen,
+        )  # fmt: skip
+        target = self.target(steps, self.blurred)
+        for source, out, axis in ((self.rough, self.across, (1, 0)), (self.across, target, (0, 1))):
+            steps.fullscreen(
+                "bilateral_blur.frag", source=source, out=out, surfaces=self.surfaces, axis=axis, screen=screen
+            )
+        self.finish(steps, target)
+
+    def update(self, frame: Frame) -> None:
+        """The kernel's directions."""
+        points = spread_points(self.samples // 4)
+        frame.write(self.kernel, np.pad(points, ((0, 0), (0, 1))).astype(np.float32))

@@ -1,0 +1,51 @@
+// What stands for the scene in image space: at each texel a unit normal in view space and in w the distance along the
+// view axis in metres, 0 where nothing is. The picture may be smaller than the screen; each of its texels then holds
+// the surface of one of the screen's, not a mean of several.
+
+// The texel of a picture of size `screen` that a texel of a picture of size `small` stands for.
+ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
+    return ((2 * texel + 1) * screen) / (2 * small);
+}
+
+// The middle of that texel, 0 to 1.
+vec2 place_for(ivec2 texel, ivec2 small, ivec2 screen) {
+    return (vec2(texel_for(texel, small, screen)) + 0.5) / vec2(screen);
+}
+
+// Clip space's w at a distance along the view axis: the distance itself, or 1 where the view is orthographic.
+float clip_w(View v, float distance) {
+    return v.projection[3][3] - v.projection[2][3] * distance;
+}
+
+// View-space position at a place of the window (0 to 1) and a distance along the view axis.
+vec3 view_position(View v, vec2 place, float distance) {
+    vec2 ndc = place * 2.0 - 1.0;
+    vec2 moved = ndc * clip_w(v, distance) + v.projection[2].xy * distance - v.projection[3].xy;
+    return vec3(moved / vec2(v.projection[0][0], v.projection[1][1]), -distance);
+}
+
+// Where a view-space position lies in the window, 0 to 1 inside.
+vec2 window_place(View v, vec3 position) {
+    vec4 clip = v.projection * vec4(position, 1.0);
+    return clip.xy / clip.w * 0.5 + 0.5;
+}
+
+// Two float32 steps of window depth as metres along the view axis.
+float depth_error(View v, float distance) {
+    float slope = v.projection[2][3] == 0.0 ? v.range.y - v.range.x : distance * distance / v.range.x;
+    return slope * 1.2e-7;
+}
+
+// Whether a point at `offset` from a surface stands out from its tangent plane, by more than depth can be wrong.
+bool rises(View v, vec3 offset, vec3 normal, float distance) {
+    return dot(offset, normal) > 0.02 * length(offset) + 2.0 * depth_error(v, distance);
+}
+
+// 1 where a neighbour at `offset` lies in the same plane and faces the same way, 0 where it is another surface.
+float same_surface(vec3 offset, vec3 normal, vec3 neighbour, float tolerance) {
+    float off_plane = dot(offset, normal) / tolerance;
+    float facing = max(dot(normal, neighbour), 0.0);
+    facing *= facing;
+    facing *= facing;
+    return exp(-off_plane * off_plane) * facing * facing;
+}
