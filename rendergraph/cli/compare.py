@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
-from rendergraph.cli.output import Bar, emit, emit_json, megabytes, say, table
+from rendergraph.cli.output import Bar, emit, emit_json, megabytes, say, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import Problem, UsageError, suggestion
 
@@ -97,7 +97,7 @@ def command(
       rendergraph compare forward shading-flat --size 320x180 -n 20 -o report.html
       rendergraph compare forward-prepass --reference forward --size 160x90 --fail-above flip=0.02 --json
     """
-    from rendergraph.compare import pictures
+    from rendergraph.compare import compare
 
     if len(pipelines) < 2 and reference is None:
         text = "there is one pipeline and nothing to compare it with; name another, or a --reference"
@@ -106,10 +106,11 @@ def command(
         check_page(output)
     loaded = [options.load(pipeline=name, **selection) for name in pipelines]
     bar = Bar("steps")
-    found = pictures.compare(
+    found = compare(
         loaded, load_reference(reference, selection), frames=frames, frame=frame, device=device, progress=bar.show
     )
     bar.clear()
+    warn(found.warnings)
     for note in found.notes:
         say(note)
     beyond = exceeded(found.results, thresholds)

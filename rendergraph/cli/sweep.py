@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
-from rendergraph.cli.output import Bar, emit, emit_json, say, table
+from rendergraph.cli.output import Bar, emit, emit_json, say, table, warn
 from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis
-    from rendergraph.compare.sweep import Sweep
+    from rendergraph.compare.product import Sweep
 
 
 def _axis(text: str) -> Axis:
@@ -64,9 +64,9 @@ def command(
       rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr --size 160x90 -o models
       rendergraph sweep forward -x light.ambient=0,[0.1,0.1,0.2] --size 160x90 -o models --resume --json
     """
+    from rendergraph.compare import sweep
     from rendergraph.compare.axes import is_sweep, read_sweep
     from rendergraph.compare.report import sweep_page
-    from rendergraph.compare.sweep import sweep
 
     words = ["sweep", pipeline, *(w for a in axes for w in ("-x", f"{a.path}={','.join(a.values)}"))]
     words += options.words(**selection) + ([] if reference is None else ["--reference", reference])
@@ -87,6 +87,7 @@ def command(
         device=device, progress=bar.show,
     )  # fmt: skip
     bar.clear()
+    warn(found.comparison.warnings)
     page = out / "report.html"
     options.write(sweep_page(found, shared.typed([*words, "-o", str(out)])), page)
     if found.torn:
@@ -104,7 +105,7 @@ def command(
 
 
 def _text(found: Sweep) -> str:
-    from rendergraph.compare.sweep import pareto
+    from rendergraph.compare.product import pareto
 
     comparison = found.comparison
     front = {result.name for result in pareto(comparison.results)}

@@ -1,1 +1,27 @@
-"""Pipelines against each other: pictures, times, memory; one by one or as the product of axes."""
+"""Pipelines against each other: pictures, times, memory; one by one or as the product of axes.
+
+from rendergraph.compare import compare, sweep
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rendergraph.compare.axes import Axis
+    from rendergraph.compare.pictures import compare
+    from rendergraph.compare.product import Sweep, sweep
+    from rendergraph.compare.values import Comparison, Result
+
+__all__ = ["Axis", "Comparison", "Result", "Sweep", "compare", "sweep"]
+
+_WHERE = {"Axis": "axes", "compare": "pictures", "Sweep": "product", "sweep": "product"}
+
+
+def __getattr__(name: str) -> Any:
+    # Looked up on first use: reading an axis off the command line needs neither GL nor NumPy.
+    if name in __all__:
+        import importlib
+
+        return getattr(importlib.import_module(f"rendergraph.compare.{_WHERE.get(name, 'values')}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -104,6 +104,7 @@ def compare(
         frame=frame,
         device=drawn[0].frame.device,
         notes=tuple(notes),
+        warnings=tuple(dict.fromkeys(problem for each in drawn for problem in each.frame.warnings)),
     )
 
 

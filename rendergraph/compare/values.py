@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from rendergraph.compare.timing import Times
 from rendergraph.diff import GraphDiff, diff_json
+from rendergraph.errors import Problem
 from rendergraph.metrics import Encoding, Metrics, description
 
 if TYPE_CHECKING:
@@ -144,6 +145,7 @@ class Comparison:
         frame: number of the frame whose pictures were compared.
         device: what drew, as `run --json` has it.
         notes: what was changed to make the variants comparable.
+        warnings: what was noticed in files and is no error.
     """
 
     results: tuple[Result, ...]
@@ -155,6 +157,7 @@ class Comparison:
     frame: int
     device: Mapping[str, object]
     notes: tuple[str, ...] = ()
+    warnings: tuple[Problem, ...] = ()
 
     @property
     def software(self) -> bool:

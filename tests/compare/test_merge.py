@@ -15,6 +15,7 @@ from rendergraph.compare.divergence import passes
 from rendergraph.compare.merge import merge
 from rendergraph.compare.together import batches, draw
 from rendergraph.link import Graph
+from rendergraph.resources import shipped_pipelines
 
 
 def distinct(graphs: Sequence[Graph]) -> int:
@@ -137,3 +138,18 @@ def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> Non
     assert batch.pass_count == 1 + 2 + 4 + 4 + 4 + 2 + 2  # prepass, sun, shadows, light and display twice
     for together, own in zip(pictures(gl, variants), alone(gl, variants), strict=True):
         np.testing.assert_array_equal(together, own)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped_pipelines())
+def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> None:
+    base = rg.load(name, size=(48, 27))
+    base = base.set("sun.resolution", 64) if "sun" in base.graph.dag else base
+    ends = {end.node for end in base.graph.outputs.values()}
+    variants = [base, *(base.set("display.exposure", 0.5) for _ in range("display" in ends))]
+    (batch,) = batches(variants, range(len(variants)))
+    drawn = [each.arrays for each in draw(gl, variants, batch, 1, 2)]
+    assert batch.pass_count <= len(passes(base.plan())) + 1
+    for arrays, variant in zip(drawn, variants, strict=True):
+        for output, pixels in gl.render(variant, frames=range(1, 3)).items():
+            np.testing.assert_array_equal(arrays[output], pixels)

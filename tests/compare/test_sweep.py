@@ -21,8 +21,8 @@ from rendergraph.compare.axes import (
     run_name,
 )
 from rendergraph.compare.ledger import Ledger, checksum
+from rendergraph.compare.product import pareto, sweep
 from rendergraph.compare.report import sweep_page
-from rendergraph.compare.sweep import pareto, sweep
 from rendergraph.errors import InputError
 from rendergraph.images import read
 

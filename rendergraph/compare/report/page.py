@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from html import escape
 
+from rendergraph.compare.product import Sweep, pareto
 from rendergraph.compare.report.parts import (
     card,
     drawing,
@@ -21,7 +22,6 @@ from rendergraph.compare.report.parts import (
     table,
 )  # fmt: skip
 from rendergraph.compare.report.scatter import Point, scatter_svg
-from rendergraph.compare.sweep import Sweep, pareto
 from rendergraph.compare.values import Comparison, Result, machine
 from rendergraph.diff import diff, diff_svg
 from rendergraph.images import viewable

@@ -160,6 +160,7 @@ def sweep(
         frame=frame,
         device=work.device,
         notes=tuple(notes),
+        warnings=tuple(dict.fromkeys(problem for variant in variants for problem in variant.warnings)),
     )
     return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, torn)
 
