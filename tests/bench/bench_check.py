@@ -55,7 +55,7 @@ class Filter(Node):
 
     def scaled(self, facts: Any) -> tuple[int, int]:
         """The viewport, divided."""
-        return tuple(max(1, side // self.shrink) for side in facts.viewport)  # type: ignore[return-value]
+        return tuple(max(1, side // self.shrink) for side in facts.viewport)
 
 
 class Join(Node):
@@ -80,7 +80,7 @@ def text() -> str:
     ]  # fmt: skip
     count, last = 5, "light.joined"
     for pyramid in ("bloom", "flare"):
-        levels = []
+        levels: list[str] = []
         for level in range(1, 6):
             source = levels[-1] if levels else "light.joined"
             for axis in ("across", "down"):

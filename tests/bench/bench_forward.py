@@ -130,7 +130,7 @@ def bench(shadow: int | None, *, frames: int, turns: int, folder: str | None = N
 
 
 def main() -> None:
-    chosen = options(__doc__, frames=3, turns=12)
+    chosen = options(__doc__, frames=1, turns=40)
     keep_memory()
     rows = [bench(shadow, frames=chosen.frames, turns=chosen.turns, folder=chosen.save) for shadow in (None, 1024)]
     report(rows, chosen.json)

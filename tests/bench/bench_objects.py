@@ -86,8 +86,8 @@ def framework(count: int, folder: Path, pictures: str | None) -> dict[str, float
 
             result: dict[str, float] = {}
             for name, used in (("still", [still] * 4), ("moving", views[:4])):
-                for view in used[:2]:
-                    draw(view)
+                for earlier in used[:2]:
+                    draw(earlier)
                 before = calls.taken()
                 draw(used[2])
                 taken = calls.taken() - before

@@ -68,9 +68,9 @@ class ByHand:
     """The passes in plain moderngl: framebuffer, texture, uniform where there is one, draw."""
 
     def __init__(self, size: int, scaled: bool) -> None:
-        self.ctx = ctx = moderngl.create_context(require=450, standalone=True, backend="egl")
+        self.ctx = ctx = moderngl.create_context(require=450, standalone=True, backend="egl")  # type: ignore[arg-type]
         start = ctx.program(VERTEX, "#version 450 core\n" + _start(size))
-        self.change = ctx.program(VERTEX, "#version 450 core\n" + (SCALE if scaled else CHANGE))
+        self.change: Any = ctx.program(VERTEX, "#version 450 core\n" + (SCALE if scaled else CHANGE))
         self.first, self.next = ctx.vertex_array(start, []), ctx.vertex_array(self.change, [])
         self.scaled = scaled
         self.textures = [ctx.texture((size, size), 4, dtype="f2") for _ in range(2)]
@@ -149,7 +149,7 @@ def objects_made(frames: int = 10) -> dict[str, float] | None:
 
 
 def main() -> None:
-    chosen = options(__doc__, frames=40, turns=20)
+    chosen = options(__doc__, frames=5, turns=100)
     keep_memory()
     rows = [
         bench(size, scaled, frames=chosen.frames, turns=chosen.turns)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-import glcontext
+import glcontext  # type: ignore[import-untyped]
 import moderngl
 import numpy as np
 
@@ -190,7 +190,9 @@ class Forward:
         index = ctx.buffer(indices.tobytes())
         models = ctx.buffer(np.ascontiguousarray(np.swapaxes(models, 1, 2), "f4").tobytes())
         looks = ctx.buffer(np.hstack([colors, surfaces]).astype("f4").tobytes())
-        program = ctx.program(VERTEX, FRAGMENT.replace("core\n", "core\n#define SHADOWS\n" if shadow else "core\n", 1))
+        program: Any = ctx.program(
+            VERTEX, FRAGMENT.replace("core\n", "core\n#define SHADOWS\n" if shadow else "core\n", 1)
+        )
         program["camera_matrix"].write(camera.T.astype("f4").tobytes())
         program["eye"].value = tuple(eye)
         program["to_light"].value = tuple(to_light)
@@ -210,7 +212,7 @@ class Forward:
         if shadow is not None:
             assert ball is not None
             matrix = light_matrix(to_light, *ball).T.astype("f4").tobytes()
-            depth = ctx.program(DEPTH_VERTEX, DEPTH_FRAGMENT)
+            depth: Any = ctx.program(DEPTH_VERTEX, DEPTH_FRAGMENT)
             depth["light_matrix"].write(matrix)
             program["light_matrix"].write(matrix)
             program["texel"].value = 2 * ball[1] / shadow

@@ -74,7 +74,7 @@ class _Context:
 @contextmanager
 def counting() -> Iterator[Calls]:
     """Count the calls of all contexts opened inside."""
-    import glcontext
+    import glcontext  # type: ignore[import-untyped]
 
     calls, original = Calls(), glcontext.get_backend_by_name
     glcontext.get_backend_by_name = lambda name: lambda **settings: _Context(original(name)(**settings), calls)
