@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
@@ -182,20 +182,17 @@ class Runner:
                 for call in step.calls:
                     call()
             return None
-        taken: list[tuple[str, float, Timer | None]] = []
+        taken: list[tuple[str, float, Timer]] = []
         for step, timer in zip(executable.steps[parity], executable.timers, strict=True):
-            draws = bool(step.all_draws)
             before = perf_counter()
-            if draws:
-                timer.start()
+            timer.start()
             for call in step.calls:
                 call()
-            if draws:
-                timer.stop()
-            taken.append((step.step.node, perf_counter() - before, timer if draws else None))
+            timer.stop()
+            taken.append((step.step.node, perf_counter() - before, timer))
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        steps = tuple(StepTime(node, cpu * 1e3, timer.milliseconds() if timer else None) for node, cpu, timer in taken)
+        steps = tuple(StepTime(node, cpu * 1e3, timer.milliseconds()) for node, cpu, timer in taken)
         return FrameTimes(frame_ms, steps)
 
     def activate(self) -> None:
@@ -265,4 +262,4 @@ def summary(values: Sequence[float]) -> Mapping[str, float]:
     return {"median": float(np.median(values)), "min": float(min(values)), "max": float(max(values))}
 
 
-__all__ = ["Callable", "FrameContext", "FrameTimes", "Runner", "StepTime", "median_times", "summary"]
+__all__ = ["FrameContext", "FrameTimes", "Runner", "StepTime", "median_times", "summary"]

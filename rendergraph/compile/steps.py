@@ -18,7 +18,7 @@ from rendergraph.compile.memory import ClearTarget, Memory
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
@@ -299,13 +299,17 @@ class _Compiler:
     def _check(
         self, step: Step, program: Program, uniforms: Mapping[str, Any], sampled: set[str], geometry: bool
     ) -> None:
-        """A sampler that nothing is bound to would silently read another pass's texture."""
+        """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0."""
         uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
         images = {use.name for use in uses if use.use == "image"}
         for name, uniform in program.uniforms.items():
             known = name in sampled or name in images or name in uniforms or (geometry and name.endswith("_texture"))
+            files = ", ".join(file for _, file in step.shaders)
+            if not uniform.opaque and name not in uniforms:
+                hint = suggestion(name, [known for known, _ in step.uniforms])
+                text = f"node '{step.node}': {files} looks at uniform '{name}', which nothing sets{hint}"
+                raise InputError(Problem("RG434", text))
             if uniform.opaque and not known:
-                files = ", ".join(file for _, file in step.shaders)
                 text = (f"node '{step.node}': {files} samples '{name}', but the step reads no texture of that name; "
                         f"it reads {', '.join(sorted(sampled)) or 'none'}")  # fmt: skip
                 raise InputError(Problem("RG430", text))

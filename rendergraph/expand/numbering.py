@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Part, Port, Views
+from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
@@ -245,6 +245,8 @@ class Numbering:
         read = []
         if load == "load" and (continued or old > 0):
             read = [Read(name, resource, old, "attach", mip=part.mip, layer=part.layer)]
+        if use == "buffer" and old == 0 and type(recorder.node.node).update is not Node.update:
+            read = [Read(name, resource, 0, "attach")]  # what `update` wrote before the frame must still be there
         if request.kind == "mipmaps":
             read = [Read(name, resource, old, "attach")]
             load = "load"
@@ -366,7 +368,8 @@ class Numbering:
         for end in self.graph.textures:
             if str(end) in previous and str(end) not in self.resources:  # its node is idle: it stays as it first was
                 port, info = self.graph[end.node].node.ports()[end.port], self.graph.textures[end]
-                assert isinstance(port, Made) and info.desc is not None
+                assert isinstance(port, Made)
+                assert info.desc is not None
                 self.resources[str(end)] = Resource(str(end), info.desc, "history", port.first, info.view, info.lights)
         for name in set(wanted.values()) | previous:
             resource = self.resources[name]

@@ -5,14 +5,12 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from time import perf_counter
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
-from rendergraph.errors import Problem, RenderError
+from rendergraph.errors import Problem, RenderError, UsageError
 from rendergraph.execute import FrameTimes, Runner, median_times, summary
-from rendergraph.expand import CAMERA
 from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.images import decode
 from rendergraph.images.decode import Limits
@@ -85,6 +83,10 @@ class Session:
             self.programs.release()
         self.device.release()
 
+    def _check_thread(self) -> None:
+        if threading.get_ident() != self._thread:
+            raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
+
     # Drawing ---------------------------------------------------------------------------------------------------------
 
     def render(
@@ -105,10 +107,11 @@ class Session:
 
         `warm_up` draws the first frame once more beforehand, unmeasured, and starts history afresh after it.
         """
-        if threading.get_ident() != self._thread:
-            raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
+        self._check_thread()
         wanted = pipeline.wanted(outputs, taps)
         frames = range(1, 2) if frames is None else frames
+        if not frames:
+            raise UsageError(Problem("RG500", f"{frames} has no frame; frame 1 is the first"))
         with self.device.current():
             runner = self.prepare(pipeline, outputs, taps, alias=alias, poison=poison, shuffle=shuffle)
             if warm_up:
@@ -125,7 +128,7 @@ class Session:
                     frame = self._collect(pipeline, runner, wanted, number, times)
                     if on_frame is not None:
                         on_frame(frame)
-        assert frame is not None, "an empty range of frames"
+        assert frame is not None
         return frame
 
     def _frame(self, pipeline: Pipeline, runner: Runner, number: int, fps: float) -> FrameTimes:
@@ -155,6 +158,7 @@ class Session:
         The runner's `run` is the bare frame: what `render` does before and after it (warming up, reading back) is the
         caller's. The session's context must be current.
         """
+        self._check_thread()
         from rendergraph.allocate import allocate
         from rendergraph.schedule import schedule
 
@@ -270,6 +274,3 @@ def _output_info(name: str, semantic: str, encoding: str | None, desc: object) -
     else:
         channels = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}[fmt.components]
     return OutputInfo(name, semantic, desc.format, desc.kind, encoding, channels)
-
-
-__all__ = ["CAMERA", "Session", "perf_counter"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -87,7 +87,11 @@ class Quads(Node):
 
     def record(self, steps: Steps) -> None:
         steps.draw(
-            "one.frag", vertex="square.vert", vertices=4, topology="triangle_strip", attributes={"2f in_corner": self.corners}
+            "one.frag",
+            vertex="square.vert",
+            vertices=4,
+            topology="triangle_strip",
+            attributes={"2f in_corner": self.corners},
         )
 
     def update(self, frame: Frame) -> None:
@@ -136,5 +140,36 @@ def test_a_draw_whose_count_a_compute_shader_decides(draw: Draw) -> None:
         "points.vert": """void main() { gl_PointSize = 1.0;
             gl_Position = vec4((float(gl_VertexID) + 0.5) / 8.0 - 1.0, 1.0 / 8.0 - 1.0, 0.0, 1.0); }""",
     }
-    image = draw("nodes: {i: {type: indirect}}\noutputs: {image: i.color}", Indirect, shaders=shaders, size=(16, 8))["image"]
+    image = draw("nodes: {i: {type: indirect}}\noutputs: {image: i.color}", Indirect, shaders=shaders, size=(16, 8))[
+        "image"
+    ]
     assert image.sum() == 5
+
+
+class Seeded(Node):
+    """A number that `update` writes each frame, doubled by a compute shader in the same buffer."""
+
+    color = Output(AnyTexel, format="r32f", doc="Twice the frame's number.")
+    number = Internal(kind="buffer", bytes=16)
+
+    def record(self, steps: Steps) -> None:
+        steps.compute("double.comp", groups=(1, 1, 1), out=self.number)
+        steps.fullscreen("number.frag", number=self.number, out=self.color)
+
+    def update(self, frame: Frame) -> None:
+        frame.write(self.number, np.full(4, frame.index, np.float32))
+
+
+def test_a_buffer_that_update_fills_and_a_step_changes_is_never_shared(bench: Any) -> None:
+    shaders = {
+        "double.comp": """layout(local_size_x = 1) in; layout(std430) buffer number { float values[4]; };
+            void main() { values[0] *= 2.0; }""",
+        "number.frag": """layout(std430) readonly buffer number { float values[4]; };
+            out float color; void main() { color = values[0]; }""",
+    }
+    text = "nodes: {a: {type: seeded}, b: {type: seeded}}\noutputs: {image: a.color, other: b.color}"
+    pipeline = bench.pipeline(text, Seeded, shaders=shaders)
+    plan = pipeline.plan()
+    assert plan.placement["a.number"] != plan.placement["b.number"]
+    frame = bench.session.render(pipeline, frames=range(1, 4))
+    assert frame["image"].mean() == frame["other"].mean() == 6.0

@@ -199,7 +199,9 @@ def test_a_sampler_that_nothing_is_bound_to_is_named(draw: Draw) -> None:
 
         color = Output(Radiance, doc="Nothing good.")
 
-    shader = {"wrong.frag": "uniform sampler2D depht; out vec4 color; void main() { color = texelFetch(depht, ivec2(0), 0); }"}
+    shader = {
+        "wrong.frag": "uniform sampler2D depht; out vec4 color; void main() { color = texelFetch(depht, ivec2(0), 0); }"
+    }
     with pytest.raises(InputError, match=r"node 'w': wrong.frag samples 'depht', but the step reads no texture"):
         draw("nodes: {w: {type: wrong}}\noutputs: {image: w.color}", Wrong, shaders=shader)
 
@@ -241,3 +243,17 @@ def test_what_is_said_beside_like_wins(bench: Any) -> None:
     described = {end.port: info.desc for end, info in graph.textures.items() if end.node == "b"}
     assert (described["same"].format, described["same"].size) == ("rgba32f", (4, 2))
     assert (described["own"].format, described["own"].size) == ("rgba16f", (16, 8))
+
+
+def test_a_uniform_that_nothing_sets_is_named(draw: Draw) -> None:
+    class Wrong(Node):
+        """Looks at a misspelt parameter."""
+
+        color = Output(Radiance, doc="Nothing good.")
+        gain: float = param(default=1.0, doc="Factor.")
+
+    shader = {"wrong.frag": "uniform float gian; out vec4 color; void main() { color = vec4(gian); }"}
+    with pytest.raises(
+        InputError, match=r"RG434 node 'w': wrong.frag looks at uniform 'gian', which nothing sets; did you mean 'gain'"
+    ):
+        draw("nodes: {w: {type: wrong}}\noutputs: {image: w.color}", Wrong, shaders=shader)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from rendergraph.api import Any as AnyTexel
 from rendergraph.api import ADD, History, InOut, Input, Luminance, Node, Output, State, Steps
+from rendergraph.api import Any as AnyTexel
 from rendergraph.declare import declaration_mistakes
 
 if TYPE_CHECKING:
