@@ -72,11 +72,11 @@ def compare(name: str, ours: Draw, by_hand: Draw, *, frames: int, turns: int, go
     taken: list[tuple[float, float, float, float]] = []
     for turn in range(turns):
         if turn % 2:
-            b = _time(by_hand, frames)
-            a = _time(ours, frames)
+            b = cpu_and_wall(by_hand, frames)
+            a = cpu_and_wall(ours, frames)
         else:
-            a = _time(ours, frames)
-            b = _time(by_hand, frames)
+            a = cpu_and_wall(ours, frames)
+            b = cpu_and_wall(by_hand, frames)
         taken.append((*a, *b))
     cpu = [a_cpu / b_cpu for a_cpu, _, b_cpu, _ in taken]
     wall = [a_wall / b_wall for _, a_wall, _, b_wall in taken]
@@ -88,7 +88,7 @@ def compare(name: str, ours: Draw, by_hand: Draw, *, frames: int, turns: int, go
     )  # fmt: skip
 
 
-def _time(draw: Draw, frames: int) -> tuple[float, float]:
+def cpu_and_wall(draw: Draw, frames: int) -> tuple[float, float]:
     """Milliseconds of CPU and of wall time a frame."""
     wall, cpu = time.perf_counter(), time.process_time()
     draw(frames)
