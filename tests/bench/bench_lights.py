@@ -173,7 +173,7 @@ def main() -> None:
     cells, device = bench(chosen.frames, chosen.save)
     if chosen.save:
         (Path(chosen.save) / "lights.svg").write_text(plot([asdict(cell) for cell in cells], device))
-        (Path(chosen.save) / "lights.md").write_text(table(cells, device) + "\n")
+        (Path(chosen.save) / "lights.txt").write_text(table(cells, device) + "\n")
     if chosen.json:
         import json
 
