@@ -7,6 +7,13 @@ uniform ivec2 screen;
 uniform float radius;  // metres
 out float rough;
 
+// What a disc at `offset` hides; nothing from beyond the radius or below the horizon.
+float hiding(View v, vec3 offset, vec3 normal, float far_off, float area, float facing) {
+    float apart = length(offset);
+    if (apart > radius || !rises(v, offset, normal, far_off)) return 0.0;
+    return disc_occlusion(apart, area, facing, dot(normal, offset) / apart);
+}
+
 void main() {
     View v = surfaces_views[0];
     ivec2 texel = ivec2(gl_FragCoord.xy);
@@ -28,17 +35,23 @@ void main() {
         vec4 seen = texelFetch(surfaces, there, 0);
         if (seen.w == 0.0) continue;
         vec3 at = view_position(v, place_for(there, size, screen), seen.w);
-        vec3 offset = at - position;
-        float apart = length(offset);
-        if (apart > radius || !rises(v, offset, here.xyz, max(here.w, seen.w))) continue;
-        vec3 towards = offset / apart;
-        // The ring's share of the disc, at the sample's distance, seen aslant.
+        // The ring's share of the disc on the screen, at the distance of what is seen there.
         float scale = clip_w(v, seen.w) / w;
+        float ring = 6.28318531 * out_to / float(SAMPLES) * radius * radius * scale * scale;
         vec3 sight = v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, -1.0) : at / seen.w;
-        float ring = 6.28318531 * out_to / float(SAMPLES) * radius * radius;
-        float area = ring * scale * scale / max(abs(dot(seen.xyz, sight)), 0.05);
-        // A face turned away is the far side of something solid, and hides as much as its hidden near side.
-        blocked += disc_occlusion(apart, area, abs(dot(seen.xyz, towards)), dot(here.xyz, towards));
+        vec3 offset = at - position;
+        float facing = -dot(seen.xyz, offset) / length(offset);
+        float slant = max(abs(dot(seen.xyz, sight)), 0.05);
+        float far_off = max(here.w, seen.w);
+        float hidden = hiding(v, offset, here.xyz, far_off, ring / slant, abs(facing));
+        if (facing < 0.0) {
+            // The far side of something solid. Its near side is not seen: a disc that faces the receiver stands for it,
+            // behind what is seen, where the line of sight comes nearest.
+            sight = normalize(sight);
+            offset += sight * clamp(-dot(offset, sight), 0.0, radius);
+            hidden = max(hidden, hiding(v, offset, here.xyz, far_off, ring, 1.0));
+        }
+        blocked += hidden;
     }
     rough = max(1.0 - blocked, 0.0);
 }

@@ -1,0 +1,202 @@
+"""The pieces of screen-space occlusion, each against NumPy or a closed form."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from rendergraph.nodes.geometry.gbuffer import GBuffer
+from rendergraph.nodes.occlusion._kernel import spread_points
+from rendergraph.nodes.occlusion._screen_space import reduced_size
+from rendergraph.nodes.occlusion.ssao_hemisphere import SSAOHemisphere
+
+import rendergraph as rg
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Output, ViewMatrices
+from rendergraph.catalog import Catalog
+from rendergraph.resources import folder
+from rendergraph.scene.cameras import view_matrices
+
+Floats = npt.NDArray[np.float64]
+Evaluate = Callable[..., Floats]
+
+
+# --- directions ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("count", "least"),
+    [(2, 0.5), (3, 3**0.5), (4, 3.674234614), (8, 19.675287861), (16, 92.911655302), (32, 412.261274651)],
+)
+def test_directions_rest_at_least_energy(count: int, least: float) -> None:
+    """The known least energies of the Thomson problem."""
+    points = spread_points(count)
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1)
+    first, second = np.triu_indices(count, 1)
+    energy = (1 / np.linalg.norm(points[first] - points[second], axis=1)).sum()
+    assert least * (1 - 1e-9) <= energy < least * 1.003
+
+
+# --- disc to disc ----------------------------------------------------------------------------------------------------
+
+
+def test_disc_occlusion(evaluate: Evaluate) -> None:
+    rng = np.random.default_rng(3)
+    r, area = rng.uniform(0.01, 3, 500), rng.uniform(1e-4, 4, 500)
+    emitter, receiver = rng.uniform(-1, 1, 500), rng.uniform(-1, 1, 500)
+    found = evaluate(
+        "disc_to_disc.glsl", {"r": r, "area": area, "emitter": emitter, "receiver": receiver},
+        "result.x = disc_occlusion(r, area, emitter, receiver);",
+    )[:, 0]  # fmt: skip
+    share = 1 - r / np.sqrt(area / np.pi + r**2)
+    expected = share * np.maximum(emitter, 0) * np.minimum(np.maximum(4 * receiver, 0), 1)
+    np.testing.assert_allclose(found, expected, atol=2e-6)
+
+
+def test_disc_overhead_hides_its_share_of_the_hemisphere(evaluate: Evaluate) -> None:
+    """Face to face: the solid angle 2π(1 − cos α) of a disc, of the 2π above the receiver."""
+    half_angle = np.linspace(0.05, 1.5, 20)
+    distance = np.full(20, 0.7)
+    area = np.pi * (distance * np.tan(half_angle)) ** 2
+    found = evaluate(
+        "disc_to_disc.glsl", {"r": distance, "area": area}, "result.x = disc_occlusion(r, area, 1.0, 1.0);"
+    )
+    np.testing.assert_allclose(found[:, 0], 1 - np.cos(half_angle), atol=1e-5)
+
+
+# --- blur and upsampling ---------------------------------------------------------------------------------------------
+
+
+class ShownOcclusion(SSAOHemisphere):
+    """The same with its scratch textures to look at."""
+
+    surfaces = Output(AnyTexel, format="rgba32f", size=reduced_size, view="depth", doc="Surfaces.")  # type: ignore[assignment]
+    rough = Output(AnyTexel, format="r16", size=reduced_size, doc="Before the blur.")  # type: ignore[assignment]
+    blurred = Output(AnyTexel, format="r16", size=reduced_size, doc="After it.")  # type: ignore[assignment]
+
+
+Show = Callable[..., tuple[rg.Frame, ViewMatrices]]
+RADIUS, BLUR = 0.4, 3
+
+
+@pytest.fixture
+def show(tmp_path: Path, session: rg.Session) -> Show:
+    """`show(size, scale)`: every texture of the Cornell box's occlusion, and the camera's projection."""
+    for family in ("geometry", "occlusion"):
+        shutil.copytree(folder("rendergraph.shaders") / family, tmp_path / "shaders", dirs_exist_ok=True)
+    catalog = Catalog.of(GBuffer, ShownOcclusion, shaders=tmp_path / "shaders")
+
+    def run(size: tuple[int, int], scale: float) -> tuple[rg.Frame, ViewMatrices]:
+        blurred = ", blurred: ao.blurred" if scale < 1 else ""
+        (tmp_path / "test.yaml").write_text(f"""rendergraph: 1
+size: [{size[0]}, {size[1]}]
+scene: cornell_box
+nodes:
+  g: {{type: gbuffer, params: {{precision: full}}}}
+  ao:
+    type: shown_occlusion
+    inputs: {{depth: g.depth, normal: g.normal}}
+    params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, samples: 8}}
+outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, rough: ao.rough, depth: g.depth, normal: g.normal{blurred}}}
+""")
+        pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=catalog)
+        frame = session.render(pipeline)
+        camera = view_matrices(next(iter(pipeline.scene.cameras.values())), size)
+        return frame, camera
+
+    return run
+
+
+def places(small: tuple[int, int], screen: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Window coordinates of the texels that a smaller picture stands for, columns and rows, bottom row first."""
+    return tuple(  # type: ignore[return-value]
+        (((2 * np.arange(s) + 1) * full // (2 * s)) + 0.5) / full for s, full in zip(small, screen, strict=True)
+    )
+
+
+def positions(distance: Floats, x: Floats, y: Floats, camera: ViewMatrices) -> Floats:
+    """View-space positions of a perspective picture, bottom row first."""
+    p = camera.projection
+    ndc_x, ndc_y = np.meshgrid(x * 2 - 1, y * 2 - 1)
+    return np.stack([ndc_x * distance / p[0, 0], ndc_y * distance / p[1, 1], -distance], -1)
+
+
+def same_surface(offset: Floats, normal: Floats, neighbour: Floats) -> Floats:
+    off_plane = (offset * normal).sum(-1) / (0.1 * RADIUS)
+    facing = np.maximum((normal * neighbour).sum(-1), 0) ** 8
+    return np.asarray(np.exp(-(off_plane**2)) * facing)
+
+
+def flipped(frame: rg.Frame, name: str) -> Floats:
+    return np.asarray(frame[name][::-1], np.float64)
+
+
+def blur_by_hand(values: Floats, surfaces: Floats, where: Floats, axis: int) -> Floats:
+    made = np.ones_like(values)
+    height, width = values.shape
+    for i in range(height):
+        for j in range(width):
+            if surfaces[i, j, 3] == 0:
+                continue
+            n, last = ((i, height), (j, width))[axis]
+            low, high = max(n - BLUR, 0), min(n + BLUR + 1, last)
+            line = (slice(low, high), j) if axis == 0 else (i, slice(low, high))
+            there = surfaces[line]
+            weights = same_surface(where[line] - where[i, j], surfaces[i, j, :3], there[:, :3]) * (there[:, 3] > 0)
+            made[i, j] = (weights * values[line]).sum() / weights.sum()
+    return made
+
+
+@pytest.mark.parametrize(("size", "scale"), [((48, 36), 1), ((81, 61), 0.5)])
+def test_the_blur_is_a_mean_over_the_same_surface(show: Show, size: tuple[int, int], scale: float) -> None:
+    frame, camera = show(size, scale)
+    surfaces, rough = flipped(frame, "surfaces"), flipped(frame, "rough")[..., 0]
+    where = positions(surfaces[..., 3], *places((rough.shape[1], rough.shape[0]), size), camera)
+    expected = blur_by_hand(blur_by_hand(rough, surfaces, where, 1), surfaces, where, 0)
+    found = flipped(frame, "occlusion" if scale == 1 else "blurred")[..., 0]
+    assert np.abs(found - rough).max() > 0.1
+    np.testing.assert_allclose(found, expected, atol=2e-3)
+
+
+@pytest.mark.parametrize(("size", "scale"), [((64, 48), 0.5), ((81, 61), 0.25), ((64, 48), 0.125)])
+def test_upsampling_keeps_to_the_surface(show: Show, size: tuple[int, int], scale: float) -> None:
+    frame, camera = show(size, scale)
+    surfaces, small = flipped(frame, "surfaces"), flipped(frame, "blurred")[..., 0]
+    height, width = small.shape
+    assert (width, height) == tuple(int(np.ceil(side * scale)) for side in size)
+    p, depth = camera.projection, flipped(frame, "depth")[..., 0] * 2 - 1
+    x, y = ((np.arange(side) + 0.5) / side for side in size)
+    where = positions(p[2, 3] / (p[2, 2] + depth), x, y, camera)
+    where_small = positions(surfaces[..., 3], *places((width, height), size), camera)
+    normals = flipped(frame, "normal")[..., :3] @ camera.view[:3, :3].T
+    expected = np.ones((size[1], size[0]))
+    for i, j in np.ndindex(expected.shape):
+        if depth[i, j] == 1:
+            continue
+        at = np.array([y[i] * height, x[j] * width]) - 0.5
+        first, total, weighted = np.floor(at).astype(int), 0.0, 0.0
+        for corner in np.ndindex(2, 2):
+            k = tuple(int(n) for n in np.clip(first + corner, 0, (height - 1, width - 1)))
+            if surfaces[k][3] == 0:
+                continue
+            near = np.prod(np.where(corner, at - first, 1 - at + first) + 1e-3)
+            weight = near * (same_surface(where_small[k] - where[i, j], normals[i, j], surfaces[k][:3]) + 1e-4)
+            total, weighted = total + weight, weighted + weight * small[k]
+        if total > 0:
+            expected[i, j] = weighted / total
+    found = flipped(frame, "occlusion")[..., 0]
+    assert found.std() > 0.02
+    assert np.quantile(np.abs(found - expected), 0.999) < 2e-3
+
+
+def test_surfaces_are_view_space(show: Show) -> None:
+    frame, camera = show((48, 36), 1)
+    surfaces, normal = flipped(frame, "surfaces"), flipped(frame, "normal")[..., :3]
+    covered = np.asarray(surfaces[..., 3] > 0)
+    np.testing.assert_allclose(surfaces[covered][:, :3], normal[covered] @ camera.view[:3, :3].T, atol=1e-5)
+    np.testing.assert_array_equal(covered, flipped(frame, "depth")[..., 0] < 1)

@@ -1,0 +1,248 @@
+"""Both kinds of screen-space occlusion against ray tracing, closed forms, and themselves from elsewhere."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import rendergraph as rg
+from rendergraph.scene.cameras import view_matrices
+
+Floats = npt.NDArray[np.float64]
+Occlusion = Callable[..., Floats]
+BOTH = pytest.mark.parametrize("technique", ["hemisphere", "disc"])
+CASES = [("cornell", 0.3), ("cornell", 0.8), ("stairs", 0.5), ("stairs", 1.2)]
+
+
+# --- ray-traced occlusion --------------------------------------------------------------------------------------------
+
+
+def errors(occlusion: Occlusion, shared: Path, technique: str, case: str, radius: float, **params: Any) -> Any:
+    """Correlation with the ray-traced picture, and RMSE, where something is and away from its edges."""
+    here = shared / "reference" / "b3_ao" / case
+    camera = json.loads((here / "case.json").read_text())["camera"]
+    truth = np.load(here / "ao.npz")
+    size = (camera["width"], camera["height"])
+    found = occlusion(technique, here / "scene.glb", size, radius=radius, **params)
+    judged = (truth["depth"] > 0) & ~truth["edge"]
+    a, b = found[judged], truth[f"ao_r{radius}"][judged].astype(np.float64)
+    return np.corrcoef(a, b)[0, 1], np.sqrt(np.mean((a - b) ** 2))
+
+
+@pytest.mark.parametrize(("case", "radius"), CASES)
+def test_hemispheres_find_the_ray_traced_occlusion(
+    occlusion: Occlusion, shared: Path, case: str, radius: float
+) -> None:
+    correlation, rmse = errors(occlusion, shared, "hemisphere", case, radius, samples=64)
+    assert correlation > 0.94
+    assert rmse < 0.08
+
+
+@pytest.mark.parametrize(("case", "radius", "bound"), [(*case, 0.13 if case[1] == 0.8 else 0.1) for case in CASES])
+def test_discs_find_the_ray_traced_occlusion(
+    occlusion: Occlusion, shared: Path, case: str, radius: float, bound: float
+) -> None:
+    """The second case reaches farthest across the picture, and 64 samples leave gaps: its RMSE is 0.126."""
+    correlation, rmse = errors(occlusion, shared, "disc", case, radius, samples=64)
+    assert correlation > 0.84
+    assert rmse < bound
+
+
+@pytest.mark.parametrize(("case", "radius"), CASES)
+def test_more_samples_are_nearer(occlusion: Occlusion, shared: Path, case: str, radius: float) -> None:
+    def falling(technique: str, **params: Any) -> list[float]:
+        return [errors(occlusion, shared, technique, case, radius, samples=n, **params)[1] for n in (8, 32, 128)]
+
+    few, some, many = falling("disc")
+    assert few > 1.1 * some > 1.1 * many
+    few, some, many = falling("hemisphere", blur=0)
+    assert few > 1.1 * some > many
+
+
+@BOTH
+@pytest.mark.parametrize("scale", [0.5, 0.25])
+def test_reduced_size_keeps_most(occlusion: Occlusion, shared: Path, technique: str, scale: float) -> None:
+    correlation, rmse = errors(occlusion, shared, technique, "stairs", 1.2, samples=64, scale=scale)
+    assert correlation > 0.83
+    assert rmse < 0.11
+
+
+# --- closed forms ----------------------------------------------------------------------------------------------------
+
+PLANE = """objects: {{floor: {{shape: plane, size: [40, 40]}}}}
+cameras: {{main: {{eye: [0, {height}, 2], target: [0.3, 0, -1], {lens}, near: 0.1, far: 60}}}}
+"""
+
+
+@BOTH
+@pytest.mark.parametrize("scale", [1, 0.5, 0.125])
+@pytest.mark.parametrize("height", [0.05, 1, 20])
+@pytest.mark.parametrize("lens", ["fov_y_degrees: 60", "height: 3"])
+def test_a_plane_alone_is_open(occlusion: Occlusion, technique: str, scale: float, height: float, lens: str) -> None:
+    found = occlusion(technique, PLANE.format(height=height, lens=lens), samples=16, scale=scale, radius=1)
+    assert found.min() == 1
+
+
+CORNER = """objects:
+  floor: {{shape: plane, size: [40, 40], at: [0, 0, 20]}}
+  wall: {{shape: plane, size: [40, 40], rotate_degrees: [90, 0, 0], at: [0, 20, 0]}}
+cameras: {{main: {{eye: [0, {eye}, {eye}], target: [0, 0, {target}], {lens}, near: 0.1, far: 60}}}}
+"""
+
+
+def in_corner(distance: Floats, radius: float) -> Floats:
+    """Openness of a plane at a distance from a wall at right angles to it, for hits nearer than the radius.
+
+    The directions that reach the wall in time are a cap around its normal; seen from above, cosine-weighted, that is
+    the segment x >= c of the unit circle.
+    """
+    c = np.clip(distance / radius, 0, 1)
+    return np.asarray(1 - (np.arccos(c) - c * np.sqrt(1 - c**2)) / np.pi)
+
+
+@pytest.mark.parametrize(("technique", "bound"), [("hemisphere", 0.055), ("disc", 0.14)])
+@pytest.mark.parametrize("lens", ["fov_y_degrees: 30", "height: 3"])
+def test_a_corner_is_the_closed_form(occlusion: Occlusion, technique: str, bound: float, lens: str) -> None:
+    """Down the middle column of a picture of the floor beside a wall."""
+    side, eye, target = 121, 4.0, 0.8
+    found = occlusion(technique, CORNER.format(eye=eye, target=target, lens=lens), (side, side), samples=128, radius=1)
+    away = floor_distance(side, eye, target, lens)
+    judged = (away > 0.08) & (away < 1.4)
+    assert judged.sum() > 30
+    column = found[judged, side // 2]
+    expected = in_corner(away[judged], 1.0)
+    assert np.abs(column - expected).max() < bound
+    assert np.corrcoef(column, expected)[0, 1] > 0.97
+    np.testing.assert_array_equal(column[away[judged] > 1.05], 1)
+
+
+def floor_distance(side: int, eye: float, target: float, lens: str) -> Floats:
+    """Where the middle of each row of the picture of `CORNER` meets the floor: z."""
+    kind, number = lens.split(": ")
+    up = 1 - (np.arange(side) + 0.5) / side * 2
+    forward = np.array([-eye, target - eye]) / np.hypot(eye, eye - target)  # y, z
+    upward = np.array([-forward[1], forward[0]])
+    if kind == "height":
+        start = np.array([eye, eye]) + up[:, None] * upward * float(number) / 2
+        along = np.broadcast_to(forward, start.shape)
+    else:
+        along = forward + up[:, None] * upward * np.tan(np.radians(float(number) / 2))
+        start = np.broadcast_to([eye, eye], along.shape)
+    return np.asarray(start[:, 1] - start[:, 0] / along[:, 0] * along[:, 1])
+
+
+FLOATING = """objects:
+  floor: {{shape: plane, size: [20, 20]}}
+  plate: {{shape: box, size: [1, 0.1, 1], at: [0, {height}, 0]}}
+cameras: {{main: {{eye: [0, 6, 2], target: [0, 0, 0], fov_y_degrees: 40, near: 0.1, far: 60}}}}
+"""
+
+
+@pytest.mark.parametrize(("technique", "trace"), [("hemisphere", 0.015), ("disc", 0.0)])
+def test_nothing_beyond_the_radius_occludes(occlusion: Occlusion, technique: str, trace: float) -> None:
+    """A plate above the floor darkens it around; twice the radius up it does not, though it is beside it on screen.
+
+    Hemispheres leave a trace: the plate's front face, extended, cuts some of the floor's directions.
+    """
+    assert occlusion(technique, FLOATING.format(height=0.35), samples=64, radius=0.6).min() < 0.9
+    assert occlusion(technique, FLOATING.format(height=1.25), samples=64, radius=0.6).min() >= 1 - trace
+
+
+# --- the same from elsewhere -----------------------------------------------------------------------------------------
+
+STUDY = """objects:
+  floor: {{shape: plane, size: [{s20}, {s20}]}}
+  box: {{shape: box, size: [{s1}, {s1}, {s1}], at: [0, {s05}, 0]}}
+  ball: {{shape: sphere, radius: {s05}, at: [{s1}, {s05}, {s05}]}}
+cameras: {{main: {{eye: [0, {eye}, {eye}], target: [0, {s05}, 0], fov_y_degrees: {fov},
+  near: {near}, far: {far}}}}}
+"""
+
+
+def study(by: float, eye: float = 4.0, fov: float = 40.0) -> str:
+    sizes = {"s20": 20 * by, "s1": by, "s05": by / 2, "eye": eye * by, "near": 0.1 * by, "far": 60 * by}
+    return STUDY.format(**sizes, fov=fov)
+
+
+@BOTH
+@pytest.mark.parametrize("by", [0.01, 250])
+def test_a_scene_in_other_units_is_the_same_picture(occlusion: Occlusion, technique: str, by: float) -> None:
+    one = occlusion(technique, study(1), samples=32, radius=0.7)
+    other = occlusion(technique, study(by), samples=32, radius=0.7 * by)
+    assert one.min() < 0.6
+    assert np.mean(np.abs(one - other) > 1e-3) < 0.01
+
+
+@pytest.mark.parametrize(("technique", "most", "mean"), [("hemisphere", 0.1, 0.012), ("disc", 0.12, 0.015)])
+def test_occlusion_stays_where_it_is_when_the_eye_goes_back(
+    session: rg.Session, tmp_path: Path, technique: str, most: float, mean: float
+) -> None:
+    """The same points of floor, box and ball, seen from one and a half times as far: no darker, no lighter."""
+
+    def look(eye: float) -> tuple[Floats, Floats, Any]:
+        file = tmp_path / "scene.yaml"
+        file.write_text("scene: 1\n" + study(1, eye))
+        patch = {"outputs": {"occlusion": "ao.occlusion", "depth": "gbuffer.depth"}}
+        sets = ["ao.samples=128", "ao.radius=0.7"]
+        pipeline = rg.load(f"ssao-{technique}", scene=file, size=(240, 180), sets=sets, patches=[patch])
+        frame = session.render(pipeline)
+        view = view_matrices(next(iter(pipeline.scene.cameras.values())), (240, 180))
+        return frame["occlusion"][::-1, :, 0].astype(float), frame["depth"][::-1, :, 0].astype(float), view
+
+    (near, depth, close), (far, far_depth, away) = look(4), look(6)
+    rows, columns = np.nonzero(depth < 1)
+    ndc = np.stack([(columns + 0.5) / 120 - 1, (rows + 0.5) / 90 - 1, depth[rows, columns] * 2 - 1, np.ones(len(rows))])
+    world = np.linalg.inv(close.projection @ close.view) @ ndc
+    clip = away.projection @ away.view @ (world / world[3])
+    x, y, z = (clip[:3] / clip[3] + 1) / 2
+    column, row = (x * 240).astype(int), (y * 180).astype(int)
+    same = np.abs(far_depth[row, column] - z) < 1e-4
+    difference = (near[rows, columns] - far[row, column])[same]
+    assert same.mean() > 0.8
+    assert near[rows, columns][same].min() < 0.5
+    assert np.quantile(np.abs(difference), 0.98) < most
+    assert np.abs(difference).mean() < mean
+    assert abs(difference.mean()) < 0.006
+
+
+# --- parameters, and what becomes of it ------------------------------------------------------------------------------
+
+
+def test_what_is_near_the_eye_is_left_open(occlusion: Occlusion) -> None:
+    """Bound and picture: the lower part of the picture is nearer than 5 m, the upper part is not."""
+    everywhere = occlusion("hemisphere", study(1), radius=0.7, blur=0)
+    cut = occlusion("hemisphere", study(1), radius=0.7, blur=0, nearest=5.3)
+    open_now = (cut == 1) & (everywhere < 1)
+    assert open_now.any()
+    np.testing.assert_array_equal(cut[~open_now], everywhere[~open_now])
+    assert np.nonzero(open_now)[0].mean() > np.nonzero(cut < 1)[0].mean()
+    assert occlusion("hemisphere", study(1), radius=0.7, blur=0, nearest=60).min() == 1
+
+
+@BOTH
+def test_ambient_light_is_scaled(session: rg.Session, technique: str) -> None:
+    def radiance(*sets: str) -> Any:
+        sets = (*sets, "light.terms=ambient", "light.ambient=0.5", "gbuffer.precision=full")
+        patch = {"outputs": {"radiance": "light.radiance", "occlusion": "ao.occlusion"}}
+        return session.render(
+            rg.load(f"ssao-{technique}", scene="cornell_box", size=(64, 48), sets=sets, patches=[patch])
+        )
+
+    with_it, without = radiance(), radiance("light.occlusion=null")
+    expected = without["radiance"][..., :3] * with_it["occlusion"][..., :1]
+    assert with_it["occlusion"].min() < 0.7
+    np.testing.assert_allclose(with_it["radiance"][..., :3], expected, rtol=2e-3, atol=1e-5)
+
+
+@BOTH
+def test_the_default_picture_is_the_same_every_time(occlusion: Occlusion, technique: str) -> None:
+    a, b = (occlusion(technique, "cornell_box", (65, 47), scale=0.3) for _ in range(2))
+    np.testing.assert_array_equal(a, b)
+    assert np.isfinite(a).all()
+    assert 0.5 < a.mean() < 1
