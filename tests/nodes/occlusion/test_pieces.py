@@ -13,6 +13,7 @@ import pytest
 from rendergraph.nodes.geometry.gbuffer import GBuffer
 from rendergraph.nodes.occlusion._kernel import spread_points
 from rendergraph.nodes.occlusion._screen_space import reduced_size
+from rendergraph.nodes.occlusion.ssao_disc import SSAODisc
 from rendergraph.nodes.occlusion.ssao_hemisphere import SSAOHemisphere
 
 import rendergraph as rg
@@ -78,10 +79,11 @@ class ShownOcclusion(SSAOHemisphere):
     surfaces = Output(AnyTexel, format="rgba32f", size=reduced_size, view="depth", doc="Surfaces.")  # type: ignore[assignment]
     rough = Output(AnyTexel, format="r16", size=reduced_size, doc="Before the blur.")  # type: ignore[assignment]
     blurred = Output(AnyTexel, format="r16", size=reduced_size, doc="After it.")  # type: ignore[assignment]
+    noise = Output(AnyTexel, format="rgba16_snorm", size=(64, 64), doc="Noise.")  # type: ignore[assignment]
 
 
 Show = Callable[..., tuple[rg.Frame, ViewMatrices]]
-RADIUS, BLUR = 0.4, 3
+RADIUS, BLUR, SAMPLES = 0.4, 3, 12
 
 
 @pytest.fixture
@@ -89,7 +91,7 @@ def show(tmp_path: Path, session: rg.Session) -> Show:
     """`show(size, scale)`: every texture of the Cornell box's occlusion, and the camera's projection."""
     for family in ("geometry", "occlusion"):
         shutil.copytree(folder("rendergraph.shaders") / family, tmp_path / "shaders", dirs_exist_ok=True)
-    catalog = Catalog.of(GBuffer, ShownOcclusion, shaders=tmp_path / "shaders")
+    catalog = Catalog.of(GBuffer, ShownOcclusion, SSAODisc, shaders=tmp_path / "shaders")
 
     def run(size: tuple[int, int], scale: float) -> tuple[rg.Frame, ViewMatrices]:
         blurred = ", blurred: ao.blurred" if scale < 1 else ""
@@ -101,8 +103,9 @@ nodes:
   ao:
     type: shown_occlusion
     inputs: {{depth: g.depth, normal: g.normal}}
-    params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, samples: 8}}
-outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, rough: ao.rough, depth: g.depth, normal: g.normal{blurred}}}
+    params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, samples: {SAMPLES}}}
+  disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}}}}}
+outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, rough: ao.rough, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
 """)
         pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=catalog)
         frame = session.render(pipeline)
@@ -200,3 +203,81 @@ def test_surfaces_are_view_space(show: Show) -> None:
     covered = np.asarray(surfaces[..., 3] > 0)
     np.testing.assert_allclose(surfaces[covered][:, :3], normal[covered] @ camera.view[:3, :3].T, atol=1e-5)
     np.testing.assert_array_equal(covered, flipped(frame, "depth")[..., 0] < 1)
+
+
+# --- occlusion itself ------------------------------------------------------------------------------------------------
+
+
+def test_hemispheres_in_numpy(show: Show) -> None:
+    """All pixels at once, one sample after the other; a sample on a texel's border may round to either side."""
+    size = (64, 48)
+    frame, camera = show(size, 1)
+    surfaces, noise = flipped(frame, "surfaces"), flipped(frame, "noise")
+    normal, distance = surfaces[..., :3], surfaces[..., 3]
+    where = positions(distance, *places(size, size), camera)
+    random = noise[: size[1], : size[0]]
+    mirror = random[..., :3] / np.linalg.norm(random[..., :3], axis=-1, keepdims=True)
+    blocked = np.zeros(distance.shape)
+    for number, even in enumerate(spread_points(SAMPLES // 4)):
+        turned = even - 2 * (mirror @ even)[..., None] * mirror
+        along = (normal + turned) / np.maximum(np.linalg.norm(normal + turned, axis=-1, keepdims=True), 1e-6)
+        jitter = (random[..., 3] / 2 + 0.5 + number * 0.618034) % 1
+        most = np.zeros(distance.shape)
+        for reach in (0.2 * (0.4 + 0.6 * jitter), *(0.2 + 0.8 * (step + jitter) / 3 for step in range(3))):
+            point = where + along * (RADIUS * reach)[..., None]
+            clip = point @ camera.projection[:2, :3].T / np.maximum(-point[..., 2:], 1e-9)
+            column, row = (np.floor((clip[..., n] / 2 + 0.5) * size[n]).astype(int) for n in (0, 1))
+            inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1]) & (point[..., 2] < 0)
+            there = np.clip(row, 0, size[1] - 1), np.clip(column, 0, size[0] - 1)
+            offset, facing = where[there] - where, normal[there]
+            length, behind = np.linalg.norm(offset, axis=-1), -point[..., 2] - distance[there]
+            above = (offset * normal).sum(-1) > 0.02 * length + 1e-6
+            cuts = ((offset * facing).sum(-1) < 0) & (((where[there] - point) * facing).sum(-1) > 0)
+            counts = inside & (distance[there] > 0) & above & (behind > 0) & (cuts | (length <= RADIUS))
+            most = np.maximum(most, counts * np.maximum(1 - (behind / (4 * RADIUS)) ** 2, 0))
+        blocked += most
+    expected = np.where(distance > 0, 1 - blocked / (SAMPLES // 4), 1)
+    found = flipped(frame, "rough")[..., 0]
+    assert found.std() > 0.1
+    assert np.mean(np.abs(found - expected) > 1e-3) < 0.01
+
+
+def test_discs_in_numpy(show: Show) -> None:
+    size = (64, 48)
+    frame, camera = show(size, 1)
+    surfaces = flipped(frame, "surfaces")
+    normal, distance = surfaces[..., :3], surfaces[..., 3]
+    x, y = places(size, size)
+    where = positions(distance, x, y, camera)
+    reach = RADIUS / np.maximum(distance, 1e-3) / 2
+    blocked = np.zeros(distance.shape)
+
+    def hiding(offset: Floats, area: Floats, emitter: Floats) -> Floats:
+        apart = np.maximum(np.linalg.norm(offset, axis=-1), 1e-9)
+        receiver = (offset * normal).sum(-1) / apart
+        share = 1 - apart / np.sqrt(area / np.pi + apart**2)
+        return np.asarray(share * emitter * np.clip(4 * receiver, 0, 1) * (apart <= RADIUS) * (receiver > 0.02))
+
+    for number in range(SAMPLES):
+        out_to, turn = (number + 0.5) / SAMPLES, number * np.pi * (3 - 5**0.5)
+        column = np.floor((x + out_to * reach * camera.projection[0, 0] * np.cos(turn)) * size[0]).astype(int)
+        row = np.floor((y[:, None] + out_to * reach * camera.projection[1, 1] * np.sin(turn)) * size[1]).astype(int)
+        inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
+        there = np.clip(row, 0, size[1] - 1), np.clip(column, 0, size[0] - 1)
+        at, facing, far = where[there], normal[there], np.maximum(distance[there], 1e-3)
+        inside &= (distance[there] > 0) & (np.linalg.norm(at - where, axis=-1) > 0)
+        across = (
+            np.pi * RADIUS**2 * ((number + 1) ** 2 - number**2) / SAMPLES**2 * (far / np.maximum(distance, 1e-3)) ** 2
+        )
+        offset, sight = at - where, at / far[..., None]
+        emitter = -(facing * offset).sum(-1) / np.maximum(np.linalg.norm(offset, axis=-1), 1e-9)
+        slant = np.maximum(np.abs((facing * sight).sum(-1)), 0.05)
+        seen = hiding(offset, across / slant, np.abs(emitter))
+        line = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
+        nearest = offset + line * np.clip(-(offset * line).sum(-1), 0, RADIUS)[..., None]
+        unseen = hiding(nearest, across, np.ones(distance.shape))
+        blocked += inside * np.where(emitter < 0, np.maximum(seen, unseen), seen)
+    expected = np.where(distance > 0, np.maximum(1 - blocked, 0), 1)
+    found = flipped(frame, "disc")[..., 0]
+    assert found.std() > 0.05
+    assert np.mean(np.abs(found - expected) > 1e-3) < 0.02
