@@ -1,8 +1,8 @@
 """Declarative real-time rendering: one YAML file is a renderer.
 
-    import rendergraph as rg
-    frame = rg.load("deferred.yaml").set("ao.radius", 0.8).render(size=(640, 360))
-    frame["image"]
+import rendergraph as rg
+frame = rg.load("deferred.yaml").set("ao.radius", 0.8).render(size=(640, 360))
+frame["image"]
 """
 
 from __future__ import annotations

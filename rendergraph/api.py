@@ -60,7 +60,7 @@ from rendergraph.textures import (
 __all__ = [
     "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Albedo", "Any", "Blend", "Depth", "DisplayColor", "Emissive", "Facts",
     "Frame", "Function", "History", "InOut", "Input", "Internal", "IrradianceSH", "LightFacts", "LinearDepth",
-    "Luminance", "Material", "Node", "Normal", "Occlusion", "Output", "Part", "Port", "Radiance", "SceneRef", "Semantic",
-    "ShadowLookup", "ShadowMap", "Signature", "State", "Stencil", "StencilFace", "Steps", "TextureDesc", "TextureInfo",
-    "View", "ViewMatrices", "Views", "Visibility", "define", "full_mip_count", "param", "structural",
+    "Luminance", "Material", "Node", "Normal", "Occlusion", "Output", "Part", "Port", "Radiance", "SceneRef",
+    "Semantic", "ShadowLookup", "ShadowMap", "Signature", "State", "Stencil", "StencilFace", "Steps", "TextureDesc",
+    "TextureInfo", "View", "ViewMatrices", "Views", "Visibility", "define", "full_mip_count", "param", "structural",
 ]  # fmt: skip

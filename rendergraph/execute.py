@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -47,6 +46,7 @@ class FrameScene:
     """The scene of one frame as `update` sees it; see `steps.FrameScene`."""
 
     scene: Scene
+    _bounds: list[tuple[Vec3, Vec3]] = field(default_factory=list)
 
     @property
     def lights(self) -> tuple[Light, ...]:
@@ -68,10 +68,12 @@ class FrameScene:
         """What `Object.mesh` counts through."""
         return self.scene.meshes
 
-    @cached_property
+    @property
     def bounds(self) -> tuple[Vec3, Vec3]:
-        """Least and greatest corner of what is drawn."""
-        return bounds(self.scene)
+        """Least and greatest corner of what is drawn, found once."""
+        if not self._bounds:
+            self._bounds.append(bounds(self.scene))
+        return self._bounds[0]
 
 
 @dataclass(eq=False)

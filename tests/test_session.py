@@ -30,7 +30,7 @@ def living(raw: RawGL, most: int = 3000) -> dict[str, int]:
 
 
 def test_closing_a_session_frees_everything_it_made() -> None:
-    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)
+    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)  # type: ignore[arg-type]  # its stub knows only dicts
     session = rg.Session(ctx=ctx)
     raw = session.device.raw
     before = living(raw)
@@ -52,7 +52,7 @@ def test_frames_make_no_gl_object(gl: rg.Session) -> None:
 
 
 def test_a_borrowed_context_may_be_left_in_any_state_between_frames() -> None:
-    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)
+    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)  # type: ignore[arg-type]  # its stub knows only dicts
     with rg.Session(ctx=ctx) as session:
         pipeline = rg.load("forward", size=(64, 36))
         first = session.render(pipeline)["image"]

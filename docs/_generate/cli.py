@@ -43,7 +43,9 @@ def pages() -> Iterator[tuple[str, str]]:
 
 
 def _verb(verb: str, command: click.Command) -> str:
-    context = click.Context(command, info_name=f"rendergraph {verb}")
+    # click keeps the help option a command first makes, so the names the group gives it must be there already.
+    names = ["-h", "--help"]
+    context = click.Context(command, info_name=f"rendergraph {verb}", help_option_names=names)
     about, _, examples = inspect.cleandoc(command.help or "").partition("\b")
     lines = [f"$ {line.strip()}" for line in examples.splitlines()[2:] if line.strip()]
     options = [record for parameter in command.params if (record := parameter.get_help_record(context)) and record[1]]

@@ -25,7 +25,9 @@ class Lighting(Node):
     @property
     def background_rgb(self) -> tuple[float, float, float]:
         """The background as RGB."""
-        return self.background if isinstance(self.background, tuple) else (self.background,) * 3
+        if isinstance(self.background, tuple):
+            return self.background
+        return self.background, self.background, self.background
 
     @property
     def wants_lights(self) -> bool:

@@ -17,8 +17,9 @@ _OF_THE_BASE = frozenset(
 )
 
 # Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that the base class owns.
-RESERVED_NAMES: frozenset[str] = frozenset(
-    """
+RESERVED_NAMES: frozenset[str] = (
+    frozenset(
+        """
     attribute const uniform varying buffer shared coherent volatile restrict readonly writeonly layout centroid flat
     smooth noperspective patch sample break continue do for while switch case default if else subroutine in out inout
     float double int void bool true false invariant precise discard return mat2 mat3 mat4 vec2 vec3 vec4 ivec2 ivec3
@@ -30,14 +31,16 @@ RESERVED_NAMES: frozenset[str] = frozenset(
     max min mix mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose
     trunc
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
-) | _OF_THE_BASE
+    )
+    | _OF_THE_BASE
+)
 
 
 def declaration_mistakes(cls: type[Node]) -> list[str]:
     """What is wrong with a node's declaration, one sentence each; empty where it is fine.
 
-    Checked: names are GLSL identifiers and distinct, docs exist, defaults lie inside their range, formats exist, `like`,
-    `view`, `lights`, `needs` and `reads` name ports of this node.
+    Checked: names are GLSL identifiers and distinct, docs exist, defaults lie inside their range, formats exist,
+    `like`, `view`, `lights`, `needs` and `reads` name ports of this node.
     """
     mistakes: list[str] = []
     ports = cls.ports()

@@ -103,8 +103,8 @@ class DeviceError(RendergraphError):
 def nearest(word: str, words: Iterable[str]) -> str | None:
     """The word a user most likely meant, or None.
 
-    `difflib` alone misses shared beginnings (`kernal` for `kernel_size`), so words that share a prefix of four letters or a token
-    count too.
+    `difflib` alone misses shared beginnings (`kernal` for `kernel_size`), so words that are
+    near to one of the tokens count too.
     """
     known = sorted(words)
     lowered = {candidate.lower(): candidate for candidate in reversed(known)}

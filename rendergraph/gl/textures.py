@@ -123,7 +123,7 @@ def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[An
     desc = texture.desc
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
-    texels = np.empty((desc.layers, height, width, channels), dtype)
+    texels: npt.NDArray[Any] = np.empty((desc.layers, height, width, channels), dtype)
     device.ctx.finish()
     device.raw.glBindBuffer(0x88EB, 0)  # PIXEL_PACK_BUFFER: a borrowed context may have left one
     device.raw.glPixelStorei(0x0D05, 1)
@@ -136,9 +136,9 @@ def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[An
     if FORMATS[desc.format].family == "depth_stencil":
         texels = texels[..., :1]
     if FORMATS[desc.format].srgb:  # drivers hand out the encoded bytes; what the texels mean is linear
-        linear = np.arange(256) / 255
-        linear = np.where(linear <= 0.04045, linear / 12.92, ((linear + 0.055) / 1.055) ** 2.4)
-        colors, alpha = linear.astype(np.float32)[texels[..., :3]], texels[..., 3:] / np.float32(255)
+        code = np.arange(256) / 255
+        linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
+        colors, alpha = np.take(linear, texels[..., :3]), texels[..., 3:] / np.float32(255)
         texels = np.concatenate([colors, alpha], axis=-1)
     return texels[:, ::-1]
 

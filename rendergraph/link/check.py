@@ -204,7 +204,9 @@ class Checker:
     def _resizing(self, info: TextureInfo) -> Accepts:
         return lambda cls: any(
             port.size == "any" and _means(port, info.semantic, any_too=True)
-            and any(_continues(out, port, info) and out.like is None and out.size in (None, 1.0) for out in _outputs(cls))
+            and any(
+                _continues(out, port, info) and out.like is None and out.size in (None, 1.0) for out in _outputs(cls)
+            )
             for port in _only_input(cls)
         )  # fmt: skip
 

@@ -39,22 +39,27 @@ class FrameScene(Protocol):
     @property
     def lights(self) -> Sequence[Any]:
         """The scene's lights, in its order."""
+        ...
 
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Least and greatest corner of what is drawn."""
+        ...
 
     @property
     def objects(self) -> Sequence[Any]:
         """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`."""
+        ...
 
     @property
     def meshes(self) -> Sequence[Any]:
         """What an object's `mesh` counts through; `box` is a mesh's least and greatest corner."""
+        ...
 
     @property
     def materials(self) -> Sequence[Any]:
         """What an object's `material` counts through."""
+        ...
 
 
 class Frame(Protocol):
@@ -73,12 +78,16 @@ class Frame(Protocol):
     @property
     def scene(self) -> FrameScene:
         """The scene in this frame."""
+        ...
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
+        ...
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
+        ...
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload into a declared buffer; the array's bytes may be fewer than the buffer's."""
+        ...

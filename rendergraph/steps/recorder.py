@@ -19,12 +19,15 @@ class Recorder(Protocol):
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         """What a port's texture or buffer is allocated from."""
+        ...
 
     def used(self, port: Port) -> bool:
         """Whether anybody reads an output."""
+        ...
 
     def add(self, request: Request) -> None:
         """Keep a request."""
+        ...
 
 
 @dataclass(frozen=True)

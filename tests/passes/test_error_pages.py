@@ -79,7 +79,9 @@ def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
     text = f"nodes:\n        a: {{type: {node.__name__.lower()}}}\noutputs: {{image: a.color}}"
     pipeline = bench.pipeline(text, node, shaders=shaders)
     file = bench.folder / "test.yaml"
-    file.write_text(file.read_text().replace("rendergraph: 1\nsize: [16, 8]\n", "").replace("outputs", "rendergraph: 1\noutputs"))
+    file.write_text(
+        file.read_text().replace("rendergraph: 1\nsize: [16, 8]\n", "").replace("outputs", "rendergraph: 1\noutputs")
+    )
     with pytest.raises(RendergraphError, match=code) as caught:
         bench.session.render(pipeline)
     expected = page(code)["message"]

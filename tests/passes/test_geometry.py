@@ -48,7 +48,13 @@ BOXES = (
 
 @pytest.mark.parametrize(
     ("objects", "seen"),
-    [("all", {1, 2, 3}), ("opaque", {1, 2}), ("transparent", {0, 3}), ("casters", {0, 1}), (["before", "left"], {0, 1, 3})],
+    [
+        ("all", {1, 2, 3}),
+        ("opaque", {1, 2}),
+        ("transparent", {0, 3}),
+        ("casters", {0, 1}),
+        (["before", "left"], {0, 1, 3}),
+    ],
 )
 def test_a_step_draws_the_objects_it_names(draw: Draw, objects: Any, seen: set[int]) -> None:
     text = f"nodes: {{i: {{type: ids, params: {{objects: {json.dumps(objects)}}}}}}}\noutputs: {{image: i.color}}"
@@ -70,9 +76,7 @@ def _triangles(folder: Path, **material: Any) -> None:
     """A glTF with one triangle that faces the camera, one that faces away, and one mirrored, which still faces it."""
     points = np.array([[-1, -1, 0], [1, -1, 0], [-1, 1, 0]], np.float32)
     (folder / "t.bin").write_bytes(points.tobytes() + np.array([0, 1, 2, 0, 2, 1], np.uint16).tobytes())
-    meshes = [
-        {"primitives": [{"attributes": {"POSITION": 0}, "indices": number, "material": 0}]} for number in (1, 2)
-    ]
+    meshes = [{"primitives": [{"attributes": {"POSITION": 0}, "indices": number, "material": 0}]} for number in (1, 2)]
     gltf = {
         "asset": {"version": "2.0"},
         "buffers": [{"uri": "t.bin", "byteLength": 48}],
@@ -119,7 +123,9 @@ class Blended(Node):
         )
 
 
-BLEND = {"blend.frag": "flat in int v_object; out vec4 color; void main() { color = vec4(float(v_object + 1), 0, 0, 0.5); }"}
+BLEND = {
+    "blend.frag": "flat in int v_object; out vec4 color; void main() { color = vec4(float(v_object + 1), 0, 0, 0.5); }"
+}
 
 
 @pytest.mark.parametrize(("eye", "expected"), [(5, 0.5 * 3 + 0.25 * 2 + 0.125), (-5, 0.5 * 1 + 0.25 * 2 + 0.125 * 3)])

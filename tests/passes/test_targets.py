@@ -142,7 +142,9 @@ def test_a_geometry_shader_draws_to_all_layers_at_once(draw: Draw) -> None:
         array = Output(AnyTexel, kind="texture2d_array", format="r32f", layers=4, size=(4, 4), clear=-1.0, doc="Layer.")
 
         def record(self, steps: Steps) -> None:
-            steps.draw("layer.frag", vertex="triangle.vert", geometry="layers.geom", vertices=3, out=self.array, height=0.0)
+            steps.draw(
+                "layer.frag", vertex="triangle.vert", geometry="layers.geom", vertices=3, out=self.array, height=0.0
+            )
 
     shaders = {
         "triangle.vert": TRIANGLE,
@@ -207,7 +209,9 @@ def test_stencil_marks_where_the_next_step_draws(draw: Draw) -> None:
             )  # fmt: skip
             for value, func in ((1.0, "equal"), (2.0, "notequal")):
                 test = State(stencil=Stencil(StencilFace(func=func, reference=1)))  # type: ignore[arg-type]
-                steps.fullscreen("number.frag", out={"color": self.color, "marks": self.marks}, state=test, number=value)
+                steps.fullscreen(
+                    "number.frag", out={"color": self.color, "marks": self.marks}, state=test, number=value
+                )
 
     shaders = NUMBER | {"triangle.vert": TRIANGLE}
     image = draw("nodes: {m: {type: marked}}\noutputs: {image: m.color}", Marked, shaders=shaders, size=(8, 8))["image"]
@@ -230,13 +234,16 @@ def test_depth_of_another_node_is_tested_and_not_written(draw: Draw) -> None:
 
         depth = Input(Depth, use="depth_test", doc="Tested.")
         color = Output(AnyTexel, format="r32f", clear=0.0, doc="Where it is seen.")
+
         def record(self, steps: Steps) -> None:
             steps.draw("number.frag", vertex="whole.vert", vertices=3, height=0.5, number=1.0)
 
     whole = """uniform float height; void main() {
         vec2 p = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2); gl_Position = vec4(p * 2.0 - 1.0, height, 1.0); }"""
     shaders = NUMBER | {"triangle.vert": TRIANGLE, "whole.vert": whole}
-    text = "nodes: {n: {type: near}, b: {type: behind, inputs: {depth: n.depth}}}\noutputs: {image: b.color, d: n.depth}"
+    text = (
+        "nodes: {n: {type: near}, b: {type: behind, inputs: {depth: n.depth}}}\noutputs: {image: b.color, d: n.depth}"
+    )
     frame = draw(text, Near, Behind, shaders=shaders, size=(8, 8))
     assert frame["image"][-1, 0, 0] == 0.0
     assert frame["image"][0, -1, 0] == 1.0
