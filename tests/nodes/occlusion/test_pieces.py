@@ -273,7 +273,7 @@ def test_discs_in_numpy(show: Show) -> None:
         emitter = -(facing * offset).sum(-1) / np.maximum(np.linalg.norm(offset, axis=-1), 1e-9)
         slant = np.maximum(np.abs((facing * sight).sum(-1)), 0.05)
         seen = hiding(offset, across / slant, np.abs(emitter))
-        line = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
+        line = sight / np.maximum(np.linalg.norm(sight, axis=-1, keepdims=True), 1e-9)
         nearest = offset + line * np.clip(-(offset * line).sum(-1), 0, RADIUS)[..., None]
         unseen = hiding(nearest, across, np.ones(distance.shape))
         blocked += inside * np.where(emitter < 0, np.maximum(seen, unseen), seen)
