@@ -178,3 +178,8 @@ def _triangle(folder: Any) -> Any:
     rows = [f"v {k} {k * k} 0" for k in range(20)] + [f"f {k} {k + 1} {k + 2}" for k in range(1, 18)]
     (folder / "t.obj").write_text("\n".join(rows))
     return folder / "t.obj"
+
+
+def test_a_tap_whose_input_is_missing_says_which() -> None:
+    with pytest.raises(InputError, match="RG116 --tap shadows.visibility: it needs input 'depth' of 'shadows'"):
+        rg.load("forward").check(taps=["shadows.visibility"])

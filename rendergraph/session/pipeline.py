@@ -227,6 +227,12 @@ class Pipeline:
                 problems.append(Problem("RG206", text))
             else:
                 wanted[tap] = Endpoint(node, port)
+                needs = getattr(graph[node].node.ports()[port], "needs", ())
+                problems += [
+                    Problem("RG116", f"--tap {tap}: it needs input '{name}' of '{node}', which is not connected")
+                    for name in needs
+                    if not graph[node].inputs.get(name)
+                ]
         if problems:
             raise InputError(problems)
         return wanted
