@@ -1,0 +1,119 @@
+"""Screen-space occlusion against 8 to 128 samples: `python tests/bench/bench_ssao.py`.
+
+Both techniques over the same G-buffer, as the document's figure 28. Milliseconds are those of `ao`
+alone: a frame's CPU time, driver threads included, which is where a software rasteriser's frame happens, less that of
+the G-buffer, measured in turn with it; medians over the turns. `blur` is part of the hemispheres' time and `ms at half
+size` is with `scale` 0.5.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from measure import cpu_and_wall, frame_loop, keep_memory, options, save
+from occlusion_plot import plot
+
+SIZE = (480, 270)
+SAMPLES = (8, 16, 32, 64, 128)
+PIPELINES = ("ssao-hemisphere", "ssao-disc")
+SURFACES = {"image": None, "radiance": None, "depth": "gbuffer.depth", "normal": "gbuffer.normal"}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One technique at one number of samples.
+
+    Attributes:
+        pipeline, samples: what was drawn.
+        ms: median CPU time of `ao`, with the least and the most.
+        half_ms: median with `scale` 0.5.
+        mean: mean occlusion of the picture, to show that the work was done.
+    """
+
+    pipeline: str
+    samples: int
+    ms: float
+    least_ms: float
+    most_ms: float
+    half_ms: float
+    mean: float
+
+
+def bench(frames: int, turns: int, folder: str | None) -> tuple[list[Cell], str]:
+    """Every technique at every number of samples."""
+    import rendergraph as rg
+
+    cells: list[Cell] = []
+    with rg.Session() as session:
+        bare = rg.load("deferred", size=SIZE, patches=[{"outputs": SURFACES}])
+        for name in PIPELINES:
+            for samples in SAMPLES:
+                patch = {"outputs": SURFACES | {"occlusion": "ao.occlusion"}}
+                whole, half_size = (
+                    rg.load(name, size=SIZE, sets=[f"ao.samples={samples}", f"ao.scale={scale}"], patches=[patch])
+                    for scale in (1, 0.5)
+                )
+                picture = np.asarray(session.render(whole)["occlusion"])
+                if not np.isfinite(picture).all() or np.ptp(picture) < 0.3:
+                    raise SystemExit(f"{name}: the picture is empty")
+                save(folder, **{f"{name}-{samples}": np.repeat(picture, 3, -1)})
+                turn = [[_time(session, made, frames) for made in (bare, whole, half_size)] for _ in range(turns)]
+                full = [row[1] - row[0] for row in turn]
+                half = [row[2] - row[0] for row in turn]
+                cells.append(
+                    Cell(
+                        name,
+                        samples,
+                        statistics.median(full),
+                        min(full),
+                        max(full),
+                        statistics.median(half),
+                        float(picture.mean()),
+                    )
+                )
+        return cells, session.device.renderer
+
+
+def _time(session: Any, pipeline: Any, frames: int) -> float:
+    """Milliseconds of CPU time a frame; prepared anew, for what another pipeline bound is bound no more."""
+    loop = frame_loop(session, pipeline)
+    loop(1)
+    return cpu_and_wall(loop, frames)[0]
+
+
+def table(cells: list[Cell], device: str) -> str:
+    """Markdown."""
+    lines = [
+        f"On {device}, {SIZE[0]}×{SIZE[1]}; a software rasteriser's times are no measure of a GPU.",
+        "",
+        "| technique | samples | CPU ms (least to most) | ms at half size | mean occlusion |",
+        "| --- | ---: | ---: | ---: | ---: |",
+    ]
+    lines += [
+        f"| {c.pipeline} | {c.samples} | {c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f}) | {c.half_ms:.1f} | {c.mean:.3f} |"
+        for c in cells
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    chosen = options(__doc__, frames=3, turns=5)
+    keep_memory()
+    cells, device = bench(chosen.frames, chosen.turns, chosen.save)
+    if chosen.save:
+        (Path(chosen.save) / "occlusion.svg").write_text(plot([asdict(cell) for cell in cells], device))
+        (Path(chosen.save) / "occlusion.txt").write_text(table(cells, device) + "\n")
+    if chosen.json:
+        json.dump({"device": device, "rows": [asdict(cell) for cell in cells]}, sys.stdout, indent=1)
+    else:
+        print(table(cells, device))
+
+
+if __name__ == "__main__":
+    main()

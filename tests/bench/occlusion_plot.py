@@ -1,0 +1,49 @@
+"""A plot of the benchmark of occlusion as SVG, by hand: milliseconds against samples, one line a technique."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+COLORS = {"ssao-hemisphere": "#b3541e", "ssao-disc": "#2b6cb0"}
+WIDTH, HEIGHT, LEFT, TOP, WIDE, TALL = 560, 400, 70, 44, 440, 270
+
+
+def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
+    """The picture.
+
+    Args:
+        rows: `pipeline`, `samples` and `ms` of each measurement.
+        device: named beneath, for its times are its own.
+    """
+    step = 10 ** math.floor(math.log10(max(row["ms"] for row in rows)))
+    top = math.ceil(max(row["ms"] for row in rows) / step) * step
+    most = max(row["samples"] for row in rows)
+
+    def at(samples: float, ms: float) -> tuple[float, float]:
+        return LEFT + WIDE * samples / most, TOP + TALL * (1 - ms / top)
+
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" '
+        'font-size="12" fill="#333">',
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
+        f'<text x="{LEFT}" y="{TOP - 18}" font-weight="bold">CPU milliseconds of `ao` against samples</text>',
+    ]
+    for number in range(5):
+        _, y = at(0, top * number / 4)
+        out.append(f'<path d="M{LEFT},{y:.1f}h{WIDE}" stroke="#ddd"/>')
+        out.append(f'<text x="{LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{top * number / 4:g}</text>')
+    for samples in sorted({row["samples"] for row in rows}):
+        x, y = at(samples, 0)
+        out.append(f'<text x="{x:.1f}" y="{y + 18:.1f}" text-anchor="middle">{samples}</text>')
+    for number, (name, color) in enumerate(COLORS.items()):
+        line = " ".join(
+            "{:.1f},{:.1f}".format(*at(row["samples"], row["ms"])) for row in rows if row["pipeline"] == name
+        )
+        out.append(f'<polyline points="{line}" fill="none" stroke="{color}" stroke-width="2.5"/>')
+        x = LEFT + number * 170
+        out.append(f'<line x1="{x}" y1="360" x2="{x + 22}" y2="360" stroke="{color}" stroke-width="2.5"/>')
+        out.append(f'<text x="{x + 28}" y="364">{name}</text>')
+    out.append(f'<text x="{LEFT}" y="386" fill="#777">{device}: a software rasteriser; its times are no GPU’s.</text>')
+    return "\n".join([*out, "</svg>"]) + "\n"
