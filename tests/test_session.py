@@ -181,5 +181,5 @@ def _triangle(folder: Any) -> Any:
 
 
 def test_a_tap_whose_input_is_missing_says_which() -> None:
-    with pytest.raises(InputError, match="RG116 --tap shadows.visibility: it needs input 'depth' of 'shadows'"):
+    with pytest.raises(InputError, match=r"RG116 --tap shadows\.visibility: it needs input 'depth' of 'shadows'"):
         rg.load("forward").check(taps=["shadows.visibility"])
