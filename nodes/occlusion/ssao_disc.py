@@ -12,8 +12,9 @@ class SSAODisc(ScreenSpaceOcclusion):
 
     Positions are reconstructed, and each sample counts as a disc in space that hides some of the sky (Bunnell,
     "Dynamic Ambient Occlusion and Indirect Lighting", 2005). The samples lie on the same spiral at every pixel: there
-    is no noise, and so no blur. The disc covers the radius's projection, which keeps the answer when the eye moves. A face
-    turned away is the far side of something solid: a disc behind it stands for the near side, which is not seen.
+    is no noise, and so no blur. The disc covers the radius's projection, which keeps the answer when the eye moves.
+
+    A face turned away is the far side of something solid: a disc behind it stands for the near side, which is not seen.
     """
 
     samples: int = define(default=32, min=8, max=128, doc="Surfaces looked at.")
