@@ -160,7 +160,11 @@ def assert_valid(plan: ResourcePlan) -> None:
     holds: dict[int, tuple[str, int]] = {}
     previous = {id for id, resource in resources.items() if resource.role == "history"}
     shown = set(plan.schedule.wanted.values())
+    filled = {r.resource for step in steps for r in step.all_reads if r.version == 0 and not r.previous}
     for frame in range(3):  # history takes turns, so that a second and a third frame are part of it
+        for name in filled:  # `update` writes these buffers before the frame
+            assert isinstance(resources[name].desc, BufferDesc)
+            holds[plan.placement[name][0]] = (name, 0)
         for position, step in enumerate(steps):
             for read in step.all_reads:
                 physicals = plan.placement[read.resource]
