@@ -30,6 +30,11 @@ def _ports_of(cls: type[Node]) -> dict[str, Port]:
     return found
 
 
+@cache
+def _inputs_of(cls: type[Node]) -> dict[str, Input | InOut]:
+    return {name: port for name, port in _ports_of(cls).items() if isinstance(port, Input | InOut)}
+
+
 class Node(BaseModel):
     """Base of every node: ports and parameters as class attributes, nothing more for a plain full-screen pass.
 
@@ -76,7 +81,7 @@ class Node(BaseModel):
     @classmethod
     def inputs(cls) -> dict[str, Input | InOut]:
         """Ports that take links."""
-        return {name: port for name, port in cls.ports().items() if isinstance(port, Input | InOut)}
+        return _inputs_of(cls)
 
     @classmethod
     def outputs(cls) -> dict[str, Output | InOut | Function | Views]:
