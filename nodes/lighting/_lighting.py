@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from typing import Literal
 
-from rendergraph.api import Node, define, param, structural
+from rendergraph.api import (
+    Depth,
+    Input,
+    Node,
+    Occlusion,
+    SceneRef,
+    ShadowLookup,
+    View,
+    Visibility,
+    define,
+    param,
+    structural,
+)  # fmt: skip
 
 Color = float | tuple[float, float, float]
 
@@ -33,3 +45,16 @@ class Lighting(Node):
     def wants_lights(self) -> bool:
         """Whether punctual lights show in the picture at all."""
         return self.shading != "unlit" and self.terms in ("all", "diffuse", "specular")
+
+
+class GeometryLighting(Lighting):
+    """What every node that lights while the geometry is drawn takes beside its parameters."""
+
+    view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
+    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
+    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
+    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
+    visibility = Input(
+        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
+    )
+    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")

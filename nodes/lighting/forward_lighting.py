@@ -7,24 +7,18 @@ from typing import Literal
 from rendergraph.api import (
     PREMULTIPLIED,
     Depth,
-    Input,
-    Occlusion,
     Output,
     Port,
     Radiance,
-    SceneRef,
-    ShadowLookup,
     State,
     Steps,
-    View,
-    Visibility,
     define,
 )  # fmt: skip
 
-from ._lighting import Lighting
+from ._lighting import GeometryLighting
 
 
-class ForwardLighting(Lighting):
+class ForwardLighting(GeometryLighting):
     """Radiance of the scene under all its lights, in one pass over the geometry.
 
     Opaque surfaces first, front to back, then those with alpha blending, back to front. Shadows come as functions
@@ -35,14 +29,6 @@ class ForwardLighting(Lighting):
     interpolated (Gouraud 1971), or once a face with the face's normal (flat). Textures and shadows stay per fragment.
     """
 
-    view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
-    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
-    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
-    visibility = Input(
-        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
-    )
-    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
     radiance = Output(
         Radiance, format="rgba16f", clear=lambda node: (*node.background_rgb, 0.0),
         doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",

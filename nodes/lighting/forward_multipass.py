@@ -6,23 +6,17 @@ from rendergraph.api import (
     ADD,
     PREMULTIPLIED,
     Depth,
-    Input,
-    Occlusion,
     Output,
     Port,
     Radiance,
-    SceneRef,
-    ShadowLookup,
     State,
     Steps,
-    View,
-    Visibility,
 )  # fmt: skip
 
-from ._lighting import Lighting
+from ._lighting import GeometryLighting
 
 
-class ForwardMultipass(Lighting):
+class ForwardMultipass(GeometryLighting):
     """Radiance of the scene, drawn once for what needs no light and once more for each light, added up.
 
     How many lights became possible before shaders could loop: every light costs all the geometry again and every
@@ -30,14 +24,6 @@ class ForwardMultipass(Lighting):
     Surfaces with alpha blending cannot be added up light by light; they come last, under all lights at once.
     """
 
-    view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
-    depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
-    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
-    visibility = Input(
-        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
-    )
-    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
     radiance = Output(
         Radiance, format="rgba32f", clear=lambda node: (*node.background_rgb, 0.0),
         doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",

@@ -105,19 +105,14 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
             InputError: there is no such output.
             RenderError: the file cannot be written.
         """
-        from rendergraph.images import save_output
+        from rendergraph.images import output_for, save_output
 
         path = Path(path)
-        chosen = name or self.output_for(path)
+        chosen = name or output_for(path, self.arrays)
         if chosen not in self.arrays:
             raise InputError(Problem("RG205", f"no output '{chosen}' to write{suggestion(chosen, self.arrays)}"))
         save_output(path, self.arrays[chosen], self.infos[chosen], self.metadata)
         return path
-
-    def output_for(self, path: Path) -> str:
-        """The output a file name asks for: `radiance` for EXR and HDR where there is one, else `image`."""
-        wants_radiance = path.suffix.lower() in (".exr", ".hdr")
-        return "radiance" if wants_radiance and "radiance" in self.arrays else "image"
 
     def _repr_png_(self) -> bytes:
         import tempfile
