@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import json
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -11,6 +13,7 @@ from rendergraph.declare import Function, InOut, Input, Node, Port, Views
 from rendergraph.errors import InputError
 from rendergraph.read import INPUT_KEYS, NAME, NODE_KEYS, PARAMETER_KEYS, TOP_KEYS, VERSION
 from rendergraph.resolve import MOST_SIDE
+from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.textures import Signature
 
 Schema = dict[str, Any]
@@ -19,6 +22,13 @@ _NAMES = {"pattern": "^" + NAME.pattern.replace("\\Z", "$")}
 _LINK: Schema = {"type": ["string", "null"], "description": "`node.port`, a node's id, or null for nothing."}
 _SIDE: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_SIDE}
 _OWN_WORDS = ("role", "unit", "glsl", "title")
+_ROLES = {
+    "param": "Changing it rebuilds nothing.",
+    "define": "Changing it recompiles a program.",
+    "structural": "Changing it changes the plan.",
+}
+_REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A parameter of the pipeline."}
+_WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
 
 def schema(catalog: Catalog) -> Schema:
@@ -35,18 +45,17 @@ def schema(catalog: Catalog) -> Schema:
     properties: Schema = {
         "rendergraph": {"const": VERSION, "description": "Version of the format."},
         "description": {"type": "string", "description": "What the pipeline shows, in a line."},
-        "extends": {"type": "string", "description": "A shipped pipeline or a file; the rest is a merge patch on it."},
+        "extends": _one_of(shipped_pipelines(), "A shipped pipeline or a file; the rest is a merge patch on it."),
         "size": {"type": "array", "items": [_SIDE, _SIDE], "minItems": 2, "maxItems": 2,
                  "description": "Width and height in pixels."},
-        "scene": {"type": "string", "description": "A shipped scene, a scene file, .obj, .gltf or .glb."},
+        "scene": _one_of(shipped_scenes(), "A shipped scene, a scene file, .obj, .gltf or .glb."),
         "parameters": _mapping({"$ref": "#/definitions/parameter"}, "Knobs of the whole pipeline, used as $name."),
         "inputs": _mapping({"$ref": "#/definitions/input"}, "What the file takes as the type of a node."),
         "nodes": _mapping({"$ref": "#/definitions/node"}, "Nodes by id."),
         "outputs": _mapping(_LINK, "Output name to `node.port`."),
     }  # fmt: skip
-    return {
+    found = {
         "$schema": "http://json-schema.org/draft-07/schema#",
-        "title": "rendergraph pipeline",
         **_object(TOP_KEYS, properties),
         "definitions": {
             "parameter": _object(PARAMETER_KEYS, {
@@ -63,6 +72,24 @@ def schema(catalog: Catalog) -> Schema:
             "node": _node(types),
         },
     }  # fmt: skip
+    _as_markdown(found)
+    return found
+
+
+def _as_markdown(value: Any) -> None:
+    """Give what is written in Markdown to editors that show it; the others take it as it stands."""
+    if isinstance(value, dict):
+        text = value.get("description")
+        if isinstance(text, str) and ("`" in text or "\n" in text):
+            value["markdownDescription"] = text
+    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        _as_markdown(part)
+
+
+def _one_of(shipped: Iterable[str], doc: str) -> Schema:
+    """A shipped name, which is offered, or the path of a file, which is not."""
+    path = {"type": "string", "pattern": "[./]", "description": doc}
+    return {"anyOf": [{"enum": list(shipped)}, path, {"type": "null"}], "description": doc}
 
 
 def _object(keys: Iterable[str], properties: Mapping[str, Schema]) -> Schema:
@@ -84,11 +111,10 @@ def _nullable(values: Schema) -> Schema:
 
 
 def _node(types: Mapping[str, type[Node] | None]) -> Schema:
-    known: list[Schema] = [
-        {"const": name, "description": (inspect.getdoc(cls) or "") if cls else ""} for name, cls in types.items()
-    ]
+    known: list[Schema] = [{"const": name, "description": _about(cls) if cls else ""} for name, cls in types.items()]
+    file = f"[./]|^({'|'.join(shipped_pipelines())})$"
     elsewhere: list[Schema] = [
-        {"type": "string", "pattern": "[./]", "description": "A pipeline file whose outputs are the node's."},
+        {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's."},
         {"$ref": "#"},
     ]
     found = _object(NODE_KEYS, {
@@ -99,7 +125,7 @@ def _node(types: Mapping[str, type[Node] | None]) -> Schema:
     found["allOf"] = [
         {
             "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
-            "then": {"properties": {"inputs": _inputs(cls), "params": _params(cls)}},
+            "then": {"properties": {"inputs": _inputs(name, cls), "params": _params(name, cls)}},
         }
         for name, cls in types.items()
         if cls is not None
@@ -107,11 +133,29 @@ def _node(types: Mapping[str, type[Node] | None]) -> Schema:
     return found
 
 
-def _inputs(cls: type[Node]) -> Schema:
+def _about(cls: type[Node]) -> str:
+    """Its docs, and what others can connect to; lines of a paragraph are joined."""
+    doc = re.sub(r"(?<!\n)\n(?![\n ])", " ", inspect.getdoc(cls) or "")
+    made = "\n".join(f"- `{name}`: {port.doc} ({_made(port)})" for name, port in cls.outputs().items())
+    return f"{doc}\n\nOutputs:\n\n{made}"
+
+
+def _made(port: Port) -> str:
+    like = getattr(port, "like", None)
+    return f"like `{like}`" if like else port_type(port)
+
+
+def _inputs(type_name: str, cls: type[Node]) -> Schema:
     links = {name: _link(port) for name, port in cls.inputs().items()}
     for group, members in cls.groups().items():
         links[group] = {**_LINK, "description": f"The id of a node with {', '.join(members)}."}
-    return {"type": ["object", "null"], "additionalProperties": False, "properties": links}
+    return _known_names(links, f"'{type_name}' has no such input.")
+
+
+def _known_names(properties: Schema, message: str) -> Schema:
+    """A mapping of these; others may be null, which drops what a node of another type had and this one lacks."""
+    others = {"type": "null", "errorMessage": message}
+    return {"type": ["object", "null"], "additionalProperties": others, "properties": properties}
 
 
 def _link(port: Input | InOut) -> Schema:
@@ -139,27 +183,44 @@ def port_type(port: Port) -> str:
     return ", ".join(words)
 
 
-def _params(cls: type[Node]) -> Schema:
+def _params(type_name: str, cls: type[Node]) -> Schema:
     properties: Schema = cls.model_json_schema().get("properties", {})
-    return {
-        "type": ["object", "null"],
-        "additionalProperties": False,
-        "properties": {name: _param(found) for name, found in properties.items()},
-    }
+    own = {name: _param(found) for name, found in properties.items()}
+    return _known_names(own, f"'{type_name}' has no such param.")
 
 
 def _param(found: Schema) -> Schema:
     """One parameter: its own values, null for the default, or a parameter of the pipeline."""
-    doc, unit, default = found.get("description", ""), found.get("unit"), found.get("default")
     own = _draft_07({key: value for key, value in found.items() if key not in ("description", "default", *_OWN_WORDS)})
-    if "anyOf" in own:  # limits beside alternatives hold for those that are numbers
+    about = {"description": _about_param(found), "default": found.get("default")}
+    kind = own.get("type")
+    if kind in _WORDS:  # said without alternatives: editors then name the limit that is broken
+        message = f"This is {_WORDS[kind]}, or $name for a parameter of the pipeline."
+        return {
+            **about, **own, "type": [kind, "string", "null"], "pattern": _REFERENCE["pattern"],
+            "patternErrorMessage": message,
+        }  # fmt: skip
+    alternatives = own.pop("anyOf", None)
+    if alternatives:  # limits beside alternatives hold for those that are numbers
         limits = {key: own.pop(key) for key in ("minimum", "maximum") if key in own}
-        own["anyOf"] = [
-            {**part, **limits} if part.get("type") in ("number", "integer") else part for part in own["anyOf"]
-        ]
-    text = f"{doc} In {unit}." if unit else doc
-    reference = {"type": "string", "pattern": "^\\$"}
-    return {"description": text, "default": default, "anyOf": [own, {"type": "null"}, reference]}
+        alternatives = [{**p, **limits} if p.get("type") in ("number", "integer") else p for p in alternatives]
+    return {**about, "anyOf": [*(alternatives or [own]), {"type": "null"}, _REFERENCE]}
+
+
+def _about_param(found: Schema) -> str:
+    """Its line of documentation, its default, its range and what a change of it costs."""
+    unit = f" {found['unit']}" if found.get("unit") else ""
+    low, high = found.get("minimum"), found.get("maximum")
+    limits = {
+        (True, True): f", {low} to {high}",
+        (True, False): f", at least {low}",
+        (False, True): f", at most {high}",
+        (False, False): "",
+    }[low is not None, high is not None]
+    default = json.dumps(found.get("default"), ensure_ascii=False)
+    return (
+        f"{found.get('description', '')}\n\nDefault {default}{unit}{limits}. {_ROLES[found.get('role', 'structural')]}"
+    )
 
 
 def _draft_07(value: Any) -> Any:

@@ -46,7 +46,7 @@ def test_every_type_is_offered_with_its_text(made: dict[str, Any], toy_catalog: 
     choices = made["definitions"]["node"]["properties"]["type"]["anyOf"]
     texts = {choice["const"]: choice["description"] for choice in choices if "const" in choice}
     assert sorted(texts) == toy_catalog.names()
-    assert texts["tonemap"] == "Radiance to display values."
+    assert texts["tonemap"] == "Radiance to display values.\n\nOutputs:\n\n- `color`: Colour. (display_color)"
 
 
 def test_a_node_type_has_its_inputs_and_params(made: dict[str, Any]) -> None:
@@ -62,8 +62,9 @@ def test_a_node_type_has_its_inputs_and_params(made: dict[str, Any]) -> None:
 
 def test_ranges_and_units_are_there(made: dict[str, Any]) -> None:
     exposure = rules_of(made, "tonemap")["params"]["properties"]["exposure"]
-    assert exposure["anyOf"][0] == {"type": "number", "minimum": -16, "maximum": 16}
-    assert exposure["description"] == "Stops. In EV."
+    assert (exposure["minimum"], exposure["maximum"]) == (-16, 16)
+    assert exposure["type"] == ["number", "string", "null"]  # a string is a pipeline's parameter
+    assert exposure["description"] == "Stops.\n\nDefault 0.0 EV, -16 to 16. Changing it rebuilds nothing."
 
 
 def test_an_independent_validator_agrees(made: dict[str, Any]) -> None:

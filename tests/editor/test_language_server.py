@@ -1,0 +1,316 @@
+"""What an editor says with our schema: yaml-language-server, asked as VS Code, Neovim and Emacs ask it.
+
+`npm install yaml-language-server` in the project, or on the path, or named by RENDERGRAPH_YAML_LS; without it these
+tests are skipped.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import shutil
+import subprocess
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rendergraph.catalog import Catalog
+from rendergraph.cli.app import main
+from rendergraph.resources import shipped_pipelines, shipped_scenes
+
+ROOT = Path(__file__).parents[2]
+PATIENCE = 60.0  # seconds for one answer: node starts slowly on a busy machine
+SETTINGS = {
+    "yaml": {
+        "validate": True, "hover": True, "completion": True, "yamlVersion": "1.2",
+        "schemaStore": {"enable": False},  # or every file would be looked up on the net
+    }
+}  # fmt: skip
+
+
+PIPELINE = """\
+# yaml-language-server: $schema=./rendergraph.schema.json
+rendergraph: 1
+size: [640, 360]
+scene: shadow_study
+nodes:
+  sun: {type: shadow_map}
+  shadows:
+    type: shadow_pcf
+    inputs: {shadow_map: sun.shadow_map}
+    params: {taps: 5}
+  light:
+    type: forward_lighting
+    inputs:
+      lookup: [shadows.lookup]
+    params:
+      ambient: 0.1
+  display: {type: tonemap, inputs: {radiance: light.radiance}}
+outputs: {image: display.color}
+"""
+
+PLUGIN = '''
+from rendergraph.api import Depth, Input, Node, Output, Radiance, param
+
+
+class Fog(Node):
+    """Radiance seen through an even fog."""
+
+    radiance = Input(Radiance, doc="What is seen without fog.")
+    depth = Input(Depth, doc="How far away it is.")
+    foggy = Output(like="radiance", doc="The same through fog.")
+
+    density: float = param(default=0.05, unit="1/m", min=0, max=10, doc="Part of the light lost in a metre.")
+'''
+
+
+def _server() -> str | None:
+    """The language server: named in the environment, on the path, or in the project's own `node_modules`."""
+    local = ROOT / "node_modules" / ".bin" / "yaml-language-server"
+    return (
+        os.environ.get("RENDERGRAPH_YAML_LS")
+        or shutil.which("yaml-language-server")
+        or (str(local) if local.exists() else None)
+    )
+
+
+class Editor:
+    """A client of the Language Server Protocol over the server's standard streams."""
+
+    def __init__(self, command: str) -> None:
+        self._process = subprocess.Popen(
+            [command, "--stdio"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        )
+        self._asked = self._opened = 0
+        self._said: queue.Queue[dict[str, Any] | None] = queue.Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self._ask("initialize", processId=os.getpid(), rootUri=None, capabilities={
+            "workspace": {"configuration": True},
+            "textDocument": {"hover": {"contentFormat": ["markdown"]}, "completion": {"completionItem": {"documentationFormat": ["markdown"]}}},
+        })  # fmt: skip
+        self._tell("initialized")
+
+    def close(self) -> None:
+        """End the server and its pipes."""
+        self._process.kill()
+        self._reader.join(PATIENCE)
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream:
+                stream.close()
+        self._process.wait()
+
+    def marks(self, folder: Path, text: str) -> list[tuple[int, str]]:
+        """What is underlined in a file of this text: lines, from 1, and messages, in order."""
+        uri = self._open(folder, text)
+        while True:
+            found = self._hear()
+            if found.get("method") == "textDocument/publishDiagnostics" and found["params"]["uri"] == uri:
+                return sorted((m["range"]["start"]["line"] + 1, m["message"]) for m in found["params"]["diagnostics"])
+
+    def offers(self, folder: Path, text: str) -> dict[str, str]:
+        """What is offered where `|` stands in the text, with its explanation."""
+        clean, place = _cursor(text)
+        found = self._ask("textDocument/completion", textDocument={"uri": self._open(folder, clean)}, position=place)
+        items = found["items"] if isinstance(found, dict) else found
+        return {item["label"]: _words(item.get("documentation", "")) for item in items}
+
+    def hover(self, folder: Path, text: str) -> str:
+        """What is shown over the letter after `|`."""
+        clean, place = _cursor(text)
+        place["character"] += 1
+        found = self._ask("textDocument/hover", textDocument={"uri": self._open(folder, clean)}, position=place)
+        return str(found["contents"]["value"]) if found else ""
+
+    def _open(self, folder: Path, text: str) -> str:
+        """A new file each time, so that no answer about an older text is taken for one about this."""
+        self._opened += 1
+        file = folder / f"pipeline-{self._opened}.yaml"
+        file.write_text(text, encoding="utf-8")
+        document = {"uri": file.as_uri(), "languageId": "yaml", "version": 1, "text": text}
+        self._tell("textDocument/didOpen", textDocument=document)
+        return file.as_uri()
+
+    # --- JSON-RPC -----------------------------------------------------------------------------------------------------
+
+    def _ask(self, method: str, **params: Any) -> Any:
+        self._asked += 1
+        self._send({"id": self._asked, "method": method, "params": params})
+        while True:
+            found = self._hear()
+            if found.get("id") == self._asked and "method" not in found:
+                assert "error" not in found, found
+                return found["result"]
+
+    def _tell(self, method: str, **params: Any) -> None:
+        self._send({"method": method, "params": params})
+
+    def _send(self, message: dict[str, Any]) -> None:
+        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
+        assert self._process.stdin
+        self._process.stdin.write(b"Content-Length: %d\r\n\r\n" % len(body) + body)
+        self._process.stdin.flush()
+
+    def _hear(self) -> dict[str, Any]:
+        """The next message for us; the server's questions about settings are answered on the way."""
+        while True:
+            message = self._said.get(timeout=PATIENCE)
+            assert message is not None, "the language server ended"
+            if "id" not in message or "method" not in message:
+                return message
+            asked = message["params"].get("items", []) if message["method"] == "workspace/configuration" else None
+            answer = None if asked is None else [SETTINGS.get(item.get("section", "")) for item in asked]
+            self._send({"id": message["id"], "result": answer})
+
+    def _read(self) -> None:
+        stream = self._process.stdout
+        assert stream
+        while header := stream.readline():
+            length = int(header.partition(b":")[2])
+            while stream.readline().strip():
+                pass
+            self._said.put(json.loads(stream.read(length)))
+        self._said.put(None)
+
+
+def _words(documentation: Any) -> str:
+    return str(documentation["value"] if isinstance(documentation, dict) else documentation)
+
+
+def _cursor(text: str) -> tuple[str, dict[str, int]]:
+    before, _, after = text.partition("|")
+    return before + after, {"line": before.count("\n"), "character": len(before) - before.rfind("\n") - 1}
+
+
+@pytest.fixture(scope="session")
+def editor() -> Iterator[Editor]:
+    """One server for all tests."""
+    command = _server()
+    if command is None:
+        pytest.skip("no yaml-language-server: npm i yaml-language-server")
+    found = Editor(command)
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="session")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the schema of the standard nodes and of a plugin."""
+    folder = tmp_path_factory.mktemp("desk")
+    plugin = folder / "fog.py"
+    plugin.write_text(PLUGIN, encoding="utf-8")
+    for words in (["rendergraph.schema.json"], ["with-fog.schema.json", "--plugin", str(plugin)]):
+        assert main(["schema", "-o", str(folder / words[0]), *words[1:]]) == 0
+    return folder
+
+
+def changed(old: str, new: str) -> str:
+    assert PIPELINE.count(old) == 1, old
+    return PIPELINE.replace(old, new)
+
+
+def line_of(text: str) -> int:
+    return PIPELINE.partition(text)[0].count("\n") + 1
+
+
+# --- errors ----------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_right_is_not_underlined(editor: Editor, desk: Path) -> None:
+    assert editor.marks(desk, PIPELINE) == []
+    patch = "{extends: forward, nodes: {light: null, display: {params: {exposure: $stops, curve: $curve}}}}\n"
+    assert editor.marks(desk, PIPELINE.partition("\n")[0] + "\n" + patch) == []
+
+
+@pytest.mark.parametrize("file", shipped_pipelines().values(), ids=lambda file: file.stem)
+def test_nothing_shipped_is_underlined(editor: Editor, desk: Path, file: Path) -> None:
+    assert editor.marks(desk, PIPELINE.partition("\n")[0] + "\n" + file.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("taps: 5", "tips: 5", "'shadow_pcf' has no such param."),
+        ("taps: 5", "taps: 99", "Value is above the maximum of 16."),
+        ("taps: 5", "taps: many", "This is a whole number, or $name for a parameter of the pipeline."),
+        ("ambient: 0.1", "ambient: -1", "Value is below the minimum of 0."),
+        ("ambient: 0.1", "shading: phon", 'Value is not accepted. Valid values: "unlit", "phong",'),
+        ("lookup: [", "lokup: [", "'forward_lighting' has no such input."),
+        ("[shadows.lookup]", "[shadows.lookup, 7]", "Incorrect type."),
+        ("type: tonemap", "type: tonemop", "Value must be "),
+        ("size:", "sise:", "Property sise is not allowed."),
+        ("rendergraph: 1", "rendergraph: 2", "Value must be 1."),
+    ],
+)
+def test_a_mistake_is_underlined_where_it_stands(editor: Editor, desk: Path, old: str, new: str, message: str) -> None:
+    (mark,) = editor.marks(desk, changed(old, new))
+    assert mark[0] == line_of(old)
+    assert mark[1].startswith(message)
+
+
+# --- completion ------------------------------------------------------------------------------------------------------
+
+
+def test_types_are_offered_with_their_docs(editor: Editor, desk: Path) -> None:
+    offers = editor.offers(desk, changed("forward_lighting", "|"))
+    assert offers.keys() - {"null"} == set(Catalog.discover().names())
+    assert "Map scene-linear radiance to display values." in offers["tonemap"]
+    assert "- `color`: Display-referred" in offers["tonemap"]  # what others can connect to
+
+
+def test_params_and_inputs_of_the_type_are_offered_and_no_others(editor: Editor, desk: Path) -> None:
+    catalog = Catalog.discover()
+    light, shadows = catalog.get("forward_lighting").cls, catalog.get("shadow_pcf").cls
+    assert editor.offers(desk, changed("      ambient: 0.1", "      |")).keys() == set(light.parameters())
+    assert editor.offers(desk, changed("taps: 5", "taps: 5, no|")).keys() == set(shadows.parameters()) - {"taps"}
+    assert editor.offers(desk, changed("      lookup: [shadows.lookup]", "      |")).keys() == set(light.inputs())
+
+
+def test_choices_and_shipped_names_are_offered(editor: Editor, desk: Path) -> None:
+    models = editor.offers(desk, changed("ambient: 0.1", "shading: |"))
+    assert {"unlit", "phong", "blinn_phong", "anisotropic", "pbr"} <= models.keys()
+    assert editor.offers(desk, changed("taps: 5", "edges_only: |")).keys() == {"true", "false", "null"}
+    assert editor.offers(desk, changed("shadow_study", "|")).keys() == {*shipped_scenes(), "null"}
+    first = PIPELINE.partition("\n")[0]
+    assert editor.offers(desk, f"{first}\nextends: |\n").keys() == {*shipped_pipelines(), "null"}
+
+
+# --- hover -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("at", "shown"),
+    [
+        ("|taps", "Tests along a side: 4 means 4×4, 1 is the plain hard shadow.\n\nDefault 3, 1 to 16. "),
+        ("|ambient", "Radiance from all sides, a number or RGB.\n\nDefault 0.03, at least 0. "),
+        ("|shadow_pcf", "Shadows from a map by percentage-closer filtering.\n\nThe mean of N×N depth tests"),
+        ("{|shadow_map: sun", "Depth as the lights see it. (shadow\\_map, texture2d\\_array)"),
+        ("|size", "Width and height in pixels."),
+        ("|outputs", "Output name to `node.port`."),
+    ],
+)
+def test_hovering_shows_the_docs(editor: Editor, desk: Path, at: str, shown: str) -> None:
+    assert editor.hover(desk, changed(at.replace("|", ""), at)).startswith(shown)
+
+
+# --- plugins ---------------------------------------------------------------------------------------------------------
+
+
+def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path) -> None:
+    fog = "  fog: {type: fog, inputs: {radiance: light.radiance}, params: {density: 0.1}}\n"
+    without = PIPELINE.replace("  display:", fog + "  display:")
+    assert [line for line, _ in editor.marks(desk, without)] == [line_of("  display:")]
+    text = without.replace("rendergraph.schema", "with-fog.schema")
+    assert editor.marks(desk, text) == []
+    ((line, message),) = editor.marks(desk, text.replace("density: 0.1", "density: 11"))
+    assert (line, message) == (line_of("  display:"), "Value is above the maximum of 10.")
+    assert editor.hover(desk, text.replace("density", "|density")).startswith(
+        "Part of the light lost in a metre.\n\nDefault 0.05 1/m, 0 to 10. "
+    )
+    assert editor.offers(desk, text.replace("light.radiance}, params", "light.radiance, de|}, params")).keys() == {
+        "depth"
+    }
