@@ -12,20 +12,10 @@ from rendergraph.api import Function, Input, Node, Output, ShadowLookup, ShadowM
 from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import ViewTable
-from rendergraph.glsl import (
-    Includes,
-    StageText,
-    compile_problems,
-    declared,
-    expand,
-    interface,
-    link_problems,
-    prefix,
-    stage_texts,
-    strip_comments,
-)  # fmt: skip
+from rendergraph.glsl import Includes, declared, expand, interface, strip_comments
 from rendergraph.glsl.names import calls, renamed
 from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.program import StageText, compile_problems, link_problems, prefix, stage_texts
 from rendergraph.resources import folder as folder_of
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc

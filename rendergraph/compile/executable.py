@@ -197,7 +197,7 @@ class Executable:
 
 def step_uniforms(step: Step) -> dict[str, Any]:
     """A step's uniforms and, under their prefixed names, those of the functions it calls."""
-    from rendergraph.glsl import prefix
+    from rendergraph.program import prefix
 
     values: dict[str, Any] = dict(step.uniforms)
     for function in step.functions:

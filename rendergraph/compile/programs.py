@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,7 @@ from rendergraph.expand import ViewTable
 from rendergraph.gl import programs
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
-from rendergraph.glsl import compile_problems, link_problems, stage_texts
+from rendergraph.program import compile_problems, link_problems, stage_texts
 from rendergraph.steps import Resource, Step
 
 
@@ -68,6 +68,14 @@ class ProgramCache:
         """Free the vertex arrays over buffers that go away; `marker` is the first part of their keys."""
         for key in [key for key in self._vertex_arrays if len(key) > 1 and key[1] == marker]:
             self._vertex_arrays.pop(key).release()
+
+    def discard(self, programs: Set[Program]) -> None:
+        """Free programs whose text is out of date, so that a day of editing does not fill the driver's memory."""
+        for key in [key for key, program in self._programs.items() if program in programs]:
+            program = self._programs.pop(key)
+            for full in [full for full in self._vertex_arrays if full[0] == program.glo]:
+                self._vertex_arrays.pop(full).release()
+            program.release()
 
     def release(self) -> None:
         """Free everything."""

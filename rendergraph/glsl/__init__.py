@@ -1,31 +1,11 @@
-"""GLSL as text: includes, macros, the functions a shader is given, and driver messages. No GL.
-
-`compile` calls
-
-    stage_texts(step, types, resources, views, defines=..., include_folder=None) -> {stage: StageText}
-
-with a `steps.Step`, node id to `catalog.NodeType`, and `Expansion.resources` and `Expansion.views`; `defines` are
-the macros of the scene and the batch (`LIGHT_COUNT`, `MATERIAL_COUNT`, `HAS_UV0`, `PASS_VIEW_COUNT`, ...).
-`StageText.text` goes to the driver; what it answers goes through `compile_problems` and `link_problems`.
-
-Names of a function's text are `prefix(node id) + name`: its textures (`shadows_shadow_map`), uniforms
-(`shadows_bias`), view blocks (`shadows_shadow_map_view_block`). The consumer's own texture reads keep their names, with
-`<name>_view_block` for the views; a block or table that the text does not look at is not declared.
-
-A stage's text is, in this order: version, `#extension` lines, macros, `<view.glsl>`, views and light tables of the
-textures read, then for each function the stage calls its providers' texts and the function that joins them, then the
-author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, where it is not 0, the table
-`shadow_lights` of the scene's lights that some provider of `shadow` knows; the same for other functions, by their name.
-"""
+"""GLSL as text: files with their includes, and the names that a text declares. No GL."""
 
 from __future__ import annotations
 
-from rendergraph.glsl.messages import compile_problems, link_problems
 from rendergraph.glsl.names import Declared, Interface, declared, interface
-from rendergraph.glsl.program import StageText, prefix, stage_texts
 from rendergraph.glsl.source import MAX_BYTES, MAX_DEPTH, Includes, Origin, SourceText, expand, strip_comments
 
 __all__ = [
-    "MAX_BYTES", "MAX_DEPTH", "Declared", "Includes", "Interface", "Origin", "SourceText", "StageText",
-    "compile_problems", "declared", "expand", "interface", "link_problems", "prefix", "stage_texts", "strip_comments",
+    "MAX_BYTES", "MAX_DEPTH", "Declared", "Includes", "Interface", "Origin", "SourceText", "declared", "expand",
+    "interface", "strip_comments",
 ]  # fmt: skip

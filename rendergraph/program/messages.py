@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 
 from rendergraph.errors import Problem
-from rendergraph.glsl.program import StageText
-from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.glsl import Origin, SourceText
+from rendergraph.program.text import StageText
 
 _FORMS = (
     re.compile(
