@@ -16,6 +16,7 @@ from typing import Any
 
 from rendergraph.document import read_bytes, shown
 from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.stamps import look
 
 FILE_NAME = "rendergraph.toml"
 _KEYS = ("asset_roots", "plugins")
@@ -51,6 +52,7 @@ def nearest(start: Path) -> Settings | None:
     folder = _resolved(start)
     for candidate in (folder, *folder.parents):
         file = candidate / FILE_NAME
+        look(file)
         if file.is_file():
             return load(file)
     return None
@@ -135,6 +137,7 @@ class Roots:
     def mistake(self, path: Path, written: str | None = None) -> tuple[str, str] | None:
         """Code and text of what forbids reading a path, None where nothing does."""
         name = shown(written or path, 120)
+        look(path)
         if "://" in (written or str(path)):
             return "RG012", f"'{name}' is an address; only files are read"
         try:

@@ -112,10 +112,10 @@ def test_variants_drawn_in_turns_are_compiled_once_and_keep_their_pictures(gl: r
     variants = [rg.load("forward", size=(32, 18)).set("display.curve", curve) for curve in ("aces", "neutral")]
     variants.append(variants[0].set("display.exposure", 1.0))
     first = [gl.render(variant)["image"] for variant in variants]
-    compiled, kept = gl.programs.compiled, list(gl._kept.values())
+    compiled, made = gl.programs.compiled, gl.device.textures_made
     again = [gl.render(variant)["image"] for variant in variants]
     assert gl.programs.compiled == compiled
-    assert {id(executable) for executable in gl._kept.values()} == {id(executable) for executable in kept}
+    assert gl.device.textures_made == made
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a, b)
     assert not np.array_equal(first[0], first[2])

@@ -13,6 +13,7 @@ from rendergraph.document.events import Limits, build, over_limit
 from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem
+from rendergraph.stamps import look
 
 
 def load(path: Path, *, limits: Limits = Limits(), keep_going: bool = False, name: str | None = None) -> Document:
@@ -65,6 +66,7 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
         InputError: there is none, it is a folder or a device, it may not be read, or it is longer.
     """
     name = shown(name or str(path))
+    look(path)
     try:
         if path.is_dir():
             raise InputError(Problem("RG011", f"'{name}' is a folder, a file is needed"))

@@ -26,12 +26,15 @@ class Device:
         ctx: moderngl's context.
         raw: the raw functions.
         owned: whether `release` ends the context; a borrowed one stays its owner's.
+        limits: what the driver offers at most.
+        textures_made: how many textures have been allocated so far.
     """
 
     ctx: moderngl.Context
     raw: RawGL
     owned: bool = True
     limits: dict[str, int] = field(default_factory=dict)
+    textures_made: int = 0
     _idle: moderngl.Framebuffer | None = None
 
     def unbind(self) -> None:

@@ -65,6 +65,7 @@ def create(device: Device, desc: TextureDesc, label: str = "") -> GpuTexture:
         text = (f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
                 f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})")  # fmt: skip
         raise RenderError(Problem("RG612", text))
+    device.textures_made += 1
     return GpuTexture(glo, target, desc)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.stamps import look
 
 MAX_BYTES = 1_000_000
 """Bytes of one stage's text after includes."""
@@ -193,6 +194,7 @@ class Includes:
         if not target.resolve().is_relative_to(inside):
             text = f"'{name}' lies outside '{shown(inside)}', where this shader's includes are"
             raise _error("RG406", text, origin, raw)
+        look(target)
         if not target.is_file():
             known = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix == ".glsl"}
             where = "beside the file" if beside else "in shaders/include"
@@ -206,6 +208,7 @@ def expand(source: Path, include_folder: Path, *, root: Path | None = None) -> S
 
 
 def _read(file: Path) -> str:
+    look(file)
     if not file.is_file():
         known = {path.name for path in file.parent.glob("*") if path.is_file()} if file.parent.is_dir() else set()
         text = f"there is no shader '{shown(file)}'{suggestion(file.name, known)}"

@@ -17,6 +17,7 @@ from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene import image_header
 from rendergraph.scene.model import ImageSource
+from rendergraph.stamps import look
 
 CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 """The root rule: returns the resolved path, or raises InputError where it leaves every root."""
@@ -228,6 +229,7 @@ _NOT = {"missing": "does not exist", "other": "is not a regular file", "unreadab
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
     """What stands at a path, links followed."""
+    look(path)
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

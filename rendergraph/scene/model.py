@@ -15,6 +15,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.stamps import Stamp
+
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
 Vec3: TypeAlias = tuple[float, float, float]
@@ -259,6 +261,7 @@ class Scene:
         warnings: what a reader left out, replaced or clamped, once a kind and file.
         recipe: section and name (`("cameras", "main")`) to the values a scene file gave: what keyframes change.
         placements: name of a scene file's object to what it placed.
+        files: every file looked at while reading it, as it was.
     """
 
     name: str
@@ -274,3 +277,4 @@ class Scene:
     warnings: tuple[Any, ...] = ()
     recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
     placements: Mapping[str, Placement] = field(default_factory=dict)
+    files: Mapping[Path, Stamp] = field(default_factory=dict)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
+from rendergraph import stamps
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
 from rendergraph.link import Endpoint, Graph
 
@@ -161,7 +162,7 @@ class Pipeline:
     def scene(self) -> Scene:
         """The scene, completed by a camera and a light where it has none.
 
-        Pipelines that ask for the same unchanged file share one scene, and so its place on the GPU.
+        Pipelines that ask for the same unchanged files share one scene, and so its place on the GPU.
         """
         from rendergraph.scene.animate import complete
         from rendergraph.scene.files import Limits, Reading
@@ -172,15 +173,18 @@ class Pipeline:
         stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
         limits = Limits(**self.allowed("scene"))
         roots = self.spec.roots.folders if file is not None else ()
-        key = (file, stamp, self.environment, self.camera, roots, limits)
+        key = (Path.cwd(), file, self.environment, self.camera, roots, limits)
         found = _SCENES.get(key)
-        if found is None:
+        if found is not None and not stamps.changed(found.files):
+            stamps.again(found.files)
+            return found
+        with stamps.looking() as files:
             scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check, limits=limits)
             if self.environment is not None:
                 reading = Reading(self.environment, lambda path, place: path, limits)
                 image = reading.image(self.environment, "environment")
                 scene = replace(scene, environment=Environment(image))
-            _SCENES[key] = found = complete(scene, self.camera)
+        _SCENES[key] = found = replace(complete(scene, self.camera), files=files)
         return found
 
     @cached_property

@@ -8,6 +8,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from rendergraph import stamps
 from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
 from rendergraph.errors import Problem, RenderError, UsageError
 from rendergraph.execute import FrameTimes, Runner, median_times, summary
@@ -18,6 +19,7 @@ from rendergraph.scene import animate, pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import ImageSource, Scene
 from rendergraph.session.frame import Frame, OutputInfo
+from rendergraph.session.kept import Kept
 from rendergraph.session.pipeline import Pipeline
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -29,20 +31,18 @@ if TYPE_CHECKING:
     from rendergraph.link import Endpoint
 
 
-KEPT = 4
-"""Compiled pipelines a session keeps, each with its textures."""
-
-
 class Session:
     """Draws pipelines on one GL context.
 
     Programs live as long as the session, keyed by source and macros; a scene stays on the GPU until another pipeline
     asks for a different one; compiled pipelines and their textures are kept for the last few that were drawn, so that
-    variants can be drawn in turns. A session is bound to the thread that made it.
+    variants can be drawn in turns. A changed shader or include is noticed, and only the programs whose text it changes
+    are compiled anew. A session is bound to the thread that made it.
 
     Attributes:
         device: the GL device.
-        programs: every program compiled so far.
+        programs: the programs that were compiled.
+        scenes_made: how many scenes have been put on the GPU so far.
         active: what was drawn last.
     """
 
@@ -61,7 +61,8 @@ class Session:
         self.programs = ProgramCache(self.device)
         self._scenes: dict[int, tuple[Scene, GpuScene]] = {}
         self.active: Executable | None = None
-        self._kept: dict[tuple[Any, ...], Executable] = {}
+        self.scenes_made = 0
+        self._kept = Kept()
         self._image_warnings: list[Problem] = []
 
     def __enter__(self) -> Session:
@@ -167,17 +168,23 @@ class Session:
         types = {node.id: node.type for node in pipeline.graph.nodes}
         sources = tuple((name, found.file, found.shaders) for name, found in types.items())
         key = (_structure(expansion), sources, id(pipeline.scene), alias, poison, shuffle)
-        executable = self._kept.pop(key, None)
+        executable = self._kept.take(key)
         if executable is None:
-            while len(self._kept) >= KEPT:
-                self._kept.pop(next(iter(self._kept))).release()
             plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
-            executable = compile_plan(self.device, plan, types, expansion.views, scene, self.programs, poison=poison)
+            self._kept.make_room(plan.memory.allocated_bytes)
+            with stamps.looking() as files:
+                for found in types.values():
+                    stamps.look(found.file)
+                executable = compile_plan(
+                    self.device, plan, types, expansion.views, scene, self.programs, poison=poison
+                )
+            self._kept.add(key, executable, files)
+            self.programs.discard(self._kept.unused())
         else:
             executable.set_uniforms(expansion.steps)
         if executable is not self.active:
             executable.fresh = True  # another pipeline may have written other values into shared programs
-        self._kept[key] = self.active = executable
+        self.active = executable
         return Runner(executable, pipeline.graph)
 
     def _scene(self, pipeline: Pipeline) -> GpuScene:
@@ -191,6 +198,7 @@ class Session:
             allowed = pipeline.allowed("scene")
             names = {"image_side": "side", "image_bytes": "bytes", "image_ratio": "ratio"}
             self._limits = Limits(**{names[name]: most for name, most in allowed.items() if name in names})
+            self.scenes_made += 1
             self._scenes = {id(scene): (scene, GpuScene(self.device, scene, pack.pack(scene), self._decode))}
             if pipeline.environment is not None and scene.environment is not None:
                 self._decode(scene.environment.image, False)  # named by the user: a broken one is said, used or not
@@ -200,8 +208,6 @@ class Session:
         return decode(source, srgb=srgb, warn=self._image_warnings.append, limits=self._limits)
 
     def _forget_executables(self) -> None:
-        for executable in self._kept.values():
-            executable.release()
         self._kept.clear()
         self.active = None
 
