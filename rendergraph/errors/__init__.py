@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from pathlib import Path
 from typing import ClassVar, Literal
 
 
@@ -88,6 +89,17 @@ class RenderError(RendergraphError):
     exit_code = 1
 
 
+class Misuse(Exception):
+    """What a node's author asked for and cannot have, said where the author's call is still on the stack.
+
+    The stage that called the node turns it into an `InputError` that names node, pipeline line and the author's line.
+    """
+
+    def __init__(self, text: str, code: str = "RG423") -> None:
+        self.code = code
+        super().__init__(text)
+
+
 class UsageError(RendergraphError):
     """The command line itself is malformed."""
 
@@ -98,6 +110,14 @@ class DeviceError(RendergraphError):
     """No usable GL device."""
 
     exit_code = 5
+
+
+def shown_file(file: str | Path) -> str:
+    """A path as messages print it: relative to the current folder where it lies inside."""
+    try:
+        return Path(file).relative_to(Path.cwd()).as_posix()
+    except (ValueError, OSError):  # elsewhere, or the current folder is gone
+        return str(file)
 
 
 def nearest(word: str, words: Iterable[str]) -> str | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.stamps import look
 
 MAX_BYTES = 1_000_000
@@ -38,7 +38,7 @@ class Origin:
         """The place as messages print it, relative to the current folder where it lies inside."""
         if self.file is None:
             return None
-        return Place(shown(self.file), self.line, max(1, column - self.column))
+        return Place(shown_file(self.file), self.line, max(1, column - self.column))
 
 
 @dataclass(frozen=True)
@@ -66,14 +66,6 @@ def generated(lines: Iterable[str]) -> SourceText:
     """Lines that stand in no file."""
     rows = tuple(lines)
     return SourceText(rows, (Origin(),) * len(rows))
-
-
-def shown(file: Path) -> str:
-    """A path as messages print it."""
-    try:
-        return file.relative_to(Path.cwd()).as_posix()
-    except ValueError:
-        return str(file)
 
 
 _COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?\*/", re.DOTALL)
@@ -192,7 +184,7 @@ class Includes:
         target = folder / name
         inside = (self.include_folder if shared else root).resolve()
         if not target.resolve().is_relative_to(inside):
-            text = f"'{name}' lies outside '{shown(inside)}', where this shader's includes are"
+            text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
             raise _error("RG406", text, origin, raw)
         look(target)
         if not target.is_file():
@@ -211,14 +203,14 @@ def _read(file: Path) -> str:
     look(file)
     if not file.is_file():
         known = {path.name for path in file.parent.glob("*") if path.is_file()} if file.parent.is_dir() else set()
-        text = f"there is no shader '{shown(file)}'{suggestion(file.name, known)}"
+        text = f"there is no shader '{shown_file(file)}'{suggestion(file.name, known)}"
         raise InputError(Problem("RG400", text))
     if file.stat().st_size > MAX_BYTES:
-        raise InputError(Problem("RG403", f"the shader is larger than {MAX_BYTES:,} bytes", Place(shown(file))))
+        raise InputError(Problem("RG403", f"the shader is larger than {MAX_BYTES:,} bytes", Place(shown_file(file))))
     try:
         return file.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
-        raise InputError(Problem("RG407", f"the shader is not UTF-8 text: {error}", Place(shown(file)))) from error
+        raise InputError(Problem("RG407", f"the shader is not UTF-8 text: {error}", Place(shown_file(file)))) from error
 
 
 def _error(code: str, text: str, origin: Origin, raw: str) -> InputError:

@@ -1,0 +1,61 @@
+"""Where in its author's own files an exception came from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import CodeType, FrameType, TracebackType
+
+from rendergraph.errors import Misuse, shown_file
+
+
+def author_line(error: BaseException, cls: type) -> str:
+    """`file:line` of the innermost line of the node's own package that an exception came through.
+
+    Helpers beside the node count as the author's own; the framework, NumPy and the like do not.
+
+    Args:
+        error: what was raised.
+        cls: the node's class.
+
+    Returns:
+        The place, or nothing where the exception never met the author's code.
+    """
+    own = [(code, line) for frame, code, line in _frames(error.__traceback__) if _is_own(frame, cls)]
+    return f"{shown_file(own[-1][0].co_filename)}:{own[-1][1]}" if own else ""
+
+
+def is_deliberate(error: BaseException, cls: type) -> bool:
+    """Whether the author's own code says `raise`: a message for users and no accident."""
+    from opcode import opmap
+
+    last = error.__traceback__
+    while last is not None and last.tb_next is not None:
+        last = last.tb_next
+    if last is None or not _is_own(last.tb_frame, cls):
+        return False
+    return last.tb_frame.f_code.co_code[last.tb_lasti] == opmap["RAISE_VARARGS"]
+
+
+def what_happened(error: BaseException, cls: type) -> str:
+    """`file:line: KeyError: 'x'`, without the exception's name where the framework refused a call."""
+    where = author_line(error, cls)
+    text = str(error) if isinstance(error, Misuse) else f"{type(error).__name__}: {error}"
+    return f"{where}: {text}" if where else text
+
+
+def _frames(trace: TracebackType | None) -> Iterator[tuple[FrameType, CodeType, int]]:
+    while trace is not None:
+        yield trace.tb_frame, trace.tb_frame.f_code, trace.tb_lineno
+        trace = trace.tb_next
+
+
+def _is_own(frame: FrameType, cls: type) -> bool:
+    module = str(frame.f_globals.get("__name__", ""))
+    if module.partition(".")[0] != cls.__module__.partition(".")[0]:
+        return False
+    return not is_framework(module)
+
+
+def is_framework(module: str) -> bool:
+    """Whether a module is the framework's; the standard nodes are authors like anybody."""
+    return module == "rendergraph" or (module.startswith("rendergraph.") and not module.startswith("rendergraph.nodes"))
