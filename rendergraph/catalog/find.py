@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import sys
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
+from rendergraph.catalog.reload import PREFIX, fresh_package
 from rendergraph.catalog.types import Listed
 from rendergraph.errors import InputError, Problem
+from rendergraph.stamps import look
 
 
 def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
@@ -46,6 +46,7 @@ def _shader_folder(package: str) -> Path | None:
 
 def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> Iterator[tuple[str, Listed]]:
     for where, subfolders, files in os.walk(folder):
+        look(Path(where))
         subfolders[:] = sorted(name for name in subfolders if name.isidentifier() and not name.startswith("_"))
         family = Path(where).relative_to(folder).as_posix().removeprefix(".")
         for file in sorted(files):
@@ -60,15 +61,13 @@ def loose(path: Path) -> Iterator[tuple[str, Listed]]:
     """The modules of a file or folder that is not installed, as a package of their own, so that they can import
     each other relatively.
     """
+    look(path)
     if not path.exists():
         raise InputError(Problem("RG011", f"there is no plugin '{path}'"))
     path = path.resolve()
     folder = path if path.is_dir() else path.parent
-    package = f"rendergraph_plugin_{zlib.crc32(os.fsencode(folder)):08x}"
-    if package not in sys.modules:
-        module = ModuleType(package)
-        module.__path__ = [str(folder)]
-        sys.modules[package] = module
+    package = f"{PREFIX}{zlib.crc32(os.fsencode(folder)):08x}"
+    fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem
     nodes, shaders = folder / "nodes", folder / "shaders"
     if path.is_dir() and nodes.is_dir() and shaders.is_dir():
