@@ -6,14 +6,17 @@ import inspect
 import json
 import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Function, InOut, Input, Node, Port, Views
-from rendergraph.errors import InputError
+from rendergraph.document import shown
+from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.read import INPUT_KEYS, NAME, NODE_KEYS, PARAMETER_KEYS, TOP_KEYS, VERSION
 from rendergraph.resolve import MOST_SIDE
 from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.settings import Roots
 from rendergraph.textures import Signature
 
 Schema = dict[str, Any]
@@ -233,3 +236,55 @@ def _draft_07(value: Any) -> Any:
     if "prefixItems" in table:
         table["items"] = table.pop("prefixItems")
     return table
+
+
+# --- is a file on disk still right? ----------------------------------------------------------------------------------
+
+_MODELINE = re.compile(r"#\s*(?:yaml-language-server:\s*)?\$schema=(\S+)\s*$", re.MULTILINE)
+_MOST_BYTES = 1 << 24
+
+
+def outdated(pipeline: Path, roots: Roots, catalog: Catalog) -> Problem | None:
+    """A warning where the schema that a pipeline file's modeline names was written before its node types changed.
+
+    Types that the schema knows and the catalog does not are nothing to warn of: it may be for more plugins than this
+    run has.
+
+    Args:
+        pipeline: the file.
+        roots: where the schema must lie; one elsewhere is not looked at.
+        catalog: the types there are.
+    """
+    text = pipeline.read_text(encoding="utf-8", errors="replace")
+    found = _MODELINE.search(text)
+    if found is None or "://" in found[1]:
+        return None
+    file = pipeline.parent / found[1]
+    try:
+        if roots.check(file).stat().st_size > _MOST_BYTES:
+            return None
+        then = _rules(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError, KeyError, InputError):  # not there, or not ours
+        return None
+    now = _rules(schema(catalog))
+    changed = [f"'{name}' {'has changed' if name in then else 'is new'}" for name in now if now[name] != then.get(name)]
+    if not changed:
+        return None
+    rest = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+    way_out = f"`rendergraph schema -o {found[1]}` writes it anew"
+    line = text.count("\n", 0, found.start()) + 1
+    return Problem(
+        "RG153",
+        f"the editor's schema '{shown(found[1])}' is out of date: {', '.join(changed[:3])}{rest}; {way_out}",
+        Place(shown_file(pipeline), line, 1),
+        text.splitlines()[line - 1],
+        "warning",
+    )
+
+
+def _rules(found: Any) -> dict[str, Any]:
+    """What a schema says of each node type."""
+    node = found["definitions"]["node"]
+    rules = {entry["if"]["properties"]["type"]["const"]: entry["then"] for entry in node["allOf"]}
+    about = {entry["const"]: entry for entry in node["properties"]["type"]["anyOf"] if "const" in entry}
+    return {name: [rules.get(name), entry] for name, entry in about.items()}

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import shlex
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from rendergraph.catalog import Catalog
+from rendergraph.cli.app import main
 from rendergraph.document import parse
-from rendergraph.schema import schema
+from rendergraph.resources import folder
+from rendergraph.schema import outdated, schema
+from rendergraph.settings import Roots
 
 FORWARD = """
 rendergraph: 1
@@ -72,6 +78,7 @@ def test_an_independent_validator_agrees(made: dict[str, Any]) -> None:
     validate = fastjsonschema.compile(made)
     validate(parse(FORWARD).value)
     validate({"extends": "forward", "nodes": {"light": None, "display": {"params": {"exposure": 1}}}})
+    validate({"nodes": {"shadows": {"type": "shadow_vsm", "params": {"taps": None}}}})  # drops an inherited one
     for wrong in (
         FORWARD.replace("bias: $bias", "bais: $bias"),
         FORWARD.replace("taps: null", "taps: 99"),
@@ -86,3 +93,62 @@ def test_an_independent_validator_agrees(made: dict[str, Any]) -> None:
         assert wrong != FORWARD
         with pytest.raises(fastjsonschema.JsonSchemaException, match=r"^data"):
             validate(parse(wrong).value)
+
+
+# --- a schema on disk ------------------------------------------------------------------------------------------------
+
+FOG = """
+from rendergraph.api import Input, Node, Output, Radiance, param
+
+class Fog(Node):
+    '''Fog.'''
+
+    radiance = Input(Radiance, doc="Clear.")
+    foggy = Output(like="radiance", doc="Foggy.")
+    density: float = param(default=0.05, min=0, max=10, doc="How much.")
+"""
+
+
+def test_check_says_when_the_schema_beside_the_file_is_out_of_date(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = yaml.safe_load((folder("rendergraph.errors") / "RG153-schema-out-of-date.yaml").read_text())
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pipeline.yaml").write_text(page["wrong"])
+    (tmp_path / "fog.py").write_text(FOG)
+    check = ["check", "pipeline.yaml", "--plugin", "fog.py"]
+
+    def warned() -> str:
+        capsys.readouterr()
+        assert main(check) == 0
+        return "\n".join(line for line in capsys.readouterr().err.splitlines() if "RG153" in line)
+
+    assert warned() == ""  # no schema is there
+    assert main(["schema", "-o", "rendergraph.schema.json"]) == 0
+    assert warned().removeprefix("pipeline.yaml:") == page["message"]
+    assert main(shlex.split(page["right"])[1:]) == 0
+    assert warned() == ""
+    (tmp_path / "fog.py").write_text(FOG.replace("max=10", "max=11"))
+    assert "'fog' has changed" in warned()
+    check = check[:2]
+    assert warned() == ""  # a schema may be for more plugins than this run has
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"definitions": {"node": 1}}', "no json"])
+def test_a_schema_of_somebody_else_is_left_alone(tmp_path: Path, toy_catalog: Catalog, text: str) -> None:
+    file = tmp_path / "pipeline.yaml"
+    (tmp_path / "other.json").write_text(text)
+    file.write_text("# $schema=other.json\nextends: forward\n")
+    assert outdated(file, Roots.around(file), toy_catalog) is None
+    file.write_text("# $schema=https://example.org/schema.json\n")
+    assert outdated(file, Roots.around(file), toy_catalog) is None
+
+
+def test_a_schema_outside_is_not_read(tmp_path: Path, toy_catalog: Catalog) -> None:
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (tmp_path / "s.json").write_text(json.dumps(schema(Catalog({}))))
+    file = inside / "pipeline.yaml"
+    file.write_text("# yaml-language-server: $schema=../s.json\n")
+    assert outdated(file, Roots.around(file), toy_catalog) is None
+    assert outdated(file, Roots.around(file, [tmp_path]), toy_catalog) is not None

@@ -23,10 +23,16 @@ def command(as_json: bool, **selection: Any) -> None:
       rendergraph check forward
       rendergraph check forward --scene spheres -s light.ambient=0.1 --json
     """
+    from rendergraph.schema import outdated
+    from rendergraph.settings import Roots
+
     pipeline = options.load(**selection)
     graph = pipeline.check()
     said = {str(problem) for problem in pipeline.warnings}
     later = [problem for problem in graph.warnings if str(problem) not in said]
+    file = pipeline.spec.path
+    stale = file and outdated(file, Roots.around(file, pipeline.asset_roots), pipeline.catalog)
+    later += [stale] if stale else []
     warn(later)
     width, height = graph.size
     links = graph.dag.number_of_edges()
