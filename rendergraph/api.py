@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from rendergraph.declare import (
+    Choice,
+    Extension,
     Facts,
     Function,
     History,
@@ -10,6 +12,7 @@ from rendergraph.declare import (
     Input,
     Internal,
     LightFacts,
+    MeshData,
     Node,
     Output,
     Part,
@@ -58,9 +61,9 @@ from rendergraph.textures import (
 )  # fmt: skip
 
 __all__ = [
-    "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Albedo", "Any", "Blend", "Depth", "DisplayColor", "Emissive", "Facts",
+    "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Albedo", "Any", "Blend", "Choice", "Depth", "DisplayColor", "Emissive", "Extension", "Facts",
     "Frame", "Function", "History", "InOut", "Input", "Internal", "IrradianceSH", "LightFacts", "LinearDepth",
-    "Luminance", "Material", "Node", "Normal", "Occlusion", "Output", "Part", "Port", "Radiance", "SceneRef",
+    "Luminance", "Material", "MeshData", "Node", "Normal", "Occlusion", "Output", "Part", "Port", "Radiance", "SceneRef",
     "Semantic", "ShadowLookup", "ShadowMap", "Signature", "State", "Stencil", "StencilFace", "Steps", "TextureDesc",
     "TextureInfo", "View", "ViewMatrices", "Views", "Visibility", "define", "full_mip_count", "param", "structural",
 ]  # fmt: skip

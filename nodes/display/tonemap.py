@@ -28,7 +28,7 @@ class Tonemap(Node):
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
     curve: Literal[
         "neutral", "aces", "reinhard", "reinhard_luminance", "reinhard_extended", "hable", "none"
-    ] = define(default="neutral", doc="Shoulder after exposure.")  # fmt: skip
+    ] | str = define(default="neutral", doc="Shoulder after exposure.", choices="curve")  # fmt: skip
     white: float = param(
         default=4.0, min=0.01, doc="Luminance after exposure that `reinhard_extended` maps to white; more clips."
     )

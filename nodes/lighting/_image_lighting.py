@@ -52,9 +52,9 @@ class ImageLighting(Lighting):
         ports: list[Port] = [self.depth, self.albedo]
         if self.shading != "unlit":
             ports += [self.normal, self.material, self.emissive, self.specular]
-        if self.shading == "anisotropic":
+        if self.shading == "anisotropic" or "grain" in steps.needs("shading"):
             ports.append(self.grain)
-        if self.shading in ("phong", "blinn_phong"):
+        if self.shading in ("phong", "blinn_phong") or "phong" in steps.needs("shading"):
             ports += [self.phong_diffuse, self.phong_specular, self.phong_ambient]
             ports.remove(self.specular)
         return _connected(steps, ports)

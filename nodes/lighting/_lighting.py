@@ -24,9 +24,10 @@ Color = float | tuple[float, float, float]
 class Lighting(Node):
     """Base of the nodes that turn surfaces into radiance: the shading model, its terms, what is around the scene."""
 
-    shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] = define(
-        default="pbr", doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model."
-    )
+    shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
+        default="pbr", doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model.",
+        choices="shading", needs=("phong", "grain"),
+    )  # fmt: skip
     smith: Literal["exact", "fast"] = define(default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots.")
     terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
         default="all", doc="One term alone, to look at; the four sum to the whole."

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from rendergraph.catalog import find, modules
+from rendergraph.catalog.extensions import extensions
 from rendergraph.catalog.types import Listed, NodeType
-from rendergraph.declare import Node
+from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
 from rendergraph.errors import InputError, Problem, suggestion
 
 GROUP = "rendergraph.nodes"
@@ -19,9 +20,16 @@ GROUP = "rendergraph.nodes"
 class Catalog:
     """Node types by name, imported when they are asked for."""
 
-    def __init__(self, listed: Mapping[str, list[Listed]], types: Mapping[str, NodeType] | None = None) -> None:
+    def __init__(
+        self,
+        listed: Mapping[str, list[Listed]],
+        types: Mapping[str, NodeType] | None = None,
+        extensions: Extensions = NO_EXTENSIONS,
+    ) -> None:
         self._listed = dict(listed)
         self._types = dict(types or {})
+        self.extensions = extensions
+        """What plugins add beside node types, imported when the first name is asked for."""
 
     @classmethod
     def discover(cls, plugin_paths: Iterable[Path] = (), *, installed: bool = True) -> Catalog:
@@ -36,12 +44,14 @@ class Catalog:
         """
         from importlib.metadata import entry_points
 
+        plugin_paths = tuple(plugin_paths)
         listed: dict[str, list[Listed]] = {}
         for entry in entry_points(group=GROUP) if installed else ():
             _add(listed, find.package(entry.name, entry.value.partition(":")[0]))
         for path in plugin_paths:
             _add(listed, find.loose(path))
-        return cls(listed)
+        folders = [(find.package_of(path), path.resolve()) for path in plugin_paths if path.is_dir()]
+        return cls(listed, extensions=extensions(folders, installed=installed))
 
     @classmethod
     def of(cls, *classes: type[Node], shaders: Path = Path(), **named: type[Node]) -> Catalog:

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from rendergraph.catalog.extensions import MODULE
 from rendergraph.catalog.reload import PREFIX, fresh_package
 from rendergraph.catalog.types import Listed
 from rendergraph.errors import InputError, Problem
@@ -51,10 +52,16 @@ def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> I
         family = Path(where).relative_to(folder).as_posix().removeprefix(".")
         for file in sorted(files):
             stem, suffix = os.path.splitext(file)
-            if suffix == ".py" and not stem.startswith("_"):
+            if suffix == ".py" and not stem.startswith("_") and (family, stem) != ("", MODULE):
                 module = ".".join([package, *filter(None, family.split("/")), stem])
                 beside = Path(where) if shaders is None else shaders / family
                 yield stem, Listed(module, family, Path(where) / file, beside, plugin)
+
+
+def package_of(path: Path) -> str:
+    """What the package is called that stands for the folder of a plugin given by path."""
+    folder = path.resolve() if path.is_dir() else path.resolve().parent
+    return f"{PREFIX}{zlib.crc32(os.fsencode(folder)):08x}"
 
 
 def loose(path: Path) -> Iterator[tuple[str, Listed]]:
@@ -66,7 +73,7 @@ def loose(path: Path) -> Iterator[tuple[str, Listed]]:
         raise InputError(Problem("RG011", f"there is no plugin '{path}'"))
     path = path.resolve()
     folder = path if path.is_dir() else path.parent
-    package = f"{PREFIX}{zlib.crc32(os.fsencode(folder)):08x}"
+    package = package_of(path)
     fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem
     nodes, shaders = folder / "nodes", folder / "shaders"

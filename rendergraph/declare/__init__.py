@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from rendergraph.declare.extension import READ_IMAGES, Choice, Extension, MeshData, extension_mistakes
+from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source, raised_at
 from rendergraph.declare.facts import Facts, LightFacts, TextureInfo
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
 from rendergraph.declare.node import Node
-from rendergraph.declare.parameters import define, param, structural
+from rendergraph.declare.parameters import closed, define, open_name, own_choices, param, structural
 from rendergraph.declare.ports import (
     PORT_TYPES,
     Function,
@@ -23,7 +25,8 @@ from rendergraph.declare.ports import (
 )  # fmt: skip
 
 __all__ = [
-    "PORT_TYPES", "RESERVED_NAMES", "Facts", "Function", "History", "InOut", "Input", "Internal", "LightFacts", "Made",
-    "Node", "Output", "Part", "Port", "Ruled", "SizeRule", "TextureInfo", "Views", "declaration_mistakes", "define",
-    "param", "structural",
+    "NO_EXTENSIONS", "PORT_TYPES", "READ_IMAGES", "RESERVED_NAMES", "Added", "Choice", "Extension", "Extensions",
+    "Facts", "Function", "History", "InOut", "Input", "Internal", "LightFacts", "Made", "MeshData", "Node", "Output",
+    "Part", "Port", "Ruled", "SizeRule", "Source", "TextureInfo", "Views", "closed", "declaration_mistakes", "define",
+    "extension_mistakes", "open_name", "own_choices", "param", "raised_at", "structural",
 ]  # fmt: skip

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from typing import get_args
 
 from rendergraph.declare.node import Node
+from rendergraph.declare.parameters import open_name
 from rendergraph.declare.ports import History, Internal, Made
 from rendergraph.textures import FORMATS
 
@@ -79,6 +81,8 @@ def declaration_mistakes(cls: type[Node]) -> list[str]:
     for name, info in cls.parameters().items():
         if not info.description:
             mistakes.append(f"parameter '{name}' has no doc")
+        if open_name(info) and str not in get_args(info.annotation):
+            mistakes.append(f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
     try:
         cls.model_validate(cls().model_dump(), strict=False)
     except ValueError as error:

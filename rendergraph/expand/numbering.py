@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
+from rendergraph.declare import Choice, Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
@@ -156,6 +157,7 @@ class Numbering:
             reads=tuple(reads),
             writes=tuple(writes),
             functions=tuple(functions),
+            includes=_includes(node.choices),
             defines=(*self._defines(recorder, reads, functions), *request.defines.items()),
             uniforms=(*param_uniforms(node.node), *request.uniforms.items()),
             size=size,
@@ -303,7 +305,7 @@ class Numbering:
             called = isinstance(port, Input) and port.kind == "function" and functions and recorder.links.get(name)
             if name in read_names or (many and f"{name}_0" in read_names) or called:
                 yield f"HAS_{name.upper()}", "1"
-        yield from define_parameters(node)
+        yield from define_parameters(node, recorder.node.choices)
 
     # Functions ------------------------------------------------------------------------------------------------------
 
@@ -335,7 +337,8 @@ class Numbering:
         return [
             FunctionBinding(
                 port.signature.name, node.id, port.shader, tuple(reads),
-                (*present, *define_parameters(node.node)), tuple(param_uniforms(node.node)),
+                (*present, *define_parameters(node.node, node.choices)), tuple(param_uniforms(node.node)),
+                _includes(node.choices),
             )
         ]  # fmt: skip
 
@@ -375,6 +378,10 @@ class Numbering:
             resource = self.resources[name]
             role: Role = "history" if name in previous or resource.role == "history" else "output"
             self.resources[name] = replace(resource, role=role)
+
+
+def _includes(plugged: Mapping[str, Choice]) -> tuple[tuple[str, Path], ...]:
+    return tuple((name.upper(), Path(choice.shader)) for name, choice in plugged.items())
 
 
 def _passed(graph: Graph, recorders: Mapping[str, Recorder]) -> Iterator[tuple[Endpoint, Endpoint]]:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import get_args
 
-from rendergraph.declare import Node
+from rendergraph.declare import Choice, Node, own_choices
 from rendergraph.steps import UniformValue, define_text
 
 
-def define_parameters(node: Node) -> Iterator[tuple[str, str]]:
-    """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers."""
+def define_parameters(node: Node, plugged: Mapping[str, Choice]) -> Iterator[tuple[str, str]]:
+    """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers.
+
+    Args:
+        node: the node.
+        plugged: parameters whose choice is a plugin's; other choices of plugins leave the text as it is.
+    """
     for name, info in type(node).parameters().items():
         if type(node).role_of(name) != "define":
             continue
         value = getattr(node, name)
         if isinstance(value, str):
-            choices = [choice for choice in get_args(info.annotation) if isinstance(choice, str)]
+            choices = [*own_choices(info.annotation), *([value] if name in plugged else [])]
             for number, choice in enumerate(choices):
                 yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
+            for need in plugged[name].needs if name in plugged else ():
+                yield f"NEEDS_{need}".upper(), "1"
             yield name.upper(), f"{name}_{value}".upper().replace("-", "_")
         else:
             yield name.upper(), define_text(value)

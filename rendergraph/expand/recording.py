@@ -55,6 +55,11 @@ class Recorder:
         """Whether anybody reads an output."""
         return port.name in self.used_ports
 
+    def needs(self, parameter: str) -> tuple[str, ...]:
+        """What a plugin's choice of a parameter needs."""
+        choice = self.node.choices.get(parameter)
+        return choice.needs if choice is not None else ()
+
     def add(self, request: Request) -> None:
         """Keep a request."""
         self.requests.append(request)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -77,6 +77,7 @@ def strip_comments(text: str) -> str:
 
 
 _INCLUDE = re.compile(r"\s*#\s*include\b\s*(.*?)\s*\Z")
+_PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")
 _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 _OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
 _CLOSES = re.compile(r"\s*#\s*endif\b")
@@ -95,14 +96,19 @@ class Includes:
         self.bytes = 0
         self._certain: set[tuple[Path, str]] = set()
         self._guards: dict[tuple[Path, str], str] = {}
+        self._plugged: dict[str, Path] = {}
 
-    def expand(self, source: Path, *, root: Path | None = None, prefix: str = "") -> SourceText:
+    def expand(
+        self, source: Path, *, root: Path | None = None, prefix: str = "", plugged: Mapping[str, Path] | None = None
+    ) -> SourceText:
         """The text of a file with all its includes.
 
         Args:
             source: the file.
             root: the folder that includes in quotes must stay in; the file's own by default.
             prefix: noted in the origins of every line that is not shared.
+            plugged: parameters in capitals whose choice is a plugin's: `#include <SHADING>` is the file given here,
+                and nothing where none is.
 
         Raises:
             InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
@@ -111,6 +117,7 @@ class Includes:
         lines: list[str] = []
         origins: list[Origin] = []
         self._certain.add((source.resolve(), prefix))
+        self._plugged = dict(plugged or {})
         self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
         return SourceText(tuple(lines), tuple(origins))
 
@@ -135,14 +142,23 @@ class Includes:
                 lines.append(line.rstrip())
                 origins.append(origin)
                 continue
-            target, shared = self._find(include[1], file, root, origin, raw, base.shared)
+            parameter = _PARAMETER.match(include[1])
+            if parameter is not None and parameter[1] not in self._plugged:
+                lines.append("")
+                origins.append(origin)
+                continue
+            if parameter is not None:
+                target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
+            else:
+                target, shared = self._find(include[1], file, root, origin, raw, base.shared)
+                home = root if '"' in include[1] else self.include_folder
             if target.resolve() in stack:
                 chain = " includes ".join(path.name for path in [*stack, target])
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
             if len(stack) > MAX_DEPTH:
                 raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix)
-            self._include(target, self.include_folder if shared else root, inner, stack, lines, origins, depth)
+            self._include(target, home, inner, stack, lines, origins, depth)
 
     def _include(
         self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
@@ -182,7 +198,7 @@ class Includes:
         shared = not beside or in_shared
         folder = file.parent if beside else self.include_folder
         target = folder / name
-        inside = (self.include_folder if shared else root).resolve()
+        inside = (root if beside else self.include_folder).resolve()
         if not target.resolve().is_relative_to(inside):
             text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
             raise _error("RG406", text, origin, raw)

@@ -14,10 +14,10 @@ from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
-from rendergraph.link.params import instance
+from rendergraph.link.params import instance, plugged
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
-from rendergraph.textures import TEXTURE_KINDS, Signature
+from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Signature
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -125,11 +125,12 @@ class _Linker:
 
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
         node, problems = instance(spec, node_type)
-        for problem in problems:
+        choices, wrong = plugged(spec, node, self.catalog.extensions)
+        for problem in (*problems, *wrong):
             self._say(problem)
         ports = node_type.cls.ports()
         inputs = {name: port for name, port in ports.items() if isinstance(port, Input | InOut)}
-        return Bound(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set())
+        return Bound(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
 
     # Links ------------------------------------------------------------------------------------------------------------
 
@@ -276,6 +277,8 @@ class _Linker:
                     continue
                 where = line_of(nodes[found.source.node].spec.place, crossing.given.place)
                 text = f"'{crossing.name}' takes {crossing.semantic}, but '{found.source}' ({where}) carries {carried}"
+                known = [*(semantic.name for semantic in SEMANTICS), *self.catalog.extensions.semantic_names()]
+                text += "" if crossing.semantic in known else suggestion(crossing.semantic, known, most=0)
                 return crossing.given.problem("RG110", text)
         return None
 
@@ -327,7 +330,7 @@ def _dag(nodes: Mapping[str, Bound]) -> nx.MultiDiGraph[str]:
     dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
     for name, bound in nodes.items():
         links = {key: tuple(found.source for found in ends) for key, ends in bound.links.items() if ends}
-        dag.add_node(name, node=GraphNode(name, bound.type, bound.node, links, bound.spec.place))
+        dag.add_node(name, node=GraphNode(name, bound.type, bound.node, links, bound.spec.place, bound.choices))
     for name, bound in nodes.items():
         for key, ends in bound.links.items():
             for found in ends:

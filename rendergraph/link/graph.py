@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import LightFacts, Node, TextureInfo
+from rendergraph.declare import Choice, LightFacts, Node, TextureInfo
 from rendergraph.errors import Place, Problem
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ class GraphNode:
         node: the instance, holding parameter values.
         inputs: connected inputs only, in the order of declaration; a `many` input has several endpoints.
         place: where it stands.
+        choices: parameters whose value a plugin brings, with the include it comes by.
     """
 
     id: str
@@ -43,6 +44,7 @@ class GraphNode:
     node: Node
     inputs: Mapping[str, tuple[Endpoint, ...]]
     place: Place | None = None
+    choices: Mapping[str, Choice] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import InOut, Input, Node, Port
+from rendergraph.declare import Choice, InOut, Input, Node, Port
 from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
@@ -60,6 +60,7 @@ class Bound:
         inputs: the ports that take links.
         links: by input, what is connected.
         failed: inputs whose link is wrong, so that nobody says they lack one.
+        choices: parameters whose value a plugin brings.
     """
 
     spec: NodeSpec
@@ -69,6 +70,7 @@ class Bound:
     inputs: Mapping[str, Input | InOut]
     links: dict[str, list[Link]]
     failed: set[str]
+    choices: Mapping[str, Choice]
 
 
 class Wrong(Exception):

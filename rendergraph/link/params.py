@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Node
+from rendergraph.declare import Added, Choice, Extensions, Node, closed, open_name, own_choices
 from rendergraph.document import Value, kind_of, shown
-from rendergraph.errors import Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec
 
@@ -42,6 +43,48 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
         return cls(), problems
 
 
+def plugged(spec: NodeSpec, node: Node, extensions: Extensions) -> tuple[dict[str, Choice], list[Problem]]:
+    """The parameters whose value is none of the node's own choices, with what a plugin brings for it.
+
+    Plugins are asked for words that the node does not know, and for no others.
+    """
+    found: dict[str, Choice] = {}
+    problems: list[Problem] = []
+    for name, info in type(node).parameters().items():
+        chosen, value = getattr(node, name), spec.params.get(name)
+        if not open_name(info) or not isinstance(chosen, str) or chosen in own_choices(info.annotation):
+            continue
+        try:
+            added = extensions.choice(open_name(info), chosen)
+            if added is None:
+                known = tuple(added.name for added in extensions.choices(open_name(info)))
+                text = f"'{spec.id}.{name}' takes {words_for(closed(info, known), {})}, this is '{shown(chosen, 40)}'"
+                hint = suggestion(chosen, (*own_choices(info.annotation), *known), most=0)
+                problems += [(value or spec.value).problem("RG104", text + hint), *extensions.problems]
+            else:
+                found[name] = added.value
+                problems += _unmet(open_name(info), added, info)
+        except InputError as error:
+            problems += error.problems
+    return found, problems
+
+
+def _unmet(parameter: str, added: Added[Choice], info: FieldInfo) -> list[Problem]:
+    """What a plugin's choice needs and nobody offers."""
+    extra = info.json_schema_extra
+    offered = [str(need) for need in extra["needs"]] if isinstance(extra, Mapping) else []  # type: ignore[union-attr]
+    return [
+        Problem(
+            "RG495",
+            f"choices['{parameter}']['{added.name}'] of plugin '{added.plugin}' needs '{need}', which "
+            f"'{parameter}' does not offer{suggestion(need, offered)}",
+            Place(str(added.file)),
+        )
+        for need in added.value.needs
+        if need not in offered
+    ]
+
+
 def _by_parameter(error: ValidationError) -> dict[str, list[Any]]:
     table: dict[str, list[Any]] = {}
     for detail in error.errors(include_url=False):
@@ -69,7 +112,7 @@ def _wrong(spec: NodeSpec, node_type: NodeType, name: str, details: list[Any]) -
         return value.problem("RG104", text)
     info = node_type.cls.parameters()[name]
     extra = info.json_schema_extra
-    words = words_for(info.annotation, extra if isinstance(extra, Mapping) else {})
+    words = words_for(closed(info), extra if isinstance(extra, Mapping) else {})
     hint = ""
     if isinstance(value.data, str):
         hint = suggestion(value.data, _choices(info.annotation), most=0)

@@ -123,14 +123,14 @@ def _stage(
     root = include_folder if shared else types[step.node].shaders
     file = root / (shared[1] if shared else name)
     # What the file calls decides which functions stand before it, so it is read once with includes of its own.
-    called = Includes(include_folder).expand(file, root=root).text
+    called = Includes(include_folder).expand(file, root=root, plugged=dict(step.includes)).text
     functions = SourceText()
     for signature in wanted.values():
         if calls(called, signature.name):
             functions += _functions(stage, signature, step, types, resources, views, includes)
         if mentions(called, f"{signature.name.upper()}_LIGHT_COUNT"):
             functions += generated(_light_table(signature, step, types[step.node], resources))
-    source = includes.expand(file, root=root)
+    source = includes.expand(file, root=root, plugged=dict(step.includes))
     extensions, source = _hoisted(source)
     body = functions.text + source.text
     head = [VERSION, *extensions, *(f"#define {key} {value}".rstrip() for key, value in macros.items())]
@@ -257,7 +257,8 @@ def provider_text(
         InputError: a file is missing, or does not define the function (RG408).
     """
     before = prefix(binding.node)
-    source = includes.expand(node.shaders / binding.shader, root=node.shaders, prefix=before)
+    file = node.shaders / binding.shader
+    source = includes.expand(file, root=node.shaders, prefix=before, plugged=dict(binding.includes))
     own = SourceText(*_rows((line, origin) for line, origin in _pairs(source) if not origin.shared))
     names = {name.name for name in declared(own.text)}
     if binding.signature not in names:

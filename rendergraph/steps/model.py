@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 from rendergraph.steps.state import State
@@ -75,6 +76,7 @@ class FunctionBinding:
         reads: what the text samples, by the names in its text.
         defines: the provider's own defines.
         uniforms: the provider's parameters that are uniforms.
+        includes: parameters whose choice is a plugin's, in capitals, and the include it brings.
     """
 
     signature: str
@@ -83,6 +85,7 @@ class FunctionBinding:
     reads: tuple[Read, ...]
     defines: tuple[tuple[str, str], ...] = ()
     uniforms: tuple[tuple[str, UniformValue], ...] = ()
+    includes: tuple[tuple[str, Path], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,7 @@ class Step:
             `<name>` for one in `shaders/include/`.
         reads, writes: resources, with versions.
         functions: providers of functions its shader calls.
+        includes: parameters whose choice is a plugin's, in capitals, and the include it brings.
         defines: names and program text.
         uniforms: names and values that belong to this step alone.
         state: fixed function.
@@ -124,6 +128,7 @@ class Step:
     reads: tuple[Read, ...] = ()
     writes: tuple[Write, ...] = ()
     functions: tuple[FunctionBinding, ...] = ()
+    includes: tuple[tuple[str, Path], ...] = ()
     defines: tuple[tuple[str, str], ...] = ()
     uniforms: tuple[tuple[str, UniformValue], ...] = ()
     state: State = State()

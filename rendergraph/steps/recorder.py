@@ -25,6 +25,10 @@ class Recorder(Protocol):
         """Whether anybody reads an output."""
         ...
 
+    def needs(self, parameter: str) -> tuple[str, ...]:
+        """What a plugin's choice of a parameter needs."""
+        ...
+
     def add(self, request: Request) -> None:
         """Keep a request."""
         ...
@@ -81,6 +85,10 @@ class Steps:
     def used(self, port: Port) -> bool:
         """Whether anybody reads an output; one that nobody reads need not be written."""
         return self._recorder.used(port)
+
+    def needs(self, parameter: str) -> tuple[str, ...]:
+        """What a plugin's choice of a parameter says that it needs; nothing where the choice is the node's own."""
+        return self._recorder.needs(parameter)
 
     def desc(self, port: Port) -> TextureDesc:
         """Size, format, mips and layers of a port's texture."""

@@ -1,5 +1,11 @@
 // Tone mapping: exposure, a shoulder, then the sRGB transfer function (IEC 61966-2-1).
+// A plugin's curve is an include with
+//
+//     vec3 tone_curve(vec3 color)
+//
+// from scene-linear after exposure, 0 to infinity, to display-linear; what leaves 0 to 1 is clipped.
 #include <tone_curves.glsl>
+#include <CURVE>
 
 uniform sampler2D radiance;  // scene-linear
 #ifdef HAS_GAIN
@@ -22,8 +28,10 @@ vec3 shoulder(vec3 c) {
     return reinhard_extended_curve(c, white);
 #elif CURVE == CURVE_HABLE
     return hable_curve(c);
-#else
+#elif CURVE == CURVE_NONE
     return c;
+#else
+    return tone_curve(c);
 #endif
 }
 

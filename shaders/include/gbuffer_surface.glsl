@@ -61,7 +61,7 @@ bool surface_at(ivec2 texel, out Surface s) {
     s.dielectric.rgb *= s.dielectric.rgb;
 #endif
     physical_reflectance(s, s.dielectric);
-#ifdef EMPIRICAL
+#ifdef NEEDS_PHONG
     s.exponent = phong_exponent(s.roughness);
 #ifdef HAS_PHONG_DIFFUSE
     s.diffuse = texelFetch(phong_diffuse, texel, 0).rgb;

@@ -2,7 +2,8 @@
 //
 //     Reflected reflected(Surface surface, vec3 to_light)
 //
-// Radiance towards the viewer for an irradiance of 1 on a surface that faces the light: the cosine is in it.
+// Radiance towards the viewer for an irradiance of 1 on a surface that faces the light: the cosine is in it. The
+// diffuse part is proportional to `surface.diffuse`; light computed at vertices leaves that factor to the fragments.
 #include <surface.glsl>
 
 struct Reflected {
@@ -18,6 +19,8 @@ struct Reflected {
 #include <shading/blinn_phong.glsl>
 #elif SHADING == SHADING_PHONG
 #include <shading/phong.glsl>
-#else
+#elif SHADING == SHADING_UNLIT
 #include <shading/unlit.glsl>
+#else
+#include <SHADING>
 #endif

@@ -13,7 +13,7 @@
 #endif
 
 #if SHADING == SHADING_PHONG || SHADING == SHADING_BLINN_PHONG
-#define EMPIRICAL
+#define NEEDS_PHONG
 #endif
 #if SHADING == SHADING_ANISOTROPIC
 #define NEEDS_GRAIN
@@ -24,10 +24,10 @@ struct Surface {
     vec3 normal;            // unit, for shading
     vec3 geometric_normal;  // unit, of the triangle, towards the viewer
     vec3 to_viewer;         // unit
-    vec3 tangent;           // unit, along the grain; used by the anisotropic model alone
+    vec3 tangent;           // unit, along the grain; with NEEDS_GRAIN, as the anisotropic model has it
     vec3 bitangent;
     vec3 base_color;
-    vec3 diffuse;    // base colour without its metallic part, or kd
+    vec3 diffuse;    // base colour without its metallic part; kd with NEEDS_PHONG, as the empirical models have it
     vec3 f0;         // specular colour at normal incidence, or ks
     vec3 ambient;    // what an even light from all sides is multiplied with: base colour, or ka
     vec3 emissive;
@@ -37,8 +37,8 @@ struct Surface {
     float metallic;
     float roughness;
     float occlusion;
-    float exponent;    // n of `phong`
-    float anisotropy;  // strength
+    float exponent;    // n of `phong`; with NEEDS_PHONG
+    float anisotropy;  // strength; with NEEDS_GRAIN
     float lit;         // 0 where the material is unlit, else 1
 };
 
@@ -84,7 +84,7 @@ void empirical_reflectance(inout Surface s, MaterialData m) {
 void derive_reflectance(inout Surface s, MaterialData m, vec4 specular) {
     s.dielectric = dielectric_of(m, specular);
     physical_reflectance(s, s.dielectric);
-#ifdef EMPIRICAL
+#ifdef NEEDS_PHONG
     empirical_reflectance(s, m);
 #endif
 }

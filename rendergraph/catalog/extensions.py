@@ -1,0 +1,77 @@
+"""Finding what plugins add beside node types: by entry point, or in `extension.py` at the top of a plugin's folder."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
+
+from rendergraph.declare import Extension, Extensions, Source, extension_mistakes, raised_at
+from rendergraph.errors import Place, Problem, shown_file
+from rendergraph.stamps import look
+
+GROUP = "rendergraph.extensions"
+"""The entry point group; an entry's value is `package.module:NAME`."""
+MODULE = "extension"
+NAME = "EXTENSION"
+"""What a plugin's folder calls it."""
+
+
+def extensions(folders: Iterable[tuple[str, Path]] = (), *, installed: bool = True) -> Extensions:
+    """What plugins add; nothing is looked for or imported before it is asked for.
+
+    Args:
+        folders: packages that stand for the folders of plugins the user named, and the folders.
+        installed: look at entry points too.
+    """
+    named = tuple(folders)
+    return Extensions(lambda: _sources(named, installed))
+
+
+def _sources(folders: Iterable[tuple[str, Path]], installed: bool) -> Iterator[Source]:
+    from importlib.metadata import entry_points
+
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.value) if installed else ():
+        plugin = entry.dist.name if entry.dist is not None else entry.name
+        yield _source(plugin, _file(entry), entry.load, entry.value)
+    for package, folder in folders:
+        file = folder / f"{MODULE}.py"
+        look(file)
+        if file.is_file():
+            yield _source(folder.name, file, _loader(f"{package}.{MODULE}"), f"{MODULE}.py:{NAME}")
+
+
+def _loader(module: str) -> Callable[[], Any]:
+    return lambda: getattr(importlib.import_module(module), NAME)
+
+
+def _file(entry: EntryPoint) -> Path:
+    """The file an entry's module will come from, found without importing more than its parent; empty where none is."""
+    try:
+        spec = importlib.util.find_spec(entry.module)
+    except Exception:  # its parent fails to import, which loading will say
+        spec = None
+    return Path(spec.origin) if spec is not None and spec.origin else Path()
+
+
+def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Source:
+    look(file)
+    place = Place(shown_file(file)) if file.name else None
+    try:
+        found = load()
+    except (Exception, SystemExit) as error:  # whatever a stranger's module raises is a mistake in that module
+        text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {type(error).__name__}: {error}"
+        where = (raised_at(error, file.parent) if file.name else None) or place
+        return Source(plugin, file, None, (Problem("RG494", " ".join(text.split()), where),))
+    if not isinstance(found, Extension):
+        text = f"'{value}' of plugin '{plugin}' is {type(found).__name__}, not an Extension"
+        return Source(plugin, file, None, (Problem("RG495", text, place),))
+    defined = sys.modules.get(value.partition(":")[0])
+    file = file if file.name else Path(getattr(defined, "__file__", None) or "")
+    mistakes = extension_mistakes(found, file.parent)
+    problems = tuple(Problem("RG495", f"plugin '{plugin}': {mistake}", place) for mistake in mistakes)
+    return Source(plugin, file, None if mistakes else found, problems)

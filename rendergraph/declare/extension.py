@@ -1,0 +1,150 @@
+"""What a plugin adds beside node types: meanings, choices, readers of meshes and images, metrics."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy.typing as npt
+
+from rendergraph.textures import Semantic
+
+Metric: TypeAlias = Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]
+ImageLoader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
+MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One more value of a parameter that plugins add choices to: GLSL that the node's shader takes in for it.
+
+    Attributes:
+        shader: the include, relative to the folder of the extension's module; what it defines, the parameter's node
+            says. Its opening comment is its documentation.
+        needs: what it looks at and other choices do not, in the words of the parameter.
+    """
+
+    shader: str | Path
+    needs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MeshData:
+    """Triangles of one material, as a mesh loader gives them: right-handed, +Y up, metres.
+
+    Attributes:
+        positions: (n, 3) finite numbers.
+        indices: (m, 3) whole numbers below n, counter-clockwise seen from outside.
+        normals: (n, 3); the mean of the adjacent faces' by default, so that shared vertices are smooth.
+        uv0, uv1: (n, 2) texture coordinates, origin at the image's top left.
+        colors: (n, 3) or (n, 4), linear.
+        name: of the object; the file's by default.
+        base_color, metallic, roughness: the material, where the scene file names none.
+    """
+
+    positions: npt.ArrayLike
+    indices: npt.ArrayLike
+    normals: npt.ArrayLike | None = None
+    uv0: npt.ArrayLike | None = None
+    uv1: npt.ArrayLike | None = None
+    colors: npt.ArrayLike | None = None
+    name: str = ""
+    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    metallic: float = 0.0
+    roughness: float = 1.0
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What a plugin adds beside node types, each by name; nothing of it is imported before a name is asked for.
+
+    It is found by the entry point group `rendergraph.extensions`, or as `EXTENSION` in `extension.py` at the top of a
+    plugin's folder.
+
+    Attributes:
+        semantics: meanings of ports.
+        choices: parameter name to further choices of it: a `Choice`, or the name of its include alone.
+        meshes: a file's ending (`.stl`) to the function that reads such a file, as a scene and as an object's `file`.
+        images: a file's ending to the function that decodes its bytes: (height, width), or with 1 to 4 channels behind,
+            the top row first, uint8 (sRGB where the slot is a colour) or floats (linear light).
+        metrics: name to a function of two pictures, (height, width, 3) in float64, sRGB-encoded from 0 to 1 where they
+            are display-referred and linear otherwise, the second the reference; the result grows with the error.
+    """
+
+    semantics: tuple[Semantic, ...] = ()
+    choices: Mapping[str, Mapping[str, Choice | str | Path]] = field(default_factory=dict)
+    meshes: Mapping[str, MeshLoader] = field(default_factory=dict)
+    images: Mapping[str, ImageLoader] = field(default_factory=dict)
+    metrics: Mapping[str, Metric] = field(default_factory=dict)
+
+
+_WORD = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")  # becomes part of a macro
+_ENDING = re.compile(r"\.[a-z0-9][a-z0-9_-]*\Z")
+_READ_MESHES = (".yaml", ".yml", ".obj", ".gltf", ".glb")
+READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
+"""Endings of image files that need no plugin."""
+_OWN_METRICS = ("flip", "rmse", "psnr", "ssim", "radiance_rmse")
+
+
+def extension_mistakes(extension: Extension, folder: Path) -> list[str]:
+    """What is wrong with an extension, one sentence each.
+
+    Args:
+        extension: as the plugin wrote it.
+        folder: where the files it names are.
+    """
+    if not isinstance(extension.semantics, Iterable):
+        return ["'semantics' is a tuple of Semantic"]
+    mistakes = [
+        f"'semantics' holds {value!r}, which is no Semantic"
+        for value in extension.semantics
+        if not isinstance(value, Semantic)
+    ]
+    for name in ("choices", "meshes", "images", "metrics"):
+        if not isinstance(getattr(extension, name), Mapping):
+            mistakes.append(f"'{name}' is a mapping, not {type(getattr(extension, name)).__name__}")
+    if mistakes:
+        return mistakes
+    for parameter, choices in extension.choices.items():
+        if not isinstance(choices, Mapping):
+            mistakes.append(f"choices['{parameter}'] maps a choice to its include, it is {type(choices).__name__}")
+            continue
+        for name, choice in choices.items():
+            mistakes += _wrong_choice(f"choices['{parameter}']['{name}']", str(name), choice, folder)
+    endings = (("meshes", extension.meshes, _READ_MESHES), ("images", extension.images, READ_IMAGES))
+    for kind, loaders, own in endings:
+        mistakes += _wrong_functions(kind, loaders)
+        for ending in map(str, loaders):
+            if not _ENDING.match(ending):
+                mistakes.append(f"{kind} has '{ending}'; a file's ending is a dot and small letters, as in '.stl'")
+            elif ending in own:
+                mistakes.append(f"{kind} has '{ending}', which rendergraph reads itself")
+    mistakes += _wrong_functions("metrics", extension.metrics)
+    for name in map(str, extension.metrics):
+        if not _WORD.match(name):
+            mistakes.append(f"metric '{name}' is not of small letters, digits and single '_'")
+        elif name in _OWN_METRICS:
+            mistakes.append(f"metric '{name}' is one of rendergraph's own; choose another name")
+    return mistakes
+
+
+def _wrong_choice(what: str, name: str, choice: object, folder: Path) -> Iterator[str]:
+    if not _WORD.match(name):
+        yield f"{what}: a choice is of small letters, digits and single '_'"
+    if isinstance(choice, str | Path):
+        choice = Choice(choice)
+    if not isinstance(choice, Choice) or not isinstance(choice.shader, str | Path):
+        yield f"{what} is {choice!r}, not a Choice or the name of an include"
+    elif not (folder / choice.shader).is_file():
+        yield f"{what}: there is no file '{choice.shader}' beside the extension"
+    elif isinstance(choice.needs, str) or not all(isinstance(need, str) for need in choice.needs):
+        yield f"{what}: 'needs' is a tuple of words"
+
+
+def _wrong_functions(kind: str, table: Mapping[str, object]) -> Iterator[str]:
+    for name, value in table.items():
+        if not callable(value):
+            yield f"{kind}['{name}'] is {value!r}, not a function"

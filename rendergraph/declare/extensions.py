@@ -1,0 +1,215 @@
+"""What all plugins add, looked up by name; plugins are imported when the first name is asked for."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from rendergraph.declare.extension import Choice, Extension, ImageLoader, MeshLoader, Metric
+from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.stamps import Stamp, again, looking
+from rendergraph.textures import SEMANTICS, Semantic
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Added(Generic[T]):
+    """One thing that a plugin adds.
+
+    Attributes:
+        name: what it is asked for by.
+        value: what it is.
+        plugin: whose it is: a distribution, or a folder.
+        file: the module of the extension.
+    """
+
+    name: str
+    value: T
+    plugin: str
+    file: Path
+
+    def run(self: Added[Callable[..., T]], code: str, doing: str, *arguments: Any) -> T:
+        """Call what was added; whatever it raises is an error at the author's line.
+
+        Args:
+            code: of the error.
+            doing: what could not be done, as a sentence without its end.
+            arguments: what it is called with.
+
+        Raises:
+            InputError: it raised.
+        """
+        try:
+            return self.value(*arguments)
+        except Exception as error:
+            place = raised_at(error, self.file.parent) or Place(shown_file(self.file))
+            text = f"{doing}: {type(error).__name__}: {error} (plugin '{self.plugin}')"
+            raise InputError(Problem(code, " ".join(text.split()), place)) from error
+
+
+@dataclass(frozen=True)
+class Source:
+    """One extension, or what is wrong with it.
+
+    Attributes:
+        plugin: a distribution, or a folder.
+        file: its module.
+        extension: None where it cannot be used.
+        problems: why.
+    """
+
+    plugin: str
+    file: Path
+    extension: Extension | None
+    problems: tuple[Problem, ...] = ()
+
+
+class Extensions:
+    """What all plugins add. Asking for a name imports every extension, so it is done for names nobody else knows."""
+
+    def __init__(self, find: Callable[[], Iterable[Source]] = tuple) -> None:
+        self._find = find
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Every extension there is."""
+        found, stamps = self._found
+        again(stamps)
+        return found
+
+    @cached_property
+    def _found(self) -> tuple[tuple[Source, ...], Mapping[Path, Stamp]]:
+        with looking() as stamps:
+            return tuple(self._find()), stamps
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """What is wrong with extensions: it may be why a name is unknown, so it is said beside that."""
+        return tuple(problem for source in self.sources for problem in source.problems)
+
+    # By name; two plugins that bring one name are an error for whoever asks for it ------------------------------------
+
+    def semantic(self, name: str) -> Semantic | None:
+        """A meaning by name, the framework's or a plugin's.
+
+        Raises:
+            InputError: two plugins give it different meanings.
+        """
+        own = next((known for known in SEMANTICS if known.name == name), None)
+        if own is not None:
+            return own
+        found = self._one(name, self.semantics(), "semantic")
+        return found.value if found is not None else None
+
+    def choice(self, parameter: str, name: str) -> Added[Choice] | None:
+        """A plugin's choice of a parameter.
+
+        Raises:
+            InputError: two plugins have it.
+        """
+        return self._one(name, self.choices(parameter), f"choice of '{parameter}'")
+
+    def mesh_loader(self, ending: str) -> Added[MeshLoader] | None:
+        """What reads mesh files of an ending.
+
+        Raises:
+            InputError: two plugins do.
+        """
+        return self._one(ending.lower(), self.meshes(), "mesh loader")
+
+    def image_loader(self, ending: str) -> Added[ImageLoader] | None:
+        """What decodes image files of an ending.
+
+        Raises:
+            InputError: two plugins do.
+        """
+        return self._one(ending.lower(), self.images(), "image loader")
+
+    # All of a kind, each with whose it is -----------------------------------------------------------------------------
+
+    def semantic_names(self) -> list[str]:
+        """The names of plugins' meanings."""
+        return [added.name for added in self.semantics()]
+
+    def semantics(self) -> list[Added[Semantic]]:
+        """Plugins' meanings; what several plugins declare alike is there once."""
+        found: list[Added[Semantic]] = []
+        for source, extension in self._usable():
+            for value in extension.semantics:
+                if all(value != other.value for other in found):
+                    found.append(Added(value.name, value, source.plugin, source.file))
+        return found
+
+    def choices(self, parameter: str) -> list[Added[Choice]]:
+        """Plugins' choices of a parameter, their files absolute."""
+        return [added for name, added in self.all_choices() if name == parameter]
+
+    def all_choices(self) -> list[tuple[str, Added[Choice]]]:
+        """Parameter and choice, of all parameters."""
+        return [
+            (str(parameter), Added(name, _absolute(choice, source.file.parent), source.plugin, source.file))
+            for source, extension in self._usable()
+            for parameter, choices in extension.choices.items()
+            for name, choice in choices.items()
+        ]
+
+    def meshes(self) -> list[Added[MeshLoader]]:
+        """Loaders of mesh files, by ending."""
+        return [Added(*row) for row in self._table("meshes")]
+
+    def images(self) -> list[Added[ImageLoader]]:
+        """Loaders of image files, by ending."""
+        return [Added(*row) for row in self._table("images")]
+
+    def metrics(self) -> list[Added[Metric]]:
+        """Metrics of pictures.
+
+        Raises:
+            InputError: two plugins have one of the same name.
+        """
+        found: list[Added[Metric]] = [Added(*row) for row in self._table("metrics")]
+        for metric in found:
+            self._one(metric.name, found, "metric")
+        return found
+
+    def _usable(self) -> Iterator[tuple[Source, Extension]]:
+        for source in self.sources:
+            if source.extension is not None:
+                yield source, source.extension
+
+    def _table(self, kind: str) -> Iterator[tuple[str, Any, str, Path]]:
+        for source, extension in self._usable():
+            for name, value in getattr(extension, kind).items():
+                yield name, value, source.plugin, source.file
+
+    def _one(self, name: str, known: Sequence[Added[T]], what: str) -> Added[T] | None:
+        found = [added for added in known if added.name == name]
+        if len(found) > 1:
+            plugins = " and ".join(f"'{added.plugin}' ({shown_file(added.file)})" for added in found)
+            text = f"{what} '{name}' comes from {plugins}; rename one, or uninstall one plugin"
+            raise InputError(Problem("RG496", text, Place(shown_file(found[0].file))))
+        return found[0] if found else None
+
+
+NO_EXTENSIONS = Extensions()
+"""What the framework has without plugins."""
+
+
+def _absolute(choice: Choice | str | Path, folder: Path) -> Choice:
+    plain = choice if isinstance(choice, Choice) else Choice(choice)
+    return Choice(folder / plain.shader, tuple(plain.needs))
+
+
+def raised_at(error: BaseException, folder: Path) -> Place | None:
+    """The innermost line in a folder that an exception came through, or that a syntax error is in."""
+    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).is_relative_to(folder):
+        return Place(shown_file(error.filename), error.lineno or 1, 1)
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        if Path(frame.filename).is_relative_to(folder):
+            return Place(shown_file(frame.filename), frame.lineno or 1, 1)
+    return None

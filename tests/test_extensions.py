@@ -1,0 +1,288 @@
+"""What plugins add beside node types: finding it, looking it up, and what is wrong with it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import rendergraph as rg
+from rendergraph.catalog import Catalog
+from rendergraph.errors import InputError
+from rendergraph.resources import folder
+
+HEAD = "from rendergraph.api import Choice, Extension, MeshData, Semantic\n"
+TOON = """// Three steps of light.
+#include "steps.glsl"
+Reflected reflected(Surface s, vec3 to_light) {
+    return Reflected(s.diffuse * stepped(max(dot(s.normal, to_light), 0.0)), vec3(0.0));
+}
+"""
+STEPS = "float stepped(float n_l) { return floor(n_l * 3.0) / 3.0; }\n"
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Writes a plugin's folder: the module of the extension, and files beside it."""
+
+    def make(extension: str, name: str = "sketch", **files: str) -> Path:
+        home = tmp_path / name
+        home.mkdir()
+        (home / "extension.py").write_text(HEAD + extension)
+        for stem, text in ({"toon_glsl": TOON, "steps_glsl": STEPS} | files).items():
+            (home / stem.replace("_", ".")).write_text(text)
+        return home
+
+    return make
+
+
+def found(*folders: Path) -> Catalog:
+    return Catalog.discover(folders, installed=False)
+
+
+def page(code: str) -> dict[str, Any]:
+    (path,) = folder("rendergraph.errors").glob(f"{code}-*.yaml")
+    read: dict[str, Any] = yaml.safe_load(path.read_text())
+    return read
+
+
+# --- finding -------------------------------------------------------------------------------------------------------
+
+
+def test_nothing_is_imported_before_a_name_is_asked_for(write: Write) -> None:
+    home = write("raise SystemExit")
+    catalog = found(home)
+    assert catalog.names() == []
+    rg.load("forward", plugins=[home], size=(8, 8)).check()
+    assert [problem.code for problem in catalog.extensions.problems] == ["RG494"]
+
+
+def test_an_installed_extension_comes_by_its_entry_point(write: Write, tmp_path: Path) -> None:
+    home = write('EXTENSION = Extension(semantics=(Semantic("heat", "Kelvin."),))', "hot_plugin")
+    (home / "__init__.py").touch()
+    info = tmp_path / "hot_plugin-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hot-plugin\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[rendergraph.extensions]\nx = hot_plugin.extension:EXTENSION\n")
+    program = (
+        "import sys; from rendergraph.catalog import Catalog\n"
+        "extensions = Catalog.discover().extensions\n"
+        "assert 'hot_plugin' not in sys.modules\n"
+        "print(extensions.semantic('radiance').name, 'hot_plugin' in sys.modules)\n"
+        "print(extensions.semantic('heat').doc, extensions.semantics()[0].plugin)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.split() == ["radiance", "False", "Kelvin.", "hot-plugin"], done.stderr
+
+
+# --- mistakes ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("code", ["RG494", "RG495"])
+def test_the_pages_tell_the_truth(code: str, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    home = write("")
+    monkeypatch.chdir(home)
+    (home / "stl.py").write_text("def read_stl(path): ...\n")
+    for text, said in ((page(code)["wrong"], [page(code)["message"]]), (page(code)["right"], [])):
+        (home / "extension.py").write_text(text)
+        assert [str(problem) for problem in found(home).extensions.problems] == said
+
+
+def test_a_name_of_two_plugins_is_an_error_for_who_asks(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    homes = [write('EXTENSION = Extension(choices={"shading": {"toon": "toon.glsl"}})', n) for n in ("first", "second")]
+    monkeypatch.chdir(homes[0].parent)
+    rg.load("forward", plugins=homes, size=(8, 8)).check()
+    with pytest.raises(InputError) as caught:
+        rg.load("forward", plugins=homes, size=(8, 8)).set("light.shading", "toon").check()
+    assert str(caught.value) == page("RG496")["message"]
+
+
+def test_plugins_may_share_a_meaning_but_not_disagree(write: Write) -> None:
+    same = [write('EXTENSION = Extension(semantics=(Semantic("heat", "K."),))', name) for name in ("a", "b")]
+    heat = found(*same).extensions.semantic("heat")
+    assert heat is not None
+    assert heat.doc == "K."
+    other = write('EXTENSION = Extension(semantics=(Semantic("heat", "Joule."),))', "c")
+    with pytest.raises(InputError, match=r"RG496 semantic 'heat' comes from 'a' \(.*\) and 'c' \("):
+        found(*same, other).extensions.semantic("heat")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ("EXTENSION = 3", "is int, not an Extension"),
+        ("EXTENSIONS = Extension()", "AttributeError: module .* has no attribute 'EXTENSION'"),
+        ("EXTENSION = Extension(", r"SyntaxError: '\(' was never closed"),
+        ("import nowhere_to_be_found", "ModuleNotFoundError: No module named 'nowhere_to_be_found'"),
+        ("EXTENSION = Extension(semantics=(3,))", "'semantics' holds 3, which is no Semantic"),
+        ("EXTENSION = Extension(semantics=Semantic('a', 'b'))", "'semantics' is a tuple of Semantic"),
+        ("EXTENSION = Extension(meshes=[1])", "'meshes' is a mapping, not list"),
+        ("EXTENSION = Extension(meshes={'.stl': 1})", r"meshes\['\.stl'\] is 1, not a function"),
+        ("EXTENSION = Extension(meshes={'stl': len})", "meshes has 'stl'; a file's ending is a dot and small letters"),
+        ("EXTENSION = Extension(meshes={'.obj': len})", "meshes has '.obj', which rendergraph reads itself"),
+        ("EXTENSION = Extension(images={'.png': len})", "images has '.png', which rendergraph reads itself"),
+        ("EXTENSION = Extension(metrics={'flip': len})", "metric 'flip' is one of rendergraph's own"),
+        ("EXTENSION = Extension(metrics={'l-1': len})", "metric 'l-1' is not of small letters"),
+        ("EXTENSION = Extension(choices={'shading': 'toon.glsl'})", "maps a choice to its include, it is str"),
+        ("EXTENSION = Extension(choices={'shading': {'Toon': 'toon.glsl'}})", "a choice is of small letters"),
+        ("EXTENSION = Extension(choices={'shading': {'toon': 3}})", "is 3, not a Choice or the name of an include"),
+        ("EXTENSION = Extension(choices={'shading': {'toon': Choice('toon.glsl', 'a')}})", "'needs' is a tuple of words"),
+    ],
+)
+def test_mistakes_name_the_plugin_and_its_file(write: Write, wrong: str, said: str) -> None:
+    home = write(wrong)
+    (problem,) = found(home).extensions.problems
+    assert problem.place is not None
+    assert problem.place.file == str(home / "extension.py")
+    assert "'sketch'" in problem.text
+    assert re.search(said, problem.text), problem.text
+
+
+def test_what_a_choice_needs_must_be_on_offer(write: Write) -> None:
+    home = write('EXTENSION = Extension(choices={"shading": {"toon": Choice("toon.glsl", needs=("fong",))}})')
+    with pytest.raises(InputError, match=r"RG495 choices\['shading'\]\['toon'\] .* needs 'fong', .*; did you mean 'phong'"):
+        rg.load("forward", plugins=[home], size=(8, 8)).set("light.shading", "toon").check()
+
+
+def test_a_broken_plugin_is_said_beside_the_unknown_word(write: Write) -> None:
+    home = write("1 / 0")
+    with pytest.raises(InputError) as caught:
+        rg.load("forward", plugins=[home], size=(8, 8)).set("light.shading", "toon").check()
+    assert sorted(problem.code for problem in caught.value.problems) == ["RG104", "RG494"]
+
+
+# --- choices -------------------------------------------------------------------------------------------------------
+
+CHOICES = """EXTENSION = Extension(choices={
+    "shading": {"toon": "toon.glsl", "combed": Choice("combed.glsl", needs=("phong", "grain"))},
+    "curve": {"halve": "halve.glsl"},
+})"""
+COMBED = """// Looks at everything there is.
+Reflected reflected(Surface s, vec3 to_light) {
+    return Reflected(s.diffuse * max(dot(s.normal, to_light), 0.0), s.f0 * (s.anisotropy + 0.001 * s.exponent));
+}
+"""
+HALVE = "// Half of it.\nvec3 tone_curve(vec3 color) { return 0.5 * color; }\n"
+
+
+@pytest.fixture
+def sketch(write: Write) -> Path:
+    return write(CHOICES, combed_glsl=COMBED, halve_glsl=HALVE)
+
+
+def image(gl: rg.Session, name: str, plugin: Path, **settings: str) -> Any:
+    pipeline = rg.load(name, plugins=[plugin], size=(48, 48))
+    for path, value in settings.items():
+        pipeline = pipeline.set(path.replace("__", "."), value)
+    return gl.render(pipeline)["image"].astype(int)
+
+
+@pytest.mark.parametrize("shading", ["toon", "combed"])
+def test_every_lighting_node_takes_a_plugins_model(gl: rg.Session, sketch: Path, shading: str) -> None:
+    forward = image(gl, "forward", sketch, light__shading=shading)
+    for name in ("forward-multipass", "deferred", "deferred-stencil-lights"):
+        other = image(gl, name, sketch, light__shading=shading)
+        # A step of light may fall on the other side where the G-buffer rounds.
+        assert (np.abs(forward - other).max(axis=-1) > 2).mean() < 0.005, name
+    for evaluate in ("vertex", "face"):
+        assert image(gl, "forward", sketch, light__shading=shading, light__evaluate=evaluate).max() > 100
+    assert np.abs(forward - image(gl, "forward", sketch)).max() > 10
+
+
+def test_a_g_buffer_keeps_what_a_plugins_model_needs(sketch: Path) -> None:
+    def drawn(shading: str) -> set[str]:
+        pipeline = rg.load("deferred", plugins=[sketch], size=(8, 8)).set("light.shading", shading)
+        return {write.name for step in pipeline.expansion().steps if step.node == "gbuffer" for write in step.writes}
+
+    assert "grain" not in drawn("toon")
+    assert "phong_diffuse" not in drawn("toon")
+    assert {"grain", "phong_diffuse", "phong_specular"} <= drawn("combed")
+
+
+def test_a_plugins_curve(gl: rg.Session, sketch: Path) -> None:
+    plain = image(gl, "forward", sketch, display__curve="none", display__exposure="-1")
+    halved = image(gl, "forward", sketch, display__curve="halve")
+    assert np.abs(plain - halved).max() <= 1
+    assert plain.max() > 50
+
+
+def test_other_choices_of_plugins_leave_the_program_as_it_is(sketch: Path) -> None:
+    steps = rg.load("forward", plugins=[sketch], size=(8, 8)).expansion().steps
+    assert not any("TOON" in name for step in steps for name, _ in step.defines)
+    assert not any(step.includes for step in steps)
+
+
+def test_a_mistake_in_a_plugins_glsl_has_its_file_and_line(gl: rg.Session, write: Write) -> None:
+    home = write(CHOICES, combed_glsl=COMBED, halve_glsl=HALVE, steps_glsl="\nfloat stepped(float n_l) { return n; }\n")
+    for name in ("forward", "deferred"):
+        with pytest.raises(InputError, match=r"steps\.glsl:2:\d+: RG410 .*'?n'? undeclared") as caught:
+            image(gl, name, home, light__shading="toon")
+        assert "return n;" in str(caught.value)
+
+
+def test_an_include_of_a_plugin_stays_in_its_folder(gl: rg.Session, write: Write) -> None:
+    home = write(CHOICES, combed_glsl=COMBED, halve_glsl='#include "../secret.glsl"\n')
+    (home.parent / "secret.glsl").write_text(HALVE)
+    with pytest.raises(InputError, match=r"halve\.glsl:1:1: RG406"):
+        image(gl, "forward", home, display__curve="halve")
+
+
+def test_an_unknown_choice_is_answered_with_the_plugins_too(sketch: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        rg.load("forward", plugins=[sketch], size=(8, 8)).set("light.shading", "tooon").check()
+    assert str(caught.value) == (
+        "--set light.shading=tooon: RG104 'light.shading' takes one of unlit, phong, blinn_phong, anisotropic, pbr, "
+        "toon, combed, this is 'tooon'; did you mean 'toon'?"
+    )
+
+
+# --- meanings ------------------------------------------------------------------------------------------------------
+
+HEAT = 'HEAT = Semantic("heat", "Kelvin.")\nEXTENSION = Extension(semantics=(HEAT,))\n'
+NODE = '''"""A node."""
+from rendergraph.api import Input, Node, Output
+from .extension import HEAT
+
+
+class Warm(Node):
+    """Warms."""
+
+    source = Input(HEAT, optional=True, doc="Before.")
+    warmer = Output(HEAT, doc="After.")
+'''
+CELLAR = """rendergraph: 1
+inputs: {x: {semantic: %s, optional: true}}
+nodes: {again: {type: warm, inputs: {source: inputs.x}}}
+outputs: {y: again.warmer}
+"""
+HOUSE = """rendergraph: 1
+size: [8, 8]
+nodes:
+  first: {type: warm}
+  cellar: {type: ./cellar.yaml, inputs: {x: first.warmer}}
+outputs: {image: cellar.y}
+"""
+
+
+@pytest.mark.parametrize("said", ["heat", "het"])
+def test_a_meaning_in_a_node_and_in_a_sub_pipeline(write: Write, tmp_path: Path, said: str) -> None:
+    home = write(HEAT)
+    (home / "warm.py").write_text(NODE)
+    (tmp_path / "house.yaml").write_text(HOUSE)
+    (tmp_path / "cellar.yaml").write_text(CELLAR % said)
+    pipeline = rg.load(tmp_path / "house.yaml", plugins=[home])
+    if said == "heat":
+        pipeline.check()
+        return
+    with pytest.raises(InputError, match=r"'cellar\.x' takes het, but .* carries heat; did you mean 'heat'\?"):
+        pipeline.check()
