@@ -27,7 +27,7 @@ CODES = (
 
 def pages() -> Iterator[tuple[str, str]]:
     """One page."""
-    verbs = {verb: importlib.import_module(f"rendergraph.cli.{verb}").command for verb in VERBS}
+    verbs = {verb: importlib.import_module(f"rendergraph.cli.{verb.replace('-', '_')}").command for verb in VERBS}
     rows = [(f"[`{verb}`](#{verb})", prose(command.get_short_help_str(200))) for verb, command in verbs.items()]
     yield (
         "cli.md",

@@ -19,9 +19,9 @@ from rendergraph.errors import Problem, RendergraphError, suggestion
 
 VERBS = (
     "run", "check", "plan", "graph", "config", "diff", "compare", "sweep", "bench", "nodes", "explain", "schema",
-    "doctor",
+    "new-node", "doctor",
 )  # fmt: skip
-"""In the order of `--help`; verb `x` is the function `command` in `rendergraph.cli.x`."""
+"""In the order of `--help`; verb `x-y` is the function `command` in `rendergraph.cli.x_y`."""
 
 INTERRUPTED, TERMINATED = 130, 143
 
@@ -39,7 +39,7 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
             return None
-        found: click.Command = importlib.import_module(f"rendergraph.cli.{cmd_name}").command
+        found: click.Command = importlib.import_module(f"rendergraph.cli.{cmd_name.replace('-', '_')}").command
         return found
 
     def resolve_command(

@@ -1,0 +1,197 @@
+"""`new-node`: what it writes works at once, passes every tool, and nothing is ever overwritten."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rendergraph import api
+from rendergraph.authoring import KINDS, new_node
+from rendergraph.authoring.names import class_name
+from rendergraph.catalog import Catalog
+from rendergraph.cli.app import main
+from rendergraph.errors import InputError, RenderError
+from rendergraph.resources import folder
+
+SCRIPTS = Path(sys.executable).parent
+ROOT = Path(__file__).parents[2]
+
+
+def run(line: str, where: Path) -> subprocess.CompletedProcess[str]:
+    """One command as a new user types it."""
+    environment = dict(os.environ, PATH=f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE="1")
+    done = subprocess.run(shlex.split(line), cwd=where, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+    return done
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", [False, True], ids=["in_place", "package"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_everything_works_at_once(kind: Any, package: bool, tmp_path: Path) -> None:
+    """The commands it prints, exactly; installing is left out, which needs a place to install to."""
+    made = new_node("lens_falloff", kind, package=package, where=tmp_path)
+    where = tmp_path
+    for command in made.commands:
+        if command.startswith("cd "):
+            where = where / command[3:]
+        elif command == "pytest":
+            passed = run("pytest -q -p no:cacheprovider", where)
+            assert " passed" in passed.stdout
+            assert "warning" not in passed.stdout
+        elif not command.startswith("pip "):
+            run(command, where)
+    assert (where / "lens_falloff.png").stat().st_size > 1000
+    ruff = ["--isolated", "--line-length", "120", "--target-version", "py311"]
+    run(shlex.join(["ruff", "check", *ruff, "--select", "E,F,W,I,UP,B,C4,SIM,RUF,PT,RET", "."]), where)
+    run(shlex.join(["ruff", "format", "--check", *ruff[:3], "."]), where)
+    if list(where.rglob("lens_falloff.py")):
+        (where / "mypy.ini").write_text(f"[mypy]\nstrict = true\nmypy_path = {ROOT}\n")
+        run("mypy --cache-dir ../types --config-file mypy.ini .", where)
+
+
+@pytest.mark.slow
+def test_a_package_can_be_built_and_found(tmp_path: Path) -> None:
+    if find_spec("setuptools") is None or int(version("setuptools").split(".")[0]) < 77:
+        pytest.skip("building without network needs setuptools 77 beside the tests")
+    new_node("lens_falloff", package=True, where=tmp_path)
+    site = tmp_path / "site"
+    words = f"-m pip install --quiet --no-deps --no-build-isolation --target {site} ."
+    run(f"{sys.executable} {words}", tmp_path / "lens_falloff")
+    program = (
+        "from rendergraph.catalog import Catalog; found = Catalog.discover().get('lens_falloff'); "
+        "print(found.plugin, found.cls.__module__, (found.shaders / 'lens_falloff.frag').is_file())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=dict(os.environ, PYTHONPATH=str(site)), cwd=tmp_path,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.split() == ["lens_falloff", "rendergraph_lens_falloff.nodes.lens_falloff", "True"], done.stderr
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_files_begin_as_editors_and_readers_want_them(kind: Any, tmp_path: Path) -> None:
+    made = new_node("lens_falloff", kind, where=tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in made.files}
+    for path in made.files:
+        text = (tmp_path / path).read_text(encoding="utf-8")
+        assert not re.search(r"@\w+@", text), path
+        assert text.endswith("\n"), path
+    first = (tmp_path / "lens_falloff.yaml").read_text(encoding="utf-8").splitlines()[0]
+    assert first == "# yaml-language-server: $schema=./rendergraph.schema.json"
+    schema = json.loads((tmp_path / "rendergraph.schema.json").read_text(encoding="utf-8"))
+    assert ("lens_falloff" in json.dumps(schema)) == (kind != "shader-only")  # a shader by path needs no entry
+
+
+@pytest.mark.parametrize("kind", ["fullscreen", "shader-only"])
+def test_a_full_screen_effect_is_at_most_25_lines(kind: Any, tmp_path: Path) -> None:
+    new_node("lens_falloff", kind, where=tmp_path)
+    texts = [path.read_text() for path in tmp_path.glob("lens_falloff.*") if path.suffix in (".py", ".frag")]
+    assert sum(bool(line.strip()) for text in texts for line in text.splitlines()) <= 25
+
+
+def test_a_second_node_beside_the_first_leaves_the_schema_and_says_how_to_refresh_it(tmp_path: Path) -> None:
+    new_node("one", where=tmp_path)
+    before = (tmp_path / "rendergraph.schema.json").stat().st_mtime_ns
+    made = new_node("two", "geometry", where=tmp_path)
+    assert (tmp_path / "rendergraph.schema.json").stat().st_mtime_ns == before
+    assert "rendergraph schema --plugin . -o rendergraph.schema.json" in made.commands
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("Lens-Falloff", r"RG530 .* such as 'lens_falloff'"), ("3d", r"such as 'd'"), ("", r"a name is up to 40"),
+        ("x" * 41, r"a name is up to 40"), ("a__b", r"such as 'a_b'"), ("gl_thing", r"reserved by GLSL"),
+        ("filter", r"reserved by GLSL or Python; choose another, such as 'my_filter'"), ("lambda", r"reserved"),
+        ("tonemap", r"there is a node type of that name; choose another, such as 'my_tonemap'"),
+        ("random", r"a Python module has that name"), ("numpy", r"a Python module has that name"),
+        ("test_it", r"pytest would take the module for a test; .* 'it_node'"), ("../up", r"such as 'up'"),
+    ],
+)  # fmt: skip
+def test_names_that_cannot_be(name: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        new_node(name, where=tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_that_would_hide_something_get_another_class_or_id(tmp_path: Path) -> None:
+    assert class_name("lens_falloff") == "LensFalloff"
+    assert class_name("radiance") == "RadianceNode"
+    assert {class_name(name.lower()) for name in api.__all__} & set(api.__all__) == set()
+    new_node("light", where=tmp_path)
+    assert "my_light: {type: light," in (tmp_path / "light.yaml").read_text()
+    new_node("node", where=tmp_path)
+    assert Catalog.discover([tmp_path / "node.py"]).get("node").cls.__name__ == "NodeNode"
+
+
+@pytest.mark.parametrize("standing", ["lens_falloff.frag", "test_lens_falloff.py"])
+def test_nothing_is_written_where_one_file_exists(standing: str, tmp_path: Path) -> None:
+    (tmp_path / standing).symlink_to("nowhere")  # a broken link counts
+    with pytest.raises(InputError, match=rf"{standing}: RG531 .* exists already and is left as it is"):
+        new_node("lens_falloff", where=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [standing]
+    (tmp_path / "pack").mkdir()
+    with pytest.raises(InputError, match="RG531 'pack' exists already"):
+        new_node("pack", package=True, where=tmp_path)
+
+
+@pytest.mark.parametrize("package", [False, True])
+def test_a_full_disk_leaves_nothing_behind(package: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real, calls = Path.open, []
+
+    def full(self: Path, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+        if mode == "x":
+            calls.append(self)
+            if len(calls) == 4:
+                raise OSError(errno.ENOSPC, "No space left on device", str(self))
+        return real(self, mode, *arguments, **options)
+
+    monkeypatch.setattr(Path, "open", full)
+    with pytest.raises(RenderError, match="No space left on device"):
+        new_node("lens_falloff", package=package, where=tmp_path)
+    assert len(calls) == 4
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_appears_meanwhile_is_not_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(files: Any, kind: Any) -> str:
+        (tmp_path / "test_lens_falloff.py").write_text("mine")
+        return "{}\n"
+
+    monkeypatch.setattr("rendergraph.authoring.new._schema", late)
+    with pytest.raises(InputError, match=r"RG531 'test_lens_falloff.py' exists already"):
+        new_node("lens_falloff", where=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["test_lens_falloff.py"]
+    assert (tmp_path / "test_lens_falloff.py").read_text() == "mine"
+
+
+def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new-node", "edges", "--kind", "geometry"]) == 0
+    out, err = capsys.readouterr()
+    assert set(out.split()) == {path.name for path in tmp_path.iterdir()}
+    assert err.splitlines()[:2] == ["next:", "  rendergraph run edges.yaml --plugin edges.py"]
+    assert main(["new-node", "edges"]) == 3
+    assert main(["new-node", "more", "--package", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["commands"][:2] == ["cd more", "rendergraph run pipelines/more.yaml --plugin ."]
+    assert all((tmp_path / path).is_file() for path in document["files"])
+    assert main(["new-node", "more", "--kind", "cubist"]) == 2
+
+
+def test_templates_are_shipped_as_data() -> None:
+    found = {path.relative_to(folder("rendergraph")) for path in folder("rendergraph").rglob("*.in")}
+    assert {path.parts[:2] for path in found} == {("authoring", "templates")}
+    assert len(found) >= 4 * 3
