@@ -1,0 +1,174 @@
+"""A pipeline that shows a node type at work: for `explain` and the reference, complete and ready to run.
+
+A type that shipped pipelines use is shown by the shortest of those files. For any other a patch on a shipped pipeline
+is put together: every input it must have gets a port that fits, and its first output goes to a node that can take it.
+Whatever is put together is linked, so that what is shown is legal.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
+
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.declare import Function, InOut, Input, LightFacts, Port
+from rendergraph.document import parse
+from rendergraph.errors import InputError
+from rendergraph.link import link
+from rendergraph.link.check import kind_of
+from rendergraph.link.graph import Endpoint, Graph, GraphNode
+from rendergraph.resolve import resolve
+from rendergraph.resources import shipped_pipelines
+
+_LIGHTS = (LightFacts("sun", "directional"),)
+
+Links = dict[str, str]
+"""Input or group to what is connected, as a file says it."""
+
+
+def example(found: NodeType, catalog: Catalog) -> str | None:
+    """A whole pipeline file with a node of this type; None where no shipped pipeline has what it needs.
+
+    Args:
+        found: the type.
+        catalog: where the type and the shipped pipelines' types are found.
+    """
+    uses = re.compile(rf"\btype: {re.escape(found.name)}\b")
+    texts = [file.read_text(encoding="utf-8") for file in shipped_pipelines().values()]
+    if shown := [text for text in texts if uses.search(text)]:
+        return min(shown, key=len)
+    for base in _bases():
+        for text in _patches(found, base):
+            if _links_up(text, catalog):
+                return text
+    return None
+
+
+@cache
+def _bases() -> tuple[Graph, ...]:
+    """The shipped pipelines, the smallest first; of equal ones those that others extend."""
+    catalog = Catalog.discover()
+    graphs = [link(resolve(name, catalog=catalog), catalog, _LIGHTS) for name in shipped_pipelines()]
+    texts = "\n".join(file.read_text(encoding="utf-8") for file in shipped_pipelines().values())
+    heirs = {graph.name: len(re.findall(rf"^extends: {graph.name}$", texts, re.MULTILINE)) for graph in graphs}
+    return tuple(sorted(graphs, key=lambda graph: (len(graph.nodes), -heirs[graph.name])))
+
+
+def _links_up(text: str, catalog: Catalog) -> bool:
+    try:
+        link(resolve(parse(text, "example.yaml"), catalog=catalog), catalog, _LIGHTS)
+    except InputError:
+        return False
+    return True
+
+
+# --- putting one together --------------------------------------------------------------------------------------------
+
+
+def _patches(found: NodeType, base: Graph) -> Iterator[str]:
+    """Files to try, the best first: with what the outputs need, somebody reading one; with less; read by nobody."""
+    needed = {name for port in found.cls.outputs().values() for name in getattr(port, "needs", ())}
+    tried = []
+    for wanted in (needed, set[str]()):
+        links = _links(found, base, wanted)
+        if links is not None and links not in tried:
+            tried.append(links)
+            for reader in _readers(found, base, links):
+                yield _text(found, base, links, reader)
+    for links in tried:
+        yield _text(found, base, links, None)
+
+
+def _links(found: NodeType, base: Graph, wanted: set[str]) -> Links | None:
+    """What the inputs it must have are connected to, and those that are wanted where something fits."""
+    links: Links = {}
+    groups = found.cls.groups()
+    for name, port in found.cls.inputs().items():
+        group = next((group for group, members in groups.items() if name in members), None)
+        if port.optional and name not in wanted:
+            continue
+        if group is not None:
+            end = _node_with(base, groups[group])
+            links |= {group: end} if end else {}
+        else:
+            end = _end_for(base, name, port)
+            links |= {name: end} if end else {}
+        if end is None and not port.optional:
+            return None
+    return links
+
+
+def _node_with(base: Graph, members: tuple[str, ...]) -> str | None:
+    return next((node.id for node in base.nodes if set(members) <= node.type.cls.outputs().keys()), None)
+
+
+def _end_for(base: Graph, name: str, port: Input | InOut) -> str | None:
+    """The port of the base that fits an input best: of its name, else what is shown, else the last."""
+    kind, meaning = getattr(port, "kind", "texture2d"), _meaning(port)
+    shown = base.outputs.get("radiance")
+    ends = [end for end, given, means in _ends(base) if given == kind and meaning in ("any", means)]
+    ends.sort(key=lambda end: (end.port != name, end != shown))
+    return str(ends[0]) if ends else None
+
+
+def _ends(base: Graph) -> Iterator[tuple[Endpoint, str, str]]:
+    """Every output of a graph, its kind and what it means."""
+    for node in base.nodes:
+        for name, port in node.type.cls.outputs().items():
+            end = Endpoint(node.id, name)
+            if isinstance(port, Function):
+                yield end, "function", port.signature.name
+            elif (info := base.textures.get(end)) is not None:
+                yield end, kind_of(port, info), info.semantic.name
+
+
+def _meaning(port: Port) -> str:
+    if isinstance(port, Function):
+        return port.signature.name
+    semantic: Any = getattr(port, "semantic", None)
+    return semantic.name if semantic else ""
+
+
+def _readers(found: NodeType, base: Graph, links: Links) -> Iterator[tuple[str, str, str]]:
+    """Node, input and our output that it could read: first who reads what we change, then who reads nothing yet."""
+    taken = set(links.values())
+    ranked = []
+    for rank, (name, port) in enumerate(found.cls.outputs().items()):
+        like = getattr(port, "like", None)
+        meaning = _meaning(found.cls.inputs()[like]) if like and not _meaning(port) else _meaning(port)
+        for node in base.nodes:
+            for theirs, other in node.type.cls.inputs().items():
+                now = {str(end) for end in node.inputs.get(theirs, ())}
+                instead = bool(now & taken)
+                if (instead if meaning == "any" else _meaning(other) == meaning) and _has_effect(base, node, theirs):
+                    ranked.append(((not instead, bool(now), rank), (node.id, theirs, name)))
+    return (reader for _, reader in sorted(ranked, key=lambda entry: entry[0]))
+
+
+def _has_effect(base: Graph, node: GraphNode, name: str) -> bool:
+    """Whether somebody uses what the node makes of an input: some are needed by one of the outputs only."""
+    wanted = {data["source_port"] for _, _, data in base.dag.out_edges(node.id, data=True)}
+    wanted |= {end.port for end in base.outputs.values() if end.node == node.id}
+    needy = {out for out, port in node.type.cls.outputs().items() if name in getattr(port, "needs", ())}
+    return not needy or bool(needy & wanted)
+
+
+def _text(found: NodeType, base: Graph, links: Links, reader: tuple[str, str, str] | None) -> str:
+    id_ = found.name if all(node.id != found.name for node in base.nodes) else "example"
+    inputs = f", inputs: {_flow(links)}" if links else ""
+    lines = [f"extends: {base.name}", "nodes:", f"  {id_}: {{type: {found.name}{inputs}}}"]
+    if reader is not None:
+        node, port, out = reader
+        return "\n".join([*lines, f"  {node}: {{inputs: {_flow({port: f'{id_}.{out}'})}}}"]) + "\n"
+    outputs = {name: f"{id_}.{name}" for name, port in found.cls.outputs().items() if _shows(port)}
+    return "\n".join([*lines, f"outputs: {_flow(outputs)}"]) + "\n"
+
+
+def _shows(port: Port) -> bool:
+    return not isinstance(port, Function) and str(getattr(port, "kind", "")).startswith("texture")
+
+
+def _flow(table: Mapping[str, str]) -> str:
+    return "{" + ", ".join(f"{key}: {value}" for key, value in table.items()) + "}"

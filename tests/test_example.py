@@ -1,0 +1,118 @@
+"""Every node type has a pipeline that shows it at work; it runs as it stands, and the node takes part in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rendergraph as rg
+from rendergraph.api import Depth, InOut, Input, Luminance, Node, Occlusion, Output, Radiance
+from rendergraph.catalog import Catalog
+from rendergraph.example import example
+
+TYPES = Catalog.discover().names()
+
+
+def shown(name: str, catalog: Catalog) -> str:
+    text = example(catalog.get(name), catalog)
+    assert text is not None, name
+    return text
+
+
+@pytest.mark.parametrize("name", TYPES)
+def test_an_example_runs_and_uses_the_node(gl: Any, tmp_path: Path, name: str) -> None:
+    file = tmp_path / "example.yaml"
+    file.write_text(shown(name, Catalog.discover()), encoding="utf-8")
+    pipeline = rg.load(file, size=(48, 27))
+    frame = gl.render(pipeline, warm_up=False)
+    assert [node.id for node in pipeline.graph.nodes if node.type.name == name and node.id not in frame.culled]
+
+
+# --- types that no shipped pipeline uses -----------------------------------------------------------------------------
+
+
+class Fog(Node):
+    """An effect on the picture."""
+
+    depth = Input(Depth, doc="How far.")
+    radiance = Input(Radiance, doc="Clear.")
+    foggy = Output(like="radiance", doc="Foggy.")
+
+
+class Edges(Node):
+    """Nothing reads what it makes."""
+
+    depth = Input(Depth, doc="How far.")
+    edges = Output(Luminance, format="r8", doc="Edges.")
+
+
+class Outlined(Node):
+    """Needs what no standard node makes."""
+
+    edges = Input(Luminance, kind="texture_cube", doc="Edges.")
+    color = Output(Radiance, doc="Outlined.")
+
+
+class Gap(Node):
+    """How open it is, without inputs."""
+
+    occlusion = Output(Occlusion, format="r8", doc="Openness.")
+
+
+class Veil(Node):
+    """An effect with a choice of inputs."""
+
+    veil = Input(Radiance, optional=True, doc="What lies over it.")
+    radiance = InOut(Radiance, doc="What it goes on.")
+
+
+CATALOG = Catalog.discover()
+
+
+@pytest.mark.parametrize(
+    ("cls", "text"),
+    [
+        (
+            Fog,
+            """\
+extends: forward
+nodes:
+  fog: {type: fog, inputs: {depth: light.surface_depth, radiance: light.radiance}}
+  display: {inputs: {radiance: fog.foggy}}
+""",
+        ),
+        (
+            Edges,
+            """\
+extends: forward
+nodes:
+  edges: {type: edges, inputs: {depth: light.surface_depth}}
+outputs: {edges: edges.edges}
+""",
+        ),
+        (
+            Gap,
+            """\
+extends: forward
+nodes:
+  gap: {type: gap}
+  light: {inputs: {occlusion: gap.occlusion}}
+""",
+        ),
+        (
+            Veil,
+            """\
+extends: forward
+nodes:
+  veil: {type: veil, inputs: {radiance: light.radiance}}
+  display: {inputs: {radiance: veil.radiance}}
+""",
+        ),
+        (Outlined, None),
+    ],
+)
+def test_a_patch_is_put_together(cls: type[Node], text: str | None) -> None:
+    catalog = Catalog.of(cls, **{name: CATALOG.get(name).cls for name in TYPES})
+    assert example(catalog.get(cls.__name__.lower()), catalog) == text
