@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from rendergraph.compile import Executable
 from rendergraph.declare import Node, Port, Views
-from rendergraph.errors import Problem, RenderError
+from rendergraph.declare.blame import what_happened
+from rendergraph.errors import Misuse, Problem, RenderError
 from rendergraph.expand import CAMERA
 from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
@@ -21,6 +22,8 @@ from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import bounds
 from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
 from rendergraph.steps import ViewMatrices
+from rendergraph.steps.checks import buffer as buffer_of
+from rendergraph.steps.checks import own_port
 from rendergraph.textures import BufferDesc, TextureDesc
 
 
@@ -89,22 +92,27 @@ class FrameContext:
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
-        return bool(self.node.inputs.get(port.name))
+        return bool(self.node.inputs.get(own_port(self.node.node, port, "connected's argument").name))
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
+        if not isinstance(own_port(self.node.node, port, "set_views"), Views):
+            raise Misuse(f"set_views is given '{port.name}', which is no Views port", "RG433")
+        for view in views:
+            if not isinstance(view, ViewMatrices):
+                raise Misuse(f"set_views is given {type(view).__name__}, not ViewMatrices", "RG433")
         self.executable.views.set(f"{self.node.id}.{port.name}", views)
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload into a declared buffer."""
+        buffer_of(own_port(self.node.node, port, "write"), "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline
         data = np.ascontiguousarray(values).tobytes()
         buffer = self.executable.memory.buffer(name)
         if len(data) > buffer.size:
-            text = f"node '{self.node.id}' writes {len(data)} bytes into '{port.name}', which holds {buffer.size}"
-            raise RenderError(Problem("RG432", text))
+            raise Misuse(f"it writes {len(data)} bytes into '{port.name}', which holds {buffer.size}", "RG432")
         buffer.write(data)
 
 
@@ -122,10 +130,13 @@ class Runner:
     _updating: list[GraphNode] = field(default_factory=list)
     _scene: FrameScene | None = None
     _parity: int = 0
+    _active: set[str] = field(default_factory=set)
+    _complete: bool = False
 
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
         active |= {f.node for step in self.executable.plan.schedule.steps for f in step.functions}
+        self._active = active
         self._updating = [
             node for node in self.graph.nodes if node.id in active and type(node.node).update is not Node.update
         ]
@@ -167,6 +178,8 @@ class Runner:
             self._scene, moved = FrameScene(scene), True
         for node in self._updating:
             self._update(node, index, time, camera, self._scene)
+        if not self._complete:
+            self._check_views()
         if views.changed or moved:
             for sort in executable.sorters:
                 sort(views)
@@ -210,9 +223,20 @@ class Runner:
             node.node.update(frame)
         except RenderError:
             raise
-        except Exception as error:
-            text = f"node '{node.id}' ({node.type.name}) failed in update: {type(error).__name__}: {error}"
-            raise RenderError(Problem("RG433", text, node.place)) from error
+        except (Exception, SystemExit) as error:  # a stranger's code
+            code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
+            text = f"node '{node.id}' ({node.type.name}) failed in update: {what_happened(error, type(node.node))}"
+            raise RenderError(Problem(code, text, node.place)) from error
+
+    def _check_views(self) -> None:
+        """Every table of a node that runs has been filled by its `update`."""
+        for name, table in self.executable.views.tables.items():
+            maker = name.rpartition(".")[0]
+            if table.count and maker in self._active and name not in self.executable.views.current:
+                node = self.graph[maker]
+                text = f"node '{maker}' ({node.type.name}) never sets the views of '{name}'; do so in `update`"
+                raise RenderError(Problem("RG433", text, node.place))
+        self._complete = True
 
     def check(self) -> None:
         """Raise what the driver has complained about since the last check.

@@ -150,7 +150,7 @@ class Memory:
             made.release()
             every = " with ".join(str(target) for target in (*colors, depth) if target is not None)
             text = (f"the driver does not draw to {every} ({_STATUS.get(status, hex(status))}); "
-                    "targets of one step are all layered or none, of one number of samples")  # fmt: skip
+                    "a float format of the same channels may do")  # fmt: skip
             raise RenderError(Problem("RG617", text))
         made.viewport = (0, 0, *size)
         if colors:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
+from rendergraph.errors import Misuse
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl.device import Device
 from rendergraph.scene.pack import VIEW, pack_view
@@ -54,7 +55,7 @@ class ViewBuffers:
         packed = b"".join(pack_view(view) for view in now)
         expected = max(1, self.tables[table].count)
         if len(now) != expected:
-            raise ValueError(f"'{table}' has {expected} views, but update set {len(now)}")
+            raise Misuse(f"'{table}' has {expected} views, but update set {len(now)}", "RG433")
         self.current[table] = now
         if self._packed.get(table) == packed:
             return

@@ -64,11 +64,19 @@ class Node(BaseModel):
         return value
 
     shader: ClassVar[str | None] = None
-    """Fragment shader of the default `record`; the type's name with `.frag` where None."""
+    """Shader of the default `record`: a fragment shader, or a compute shader, which ends in `.comp`; the type's name
+    with `.frag` where None."""
 
     def record(self, steps: Steps) -> None:
-        """Append the steps of this pass; called before the schedule and without GL. One full-screen step by default."""
-        steps.fullscreen(self.shader or f"{steps.type_name}.frag")
+        """Append the steps of this pass; called before the schedule and without GL.
+
+        By default one full-screen step, or one dispatch over the first texture that is written or else read.
+        """
+        shader = self.shader or f"{steps.type_name}.frag"
+        if shader.endswith(".comp"):
+            steps.compute(shader)
+        else:
+            steps.fullscreen(shader)
 
     def update(self, frame: Frame) -> None:
         """Compute what changes each frame on the CPU: views, buffers. Called once a frame, before any step runs."""

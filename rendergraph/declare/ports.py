@@ -25,9 +25,11 @@ class Port:
     """One named connection point or texture of a node; its name is the class attribute's."""
 
     name: str = field(init=False, default="")
+    owner: str = field(init=False, default="", repr=False)
 
     def __set_name__(self, owner: type, name: str) -> None:
         object.__setattr__(self, "name", name)
+        object.__setattr__(self, "owner", owner.__name__)
 
     def mip(self, level: int) -> Part:
         """One level of the mip chain as an ordinary 2D texture."""

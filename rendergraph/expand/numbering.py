@@ -11,7 +11,9 @@ from rendergraph.declare import Choice, Function, History, InOut, Input, Interna
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import Recorder, author_line, author_problem, now
+from rendergraph.expand.recording import Recorder, now
+from rendergraph.expand.rules import cleared_to, filter_of, view_table
+from rendergraph.expand.targets import feedback, misfit, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -44,14 +46,7 @@ class Numbering:
     def expansion(self) -> Expansion:
         """Number everything that was recorded."""
         for recorder in self.recorders.values():
-            try:
-                self._node(recorder)
-            except InputError:
-                raise
-            except Exception as error:  # rules of ports (`clear`, `filter`, `count`) are the author's functions
-                if not author_line(recorder.node, error):
-                    raise
-                raise InputError(author_problem(recorder.node, error)) from error
+            self._node(recorder)
         wanted = self._wanted()
         self._mark_roles(wanted)
         return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
@@ -76,9 +71,7 @@ class Numbering:
         for port in node.node.ports().values():
             end = Endpoint(node.id, port.name)
             if isinstance(port, Views):
-                count = port.count(node.node, recorder.facts) if callable(port.count) else port.count
-                lights = port.lights(node.node, recorder.facts) if port.lights else ()
-                self.views[str(end)] = ViewTable(count, lights)
+                self.views[str(end)] = view_table(node, port, recorder.facts)
             if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recorder.links.get(port.name):
@@ -136,11 +129,10 @@ class Numbering:
             read, write = self._write(recorder, request, name, part, options.get("value"))
             reads += read
             writes.append(write)
-        for write in writes:
-            self._check_feedback(recorder, request, write, [*reads, *(read for f in functions for read in f.reads)])
+        self._check_targets(recorder, request, writes, [*reads, *(read for f in functions for read in f.reads)])
         view, view_index = self._view(recorder, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
-        size, samples = self._target_size(writes, reads)
+        size, samples = target_size(self.resources, writes, reads)
         attributes = options.pop("attributes", {})
         vertices = options.get("vertices", 3)
         if isinstance(vertices, Port):
@@ -148,7 +140,7 @@ class Numbering:
             vertices = reads[-1].resource
         for port in attributes.values():
             reads += self._reads(recorder, port.name, Part(port))
-        keep = ("state", "objects", "materials", "order", "per_light", "topology", "instances", "groups")
+        keep = ("state", "objects", "materials", "order", "per_light", "topology", "instances", "groups", "invocations")
         return Step(
             node=node.id,
             index=index,
@@ -167,6 +159,9 @@ class Numbering:
             vertices=vertices,
             attributes=tuple((layout, self._own(recorder, port)) for layout, port in attributes.items()),
             label=f"{node.id}" + (f" {index}" if len(recorder.requests) > 1 else ""),
+            type=node.type.name,
+            place=node.place,
+            caller=request.caller,
             **{key: options[key] for key in keep if key in options},
         )
 
@@ -177,10 +172,7 @@ class Numbering:
         port = part.port
         if isinstance(port, Input):
             ends = recorder.links.get(port.name, ())
-            sampler = part.sampler or Sampler(
-                port.filter(recorder.node.node) if callable(port.filter) else port.filter,
-                port.wrap, port.compare, port.anisotropy,
-            )  # fmt: skip
+            sampler = part.sampler or Sampler(filter_of(recorder.node, port), port.wrap, port.compare, port.anisotropy)
             return [
                 self._read(f"{name}_{number}" if port.many else name, end, part, sampler, port.use)
                 for number, end in enumerate(ends)
@@ -214,23 +206,19 @@ class Numbering:
         self, recorder: Recorder, request: Request, name: str, part: Part, value: Any
     ) -> tuple[list[Read], Write]:
         port = part.port
-        if not isinstance(port, Made):
-            text = (f"node '{recorder.node.id}' writes its {type(port).__name__.lower()} '{port.name}'; "
-                    "only outputs, internals and history can be")  # fmt: skip
-            raise InputError(Problem("RG421", text, recorder.node.place))
+        assert isinstance(port, Made)  # `steps` has seen to that
         end = Endpoint(recorder.node.id, port.name)
         if end not in self.at_end:
-            text = f"node '{recorder.node.id}' writes '{port.name}', which has no layers"
-            raise InputError(Problem("RG421", text, recorder.node.place))
+            raise self._refused(recorder, request, "RG421", f"it writes '{port.name}', which has no layers")
         resource, _ = self.at_end[end]
         desc = self.resources[resource].desc
         old = self.version[resource]
         self.version[resource] = old + 1
         continued = isinstance(port, InOut) and bool(recorder.links.get(port.name))
-        parts, touched = self.written[resource], _parts_written(request, part, desc)
-        fresh = not continued and not any(_overlap(one, other) for one in parts for other in touched)
+        parts, touched = self.written[resource], parts_written(request, part, desc)
+        fresh = not continued and not any(overlap(one, other) for one in parts for other in touched)
         parts |= touched
-        clear = port.clear(recorder.node.node) if callable(port.clear) else port.clear
+        clear = cleared_to(recorder.node, port)
         if request.kind == "clear":
             load, clear = "clear", value
         elif not fresh:
@@ -256,19 +244,29 @@ class Numbering:
         write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
 
-    def _check_feedback(self, recorder: Recorder, request: Request, write: Write, reads: Iterable[Read]) -> None:
-        """What a step samples it must not write: drivers give old texels, new ones, or some of each."""
-        state = request.options.get("state")
-        if write.use == "depth" and state is not None and state.depth_write is False:
-            return
-        for read in reads:
-            if read.resource != write.resource or read.previous or read.use != "sample":
-                continue
-            if read.mip not in (None, write.mip or 0) or not _overlap((0, read.layer), (0, write.layer)):
-                continue
-            text = (f"node '{recorder.node.id}' samples '{read.resource}' in the step that writes it; "
-                    "blend, sample another mip or layer, or go through an `Internal`")  # fmt: skip
-            raise InputError(Problem("RG422", text, recorder.node.place))
+    def _check_targets(self, recorder: Recorder, request: Request, writes: list[Write], reads: list[Read]) -> None:
+        """Refuse what no driver draws, while the author's call is known."""
+        for write in writes:
+            text = feedback(request, write, reads)
+            if text is not None:
+                raise self._refused(recorder, request, "RG422", text)
+        text = misfit(self.resources, writes, reads)
+        if text is not None:
+            raise self._refused(recorder, request, "RG425", text)
+        for write in writes:
+            desc = self.resources[write.resource].desc
+            if write.use == "image" and isinstance(desc, TextureDesc):
+                format_of = FORMATS[desc.format]
+                if format_of.is_depth or format_of.srgb or desc.samples > 1:
+                    what = f"{desc.samples} samples a texel" if desc.samples > 1 else f"the format {desc.format}"
+                    text = f"a compute step cannot write '{write.resource}', which has {what}"
+                    raise self._refused(recorder, request, "RG426", text)
+
+    def _refused(self, recorder: Recorder, request: Request, code: str, text: str) -> InputError:
+        """A request that cannot be carried out, at the line where the author made it."""
+        node = recorder.node
+        step = Step(node.id, 0, request.kind, type=node.type.name, place=node.place, caller=request.caller)
+        return InputError(step.problem(code, text))
 
     def _view(self, recorder: Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
         port = options.pop("view", None)
@@ -276,7 +274,12 @@ class Numbering:
         if request.kind not in ("geometry", "draw"):
             return None, None
         if isinstance(port, Views):
-            return str(Endpoint(recorder.node.id, port.name)), index
+            table = str(Endpoint(recorder.node.id, port.name))
+            count = self.views[table].count
+            if index is not None and index >= max(1, count):
+                text = f"view_index is {index}, but '{port.name}' has {count} views, counted from 0"
+                raise self._refused(recorder, request, "RG423", text)
+            return table, index
         name = port.name if isinstance(port, Input) else "view"
         ends = recorder.links.get(name, ())
         return (str(ends[0]) if ends else CAMERA), index
@@ -286,14 +289,6 @@ class Numbering:
             resource = self.resources[write.resource]
             if view is not None and resource.view is None:
                 self.resources[write.resource] = replace(resource, view=view)
-
-    def _target_size(self, writes: Iterable[Write], reads: Iterable[Read]) -> tuple[tuple[int, int], int]:
-        targets: list[Read | Write] = [*writes, *(read for read in reads if read.use == "depth_test")]
-        for touched in targets:
-            desc = self.resources[touched.resource].desc
-            if isinstance(desc, TextureDesc):
-                return desc.mip_size(touched.mip or 0), desc.samples
-        return (1, 1), 1
 
     def _defines(
         self, recorder: Recorder, reads: list[Read], functions: list[FunctionBinding]
@@ -390,17 +385,3 @@ def _passed(graph: Graph, recorders: Mapping[str, Recorder]) -> Iterator[tuple[E
         for name, port in node.node.ports().items() if node.id not in recorders else ():
             if isinstance(port, InOut) and node.inputs.get(name):
                 yield Endpoint(node.id, name), now(node.inputs[name][0])
-
-
-def _parts_written(request: Request, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
-    """Mips and layers a request leaves something in: a clear means the whole texture, a mip chain all but mip 0."""
-    mips = desc.mips if isinstance(desc, TextureDesc) else 1
-    if request.kind == "mipmaps":
-        return {(mip, None) for mip in range(1, mips)}
-    if request.kind == "clear" and part.mip is None:
-        return {(mip, part.layer) for mip in range(mips)}
-    return {(part.mip or 0, part.layer)}
-
-
-def _overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
-    return one[0] == other[0] and (one[1] == other[1] or None in (one[1], other[1]))

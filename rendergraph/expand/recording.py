@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Part, Port
-from rendergraph.errors import InputError, Problem
+from rendergraph.declare.blame import author_line, what_happened
+from rendergraph.errors import InputError, Misuse, Problem, shown_file
 from rendergraph.expand.model import is_empty
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.steps import Request, Steps
@@ -112,11 +113,35 @@ def record_all(
     Returns:
         Recorders by node id in the same order, and idle nodes with their reasons.
     """
+    remembering = _remembering(graph, wanted)
+    while True:
+        recorders, idle = _recorded(graph, order, wanted, remembering)
+        if not remembering & idle.keys():
+            return recorders, idle
+        remembering -= idle.keys()  # whoever does nothing does not read last frame's values either
+
+
+def _remembering(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
+    """Nodes that read last frame's values and that something wanted can be reached from."""
+    reached: set[str] = set()
+    stack = [end.node for end in wanted.values()]
+    while stack:
+        name = stack.pop()
+        if name not in reached:
+            reached.add(name)
+            stack += [end.node for ends in graph[name].inputs.values() for end in ends]
+    return {name for name in reached if any(end.previous for ends in graph[name].inputs.values() for end in ends)}
+
+
+def _recorded(
+    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint], remembering: set[str]
+) -> tuple[dict[str, Recorder], dict[str, str]]:
+    """The same where it is known who reads last frame's values; those may come earlier in the order than the makers."""
     demanded: dict[str, set[str]] = {name: set() for name in order}
     for end in wanted.values():
         demanded[end.node].add(end.port)
-    for node in graph.nodes:  # last frame's readers may come earlier in the order, so all of them count
-        for ends in node.inputs.values():
+    for name in remembering:
+        for ends in graph[name].inputs.values():
             for end in ends:
                 if end.previous:
                     demanded[end.node].add(end.port)
@@ -138,10 +163,10 @@ def record_all(
         recorder = Recorder(graph, node, used)
         steps = Steps(node.node, name, node.type.name, recorder)
         try:
-            node.node.record(steps)
+            _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # a stranger's may
         except InputError:
             raise
-        except Exception as error:  # whatever a stranger's node raises is a mistake in that node
+        except (Exception, SystemExit) as error:  # whatever a stranger's node raises is a mistake in that node
             raise InputError(author_problem(node, error)) from error
         recorders[name] = recorder
         for end in recorder.demands():
@@ -162,19 +187,24 @@ def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
     return None
 
 
-def author_line(node: GraphNode, error: Exception) -> str:
-    """The line of the node's own module that an error came through, as `file:line: `; empty where there is none."""
-    import traceback
+def _returns_nothing(value: object) -> None:
+    """A `record` with `yield` or `async` in it has not run at all."""
+    if value is not None:
+        close = getattr(value, "close", None)
+        if callable(close):
+            close()
+        raise Misuse(f"`record` gives back a {type(value).__name__}; it calls steps.… and returns nothing")
 
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(node.type.file)]
-    return f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
 
-
-def author_problem(node: GraphNode, error: Exception) -> Problem:
-    """What a node's own code raised, with the author's line."""
-    where = author_line(node, error)
-    text = f"node '{node.id}' ({node.type.name}) failed while recording: {where}{type(error).__name__}: {error}"
-    return Problem("RG420", text, node.place)
+def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", doing: str = "recording") -> Problem:
+    """What a node's own code raised or asked for wrongly, with the author's line."""
+    who = f"node '{node.id}' ({node.type.name})"
+    happened = what_happened(error, type(node.node))
+    if not isinstance(error, Misuse):
+        return Problem(code, f"{who} failed while {doing}: {happened}", node.place)
+    if not author_line(error, type(node.node)) and node.type.file.name:
+        happened = f"{shown_file(node.type.file)}: {happened}"
+    return Problem(error.code, f"{who}: {happened}", node.place)
 
 
 def topological(graph: Graph) -> list[str]:

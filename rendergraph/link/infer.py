@@ -25,6 +25,7 @@ from rendergraph.declare import (
     TextureInfo,
     Views,
 )  # fmt: skip
+from rendergraph.declare.blame import is_deliberate, what_happened
 from rendergraph.document import shown
 from rendergraph.errors import Problem
 from rendergraph.link.graph import Endpoint
@@ -144,7 +145,10 @@ class Infer:
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):
-            self._ruled(end, "count", port.count)
+            count = self._ruled(end, "count", port.count)
+            if not isinstance(count, int) or count < 0:
+                self._say(end, "RG209", f"the rule for its count gives {shown(count, 60)}, not a whole number from 0")
+                return None
             return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port))
         if isinstance(port, InOut) and bound.links.get(port.name):
             return self.info(bound.links[port.name][0].source)
@@ -166,16 +170,16 @@ class Infer:
             return rule(bound.node, self._facts_of(bound))
         except _Unknown:
             raise
-        except Exception as error:  # a stranger's function
+        except (Exception, SystemExit) as error:  # a stranger's function
             missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in bound.inputs
             if missing and end not in self.used:
                 raise _Unknown from None  # nobody uses what lacks an input
             if missing:
                 self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
-            elif isinstance(error, ValueError):
+            elif isinstance(error, ValueError) and is_deliberate(error, bound.type.cls):
                 self._refused(bound, str(error))
             else:
-                self._say(end, "RG209", f"the rule for its {what} fails: {type(error).__name__}: {shown(error, 200)}")
+                self._say(end, "RG209", f"the rule for its {what} fails: {what_happened(error, bound.type.cls)}")
             raise _Unknown from None
 
     def _refused(self, bound: Bound, message: str) -> None:
@@ -215,7 +219,7 @@ class Infer:
         if size is None:
             return None
         name = self._ruled(end, "format", port.format) or (like.format if like is not None else DEFAULT_FORMAT)
-        if name not in FORMATS:
+        if not isinstance(name, str) or name not in FORMATS:
             self._say(end, "RG211", f"there is no format '{name}'")
             return None
         kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
@@ -266,7 +270,13 @@ class Infer:
     # Views and lights -------------------------------------------------------------------------------------------------
 
     def _view_lights(self, end: Endpoint, port: Views) -> tuple[int, ...]:
-        return tuple(self._ruled(end, "lights", port.lights)) if port.lights else ()
+        return self._indices(end, self._ruled(end, "lights", port.lights)) if port.lights else ()
+
+    def _indices(self, end: Endpoint, given: object) -> tuple[int, ...]:
+        if not isinstance(given, list | tuple | range) or not all(isinstance(light, int) for light in given):
+            self._say(end, "RG209", f"the rule for its lights gives {given!r}, not the indices of lights")
+            raise _Unknown
+        return tuple(given)
 
     def _view(
         self, end: Endpoint, bound: Bound, port: Made, semantic: Semantic
@@ -283,7 +293,7 @@ class Infer:
         elif isinstance(drawn := bound.ports.get("view"), Input) and drawn.kind == "view" and semantic.name in _DRAWN:
             view, lights = self._carried(bound, drawn)
         if callable(port.lights):
-            lights = tuple(self._ruled(end, "lights", port.lights))
+            lights = self._indices(end, self._ruled(end, "lights", port.lights))
         elif port.lights:
             table: Port | None = bound.ports.get(port.lights)
             if isinstance(table, Views):

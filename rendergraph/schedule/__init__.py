@@ -85,7 +85,7 @@ def schedule(
         text = f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; use fewer nodes or lower counts"
         raise InputError(Problem("RG606", text))
     versions = Versions.of(expansion.steps)
-    kept = contributing(expansion.steps, expansion.resources, expansion.wanted, versions)
+    kept = contributing(expansion.steps, expansion.resources, expansion.wanted, versions, expansion.idle)
     touched = {id for step in kept for id in touched_ids(step)}
     shown = set(expansion.wanted.values())
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}

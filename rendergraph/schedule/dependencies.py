@@ -84,15 +84,26 @@ def is_filled_by_update(id: str, resource: Resource, versions: Versions) -> bool
 
 
 def contributing(
-    steps: Sequence[Step], resources: Mapping[str, Resource], wanted: Mapping[str, str], versions: Versions
+    steps: Sequence[Step],
+    resources: Mapping[str, Resource],
+    wanted: Mapping[str, str],
+    versions: Versions,
+    idle: Mapping[str, str],
 ) -> list[Step]:
     """The steps that something wanted depends on, in the order given.
 
     History that a kept step reads from the last frame is wanted as well: its writers are kept.
 
+    Args:
+        steps: everything that was recorded.
+        resources: what the steps touch.
+        wanted: output name to the resource it shows.
+        versions: who writes and reads what.
+        idle: nodes that recorded nothing, with the reason.
+
     Raises:
-        InputError: a kept step reads, or continues, a texture that nothing has written (RG601, RG603), or an output is
-            never written (RG604).
+        InputError: a kept step reads, or continues, a texture that nothing has written (RG601, RG603), an output is
+            never written (RG604), or the node that would write it is idle (RG607).
     """
     kept: set[StepKey] = set()
     problems: list[Problem] = []
@@ -103,7 +114,8 @@ def contributing(
             stack.append(final)
         elif id not in resources or isinstance(resources[id].desc, TextureDesc):
             text = f"output '{name}' shows '{id}', but no step writes it; write it in the node's `record`"
-            problems.append(Problem("RG604", text))
+            maker = next((step for step in steps if step.node == id.rpartition(".")[0]), None)
+            problems.append(Problem("RG604", text, maker.place if maker is not None else None))
     while stack:
         step = stack.pop()
         if step.key in kept:
@@ -114,9 +126,10 @@ def contributing(
                 writer = versions.final(read.resource)
             else:
                 writer = versions.writers.get(read.resource, {}).get(read.version)
-                texture = isinstance(resources[read.resource].desc, TextureDesc)
+                made = resources.get(read.resource)
+                texture = made is None or isinstance(made.desc, TextureDesc)
                 if writer is None and texture and read.use != "attach":  # the write beside it says it better
-                    problems.append(_unwritten(step, read.resource))
+                    problems.append(_unwritten(step, read.resource, versions, idle))
             if writer is not None:
                 stack.append(writer)
         for write in step.writes:
@@ -189,20 +202,24 @@ def _two_writers(resource: str, one: Step, other: Step) -> Problem:
     )
 
 
-def _unwritten(step: Step, resource: str) -> Problem:
-    return Problem(
-        "RG601",
-        f"node '{step.node}' reads '{resource}', but no step has written it by then; "
-        f"write it in an earlier step, or declare it `History` to read last frame's value",
-    )
+def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str, str]) -> Problem:
+    """Why nothing has been written: the maker has nothing to do, forgot it, or the step comes too early."""
+    maker = resource.rpartition(".")[0]
+    if maker in idle:
+        text = f"node '{step.node}' reads '{resource}', but '{maker}' does nothing: {idle[maker]}"
+        return Problem("RG607", text, step.place)
+    if maker != step.node and not versions.writers.get(resource):
+        text = f"node '{step.node}' reads '{resource}', but no step of '{maker}' writes it; write it in its `record`"
+        return Problem("RG604", text, step.place)
+    text = (f"it reads '{resource}', but no step has written it by then; "
+            "write it in an earlier step, or declare it `History` to read last frame's value")  # fmt: skip
+    return step.problem("RG601", text)
 
 
 def _loads_nothing(step: Step, resource: str) -> Problem:
-    return Problem(
-        "RG603",
-        f"the first step that writes '{resource}', in node '{step.node}', keeps what is there, but nothing is there "
-        f"yet; give the port a `clear` value or fill it in an earlier step",
-    )
+    text = (f"the first step that writes '{resource}' keeps what is there, but nothing is there yet; "
+            "give the port a `clear` value or fill it in an earlier step")  # fmt: skip
+    return step.problem("RG603", text)
 
 
 def _cycle(dag: nx.DiGraph[StepKey]) -> Problem:

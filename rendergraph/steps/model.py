@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
+from rendergraph.errors import Place, Problem, shown_file
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 
 Topology = Literal["points", "lines", "line_strip", "triangles", "triangle_strip", "triangles_adjacency"]
+TOPOLOGIES: tuple[str, ...] = get_args(Topology)
+MATERIAL_LEVELS = ("full", "alpha", "none")
+DRAW_ORDERS = ("front_to_back", "back_to_front", "scene")
 UniformValue: TypeAlias = "float | int | bool | Sequence[float] | Sequence[int]"
 
 
@@ -118,7 +122,11 @@ class Step:
         instances: instance count of a `draw` step.
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
         groups: work groups of a compute step.
+        invocations: what a compute step covers along x, y and z; the groups are then as many as its shader needs.
         label: shown in plans and GL debug groups.
+        type: the node's type.
+        place: where the node stands in the pipeline's file.
+        caller: the author's file and line of the call that recorded it; None where the framework did by itself.
     """
 
     node: str
@@ -145,7 +153,21 @@ class Step:
     instances: int = 1
     attributes: tuple[tuple[str, str], ...] = ()
     groups: tuple[int, int, int] = (1, 1, 1)
+    invocations: tuple[int, int, int] | None = None
     label: str = ""
+    type: str = ""
+    place: Place | None = field(default=None, compare=False)
+    caller: tuple[str, int] | None = field(default=None, compare=False)
+
+    def problem(self, code: str, text: str) -> Problem:
+        """What is wrong with the step, as `node 'id' (type): file:line: …`, at the node's place in the pipeline."""
+        return Problem(code, f"{self.said_of}: {text}", self.place)
+
+    @property
+    def said_of(self) -> str:
+        """The node, its type, and the author's line of the step."""
+        who = f"node '{self.node}'" + (f" ({self.type})" if self.type else "")
+        return who + (f": {shown_file(self.caller[0])}:{self.caller[1]}" if self.caller is not None else "")
 
     @property
     def key(self) -> tuple[str, int]:

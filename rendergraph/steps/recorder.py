@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, TypeAlias
 
-from rendergraph.declare import Facts, InOut, LightFacts, Node, Output, Part, Port
-from rendergraph.steps.model import UniformValue
+from rendergraph.declare import Facts, InOut, Input, LightFacts, Node, Output, Part, Port, Views
+from rendergraph.declare.blame import is_framework
+from rendergraph.errors import Misuse
+from rendergraph.steps import checks
+from rendergraph.steps.model import DRAW_ORDERS, MATERIAL_LEVELS, TOPOLOGIES, UniformValue
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -36,7 +40,10 @@ class Recorder(Protocol):
 
 @dataclass(frozen=True)
 class Request:
-    """What a node asked for, before its ports are mapped to resources."""
+    """What a node asked for, before its ports are mapped to resources.
+
+    `caller` is the author's file and line of the call, None where the framework recorded the step by itself.
+    """
 
     kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps"]
     shaders: tuple[tuple[str, str], ...] = ()
@@ -46,6 +53,7 @@ class Request:
     uniforms: Mapping[str, UniformValue] = field(default_factory=dict)
     defines: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
+    caller: tuple[str, int] | None = None
 
 
 Target: TypeAlias = "Port | Part"
@@ -80,21 +88,34 @@ class Steps:
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
-        return self.facts.connected(port.name)
+        return self.facts.connected(checks.own_port(self.node, port, "connected's argument").name)
 
     def used(self, port: Port) -> bool:
         """Whether anybody reads an output; one that nobody reads need not be written."""
-        return self._recorder.used(port)
+        return self._recorder.used(checks.own_port(self.node, port, "used's argument"))
 
     def needs(self, parameter: str) -> tuple[str, ...]:
         """What a plugin's choice of a parameter says that it needs; nothing where the choice is the node's own."""
         return self._recorder.needs(parameter)
 
     def desc(self, port: Port) -> TextureDesc:
-        """Size, format, mips and layers of a port's texture."""
-        found = self._recorder.desc(port)
-        assert isinstance(found, TextureDesc), f"{port.name} is a buffer"
+        """Size, format, mips and layers of a port's texture.
+
+        Raises:
+            Misuse: it is no port of this node, holds no texture, or is an input that is not connected.
+        """
+        found = self._desc(checks.own_port(self.node, port, "desc's argument"))
+        if found is None:
+            raise Misuse(f"input '{port.name}' is not connected; ask `steps.connected` first")
+        if isinstance(found, BufferDesc):
+            raise Misuse(f"'{port.name}' holds no texture; its description has no size or format")
         return found
+
+    def _desc(self, port: Port) -> TextureDesc | BufferDesc | None:
+        """What a port is allocated from, None where nothing is linked to an input."""
+        if isinstance(port, Input) and not self.facts.connected(port.name):
+            return None
+        return self._recorder.desc(port)
 
     # Steps ----------------------------------------------------------------------------------------------------------
 
@@ -140,11 +161,14 @@ class Steps:
             order: `front_to_back`, `back_to_front` or `scene`.
             per_light: one light's index, for a pass a light.
         """
+        checks.choice("materials", materials, MATERIAL_LEVELS)
+        checks.choice("order", order, DRAW_ORDERS)
+        if per_light is not None:
+            checks.whole("per_light", per_light)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
             "geometry", shaders, out, bindings, defines, state=state, view=view, view_index=view_index,
-            objects=objects if isinstance(objects, str) else tuple(objects), materials=materials, order=order,
-            per_light=per_light,
+            objects=checks.objects(objects), materials=materials, order=order, per_light=per_light,
         )  # fmt: skip
 
     def draw(
@@ -175,30 +199,61 @@ class Steps:
             out, state, defines, bindings: see the class.
             view, view_index: as for `geometry`.
         """
+        checks.choice("topology", topology, TOPOLOGIES)
+        checks.whole("instances", instances)
+        if isinstance(vertices, Port):
+            checks.buffer(checks.own_port(self.node, vertices, "vertices"), "vertices")
+        else:
+            checks.whole("vertices", vertices)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
             "draw", shaders, out, bindings, defines, state=state, vertices=vertices, topology=topology, view=view,
-            view_index=view_index, instances=instances, attributes=dict(attributes or {}),
+            view_index=view_index, instances=instances, attributes=checks.attributes(self.node, attributes),
         )  # fmt: skip
 
     def compute(
         self,
         shader: str,
         *,
-        groups: tuple[int, int, int],
+        over: Target | int | tuple[int, ...] | None = None,
+        groups: tuple[int, int, int] | None = None,
         out: Target | Mapping[str, Target] | None = None,
         defines: Mapping[str, Any] | None = None,
         **bindings: Target | UniformValue,
     ) -> None:
-        """A compute dispatch: `out` is bound as images and buffers; barriers follow from who reads them next."""
-        self._add("compute", {"compute": shader}, out, bindings, defines, groups=groups)
+        """A compute dispatch: `out` is bound as images and buffers; barriers follow from who reads them next.
+
+        Args:
+            shader: the compute shader, whose `layout(local_size_x = …)` is the size of a work group.
+            over: what it covers with one invocation a texel: a texture, or so many invocations along x, y and z. By
+                default the first texture it writes, else the first that it reads. There are as many work groups as
+                that takes, so the last ones reach beyond the edge: the shader leaves those invocations out.
+            groups: the number of work groups instead.
+            out, defines, bindings: see the class.
+        """
+        if groups is not None and over is not None:
+            raise Misuse("both over and groups are given; over finds the number of groups itself")
+        options = {"over": over} if groups is None else {"groups": checks.counts("groups", groups)}
+        self._add("compute", {"compute": shader}, out, bindings, defines, **options)
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
-        """Fill a texture with one value."""
-        self._add("clear", {}, out, {}, None, value=value)
+        """Fill a texture with one value in every channel, or one a channel; a buffer with 0."""
+        part = checks.part_of(self.node, out, "out")
+        numbers = checks.uniform("value", value)
+        if not isinstance(numbers, int | float) and len(numbers) > 4:
+            raise Misuse(f"value has {len(numbers)} numbers; a texel has up to 4 channels")
+        if getattr(part.port, "kind", "") == "buffer" and numbers != 0:
+            raise Misuse(f"'{part.port.name}' is a buffer, which is cleared to 0 alone")
+        self._add("clear", {}, out, {}, None, value=numbers)
 
     def mipmaps(self, out: Port) -> None:
         """Make mips 1 and up from mip 0 by 2×2 averages."""
+        port = checks.own_port(self.node, out, "out")
+        if isinstance(out, Part):
+            raise Misuse(f"out is a part of '{port.name}'; mips are made of a whole texture")
+        desc = self._desc(port)
+        if isinstance(desc, BufferDesc) or (desc is not None and desc.mips == 1):
+            raise Misuse(f"'{port.name}' has no mips to make; declare it with mips=0 for the whole chain")
         self._add("mipmaps", {}, out, {}, None)
 
     def _add(
@@ -210,31 +265,100 @@ class Steps:
         defines: Mapping[str, Any] | None,
         **options: Any,
     ) -> None:
-        targets: dict[str, Target]
         if out is None:
             targets = {
-                name: port
+                name: Part(port)
                 for name, port in self.node.ports().items()
-                if isinstance(port, Output | InOut) and self.used(port)
+                if isinstance(port, Output | InOut) and self._recorder.used(port)
             }
-        elif isinstance(out, Port | Part):
-            targets = {(out if isinstance(out, Port) else out.port).name: out}
         else:
-            targets = dict(out)
-        textures = {name: value for name, value in bindings.items() if isinstance(value, Port | Part)}
-        uniforms = {name: value for name, value in bindings.items() if not isinstance(value, Port | Part)}
+            targets = checks.targets(self.node, out)
+        textures, uniforms = self._bindings(bindings)
+        for part in (*targets.values(), *(value for value in textures.values() if isinstance(value, Part))):
+            if part.mip is not None or part.layer is not None:
+                desc = self._desc(part.port)
+                if desc is not None:
+                    checks.within(part, desc)
+        self._check_options(options)
+        if "over" in options:
+            options["invocations"] = self._invocations(options.pop("over"), targets, textures)
+        caller = sys._getframe(2)  # what the author's `record`, or a helper of it, called is one frame further down
+        own = not is_framework(str(caller.f_globals.get("__name__")))
         self._recorder.add(
             Request(
                 kind=kind,
-                shaders=tuple((stage, file) for stage, file in shaders.items() if file is not None),
-                out=tuple((name, part if isinstance(part, Part) else Part(part)) for name, part in targets.items()),
+                shaders=checks.shader_files(shaders),
+                out=tuple(targets.items()),
                 bindings=textures,
                 default_inputs=not textures and kind in ("fullscreen", "geometry", "draw", "compute"),
                 uniforms=uniforms,
-                defines={name: define_text(value) for name, value in (defines or {}).items()},
+                defines=checks.macros(defines),
                 options=options,
+                caller=(caller.f_code.co_filename, caller.f_lineno) if own else None,
             )
         )
+
+    def _bindings(
+        self, bindings: Mapping[str, Target | UniformValue]
+    ) -> tuple[dict[str, Target], dict[str, UniformValue]]:
+        """What a step reads by the shader's name, and its own uniforms."""
+        textures: dict[str, Target] = {}
+        uniforms: dict[str, UniformValue] = {}
+        for name, value in bindings.items():
+            if not isinstance(value, Port | Part):
+                uniforms[name] = checks.uniform(name, value)
+                continue
+            port = checks.own_port(self.node, value, name)
+            if isinstance(port, Views):
+                raise Misuse(f"{name} is the view table '{port.name}'; give it as `view=` to a step that draws")
+            textures[name] = checks.part_of(self.node, value, name) if isinstance(value, Part) else port
+        return textures, uniforms
+
+    def _check_options(self, options: Mapping[str, Any]) -> None:
+        """What several kinds of step take."""
+        state = options.get("state")
+        if state is not None and not isinstance(state, State):
+            raise Misuse(f"state is {checks.shown(state)}, not a State(…)")
+        if options.get("view") is not None:
+            port = checks.own_port(self.node, options["view"], "view")
+            if not isinstance(port, Views | Input):
+                raise Misuse(f"view is {checks.shown(port)}; it is a Views port or an input that carries views")
+        if options.get("view_index") is not None:
+            checks.whole("view_index", options["view_index"])
+
+    def _invocations(
+        self, over: object, targets: Mapping[str, Part], reads: Mapping[str, Target]
+    ) -> tuple[int, int, int]:
+        """How many invocations a dispatch needs along each axis."""
+        if over is not None and not isinstance(over, Port | Part | str):
+            return checks.counts("over", over)
+        if over is not None:
+            part = checks.part_of(self.node, over, "over")
+            desc = self._desc(part.port)
+            if isinstance(desc, BufferDesc):
+                raise Misuse(f"over is the buffer '{part.port.name}'; say how many invocations, as in over=256")
+            if desc is None:
+                raise Misuse(f"over is input '{part.port.name}', which is not connected; ask `steps.connected` first")
+            checks.within(part, desc)
+            return _texels(desc, part)
+        for part in (*targets.values(), *self._reads(reads)):
+            desc = self._desc(part.port)
+            if isinstance(desc, TextureDesc):
+                return _texels(desc, part)
+        if not targets:
+            return 1, 1, 1  # nobody reads what it makes
+        raise Misuse("it writes and reads no texture that says how many work groups there are; give over or groups")
+
+    def _reads(self, named: Mapping[str, Target]) -> Iterator[Part]:
+        """What a step reads, every input where it names none."""
+        for target in named.values() or self.node.inputs().values():
+            part = target if isinstance(target, Part) else Part(target)
+            if getattr(part.port, "kind", "function") not in ("view", "scene", "function"):
+                yield part
+
+
+def _texels(desc: TextureDesc, part: Part) -> tuple[int, int, int]:
+    return *desc.mip_size(part.mip or 0), 1 if part.layer is not None else desc.layers
 
 
 def define_text(value: object) -> str:

@@ -119,7 +119,7 @@ def test_an_update_that_writes_too_much_is_named(draw: Draw) -> None:
             frame.write(self.corners, np.zeros(9, np.float32))
 
     text = "nodes: {q: {type: too_much}}\noutputs: {image: q.color}"
-    with pytest.raises(RenderError, match=r"node 'q' writes 36 bytes into 'corners', which holds 32"):
+    with pytest.raises(RenderError, match=r"RG432 node 'q' .*test_buffers\.py:\d+: it writes 36 bytes into 'corners', which holds 32"):
         draw(text, TooMuch, shaders=QUADS)
 
 

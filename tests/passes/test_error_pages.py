@@ -12,8 +12,8 @@ import yaml
 
 import rendergraph as rg
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Frame, Input, Node, Output, Radiance, Steps, Views
-from rendergraph.errors import RendergraphError
+from rendergraph.api import Depth, Frame, Input, Internal, Node, Output, Radiance, Steps, Views
+from rendergraph.errors import InputError, RendergraphError
 from rendergraph.resources import folder
 
 PAGES = {path.stem.partition("-")[0]: path for path in sorted(folder("rendergraph.errors").glob("RG*.yaml"))}
@@ -71,9 +71,84 @@ class Viewless(Node):
         frame.set_views(self.views, [])
 
 
+class Quoted(Node):
+    """Names a port in quotes."""
+
+    source = Input(AnyTexel, optional=True, doc="Source.")
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("a.frag", source="source")  # type: ignore[arg-type]
+
+
+class Gbuffer(Node):
+    """Another node."""
+
+    normal = Output(Radiance, doc="Nothing.")
+
+
+class Borrower(Node):
+    """Reads what another class declares."""
+
+    source = Input(AnyTexel, optional=True, doc="Source.")
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("a.frag", source=Gbuffer.normal)
+
+
+class Both(Node):
+    """Two sizes at once."""
+
+    large = Output(Radiance, doc="Whole.")
+    small = Output(Radiance, size=0.5, doc="Half.")
+    color = Output(Radiance, doc="Whole.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("a.frag", out={"color": self.color, "large": self.large})
+        steps.fullscreen("a.frag", out={"color": self.large, "small": self.small})
+
+
+class Stores(Node):
+    """Stores into depth."""
+
+    depth = Output(Depth, format="depth32f", doc="Depth.")
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.compute("a.comp", groups=(1, 1, 1), out=self.depth)
+        steps.fullscreen("a.frag", depth=self.depth, out=self.color)
+
+
+class Early(Node):
+    """Reads before it writes."""
+
+    raw = Internal(Radiance)
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("a.frag", source=self.raw, out=self.color)
+        steps.fullscreen("a.frag", out=self.raw)
+
+
+class Unfilled(Node):
+    """Makes mips of nothing."""
+
+    bright = Internal(Radiance, mips=0)
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.mipmaps(self.bright)
+        steps.fullscreen("a.frag", source=self.bright, out=self.color)
+
+
 @pytest.mark.parametrize(
-    ("code", "node"), [("RG420", Broken), ("RG421", Backwards), ("RG422", Feedback), ("RG433", Viewless)]
-)
+    ("code", "node"),
+    [
+        ("RG420", Broken), ("RG421", Backwards), ("RG422", Feedback), ("RG423", Quoted), ("RG424", Borrower),
+        ("RG425", Both), ("RG426", Stores), ("RG433", Viewless), ("RG601", Early), ("RG603", Unfilled),
+    ],
+)  # fmt: skip
 def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
     shaders = {"a.frag": "out vec4 color; void main() { color = vec4(1.0); }"}
     text = f"nodes:\n        a: {{type: {node.__name__.lower()}}}\noutputs: {{image: a.color}}"
@@ -84,8 +159,11 @@ def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
     )
     with pytest.raises(RendergraphError, match=code) as caught:
         bench.session.render(pipeline)
-    expected = page(code)["message"]
-    assert re.sub(r"failed while recording: \S+\.py:\d+: ", "failed while recording: ", said(caught.value)) == expected
+    assert re.sub(r"\S+\.py:\d+", "blur.py:2", said(caught.value)) == page(code)["message"]
+    here = re.search(r"(\S+\.py):(\d+)", said(caught.value))
+    assert here is not None
+    assert Path(here[1]).name == "test_error_pages.py"
+    assert any(word in Path(__file__).read_text().splitlines()[int(here[2]) - 1] for word in ("steps.", "frame."))
 
 
 def test_outputs_and_taps(gl: rg.Session, tmp_path: Path) -> None:
@@ -132,9 +210,9 @@ class Mixed(Node):
 
 def test_targets_that_no_driver_draws_together(bench: Any) -> None:
     shaders = {"mixed.frag": "out float color; out float layers; void main() { color = layers = 1.0; }"}
-    with pytest.raises(RendergraphError, match="RG617") as caught:
-        bench.draw("nodes: {m: {type: mixed}}\noutputs: {image: m.color, two: m.layers}", Mixed, shaders=shaders)
-    assert said(caught.value) == page("RG617")["message"]
+    text = "nodes: {m: {type: mixed}}\noutputs: {image: m.color, two: m.layers}"
+    with pytest.raises(InputError, match=r"RG425 .*'m.color' is a plain 2D target, but 'm.layers' is 2 layers; the tar"):
+        bench.pipeline(text, Mixed, shaders=shaders).check()
 
 
 def test_every_code_that_is_raised_has_one_page_and_every_page_a_code() -> None:

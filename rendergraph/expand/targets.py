@@ -1,0 +1,90 @@
+"""What a step writes to: which parts, at which size, and what it must not read meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from rendergraph.declare import Part
+from rendergraph.steps import Read, Request, Resource, Write
+from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
+
+
+def parts_written(request: Request, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
+    """Mips and layers a request leaves something in: a clear means the whole texture, a mip chain all but mip 0."""
+    mips = desc.mips if isinstance(desc, TextureDesc) else 1
+    if request.kind == "mipmaps":
+        return {(mip, None) for mip in range(1, mips)}
+    if request.kind == "clear" and part.mip is None:
+        return {(mip, part.layer) for mip in range(mips)}
+    return {(part.mip or 0, part.layer)}
+
+
+def overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
+    """Whether two parts, each mip and layer, share a texel."""
+    return one[0] == other[0] and (one[1] == other[1] or None in (one[1], other[1]))
+
+
+def feedback(request: Request, write: Write, reads: Iterable[Read]) -> str | None:
+    """What a step samples it must not write: drivers give old texels, new ones, or some of each."""
+    state = request.options.get("state")
+    if write.use == "depth" and state is not None and state.depth_write is False:
+        return None
+    for read in reads:
+        if read.resource != write.resource or read.previous or read.use != "sample":
+            continue
+        if read.mip in (None, write.mip or 0) and overlap((0, read.layer), (0, write.layer)):
+            return (f"it samples '{read.resource}' in the step that writes it; "
+                    "blend, sample another mip or layer, or go through an `Internal`")  # fmt: skip
+    return None
+
+
+def target_size(
+    resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
+) -> tuple[tuple[int, int], int]:
+    """Width, height and samples of what a step writes."""
+    for touched in (*writes, *(read for read in reads if read.use == "depth_test")):
+        desc = resources[touched.resource].desc
+        if isinstance(desc, TextureDesc):
+            return desc.mip_size(touched.mip or 0), desc.samples
+    return (1, 1), 1
+
+
+def misfit(resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]) -> str | None:
+    """Why the attachments of one draw do not go together: size, samples, layers, or two of depth."""
+    attached: list[Read | Write] = [write for write in writes if write.use in ("color", "depth")]
+    attached += [read for read in reads if read.use == "depth_test"]
+    first: tuple[str, Facts] | None = None
+    depths = []
+    for touched in attached:
+        desc = resources[touched.resource].desc
+        if not isinstance(desc, TextureDesc) or desc.layers == 0:
+            continue
+        depths += [touched.resource] if FORMATS[desc.format].is_depth else []
+        layered = touched.layer is None and desc.kind != "texture2d"
+        facts = (*desc.mip_size(touched.mip or 0), desc.samples, desc.layers if layered else 0)
+        name = touched.resource + ("" if touched.mip is None else f" mip {touched.mip}")
+        if first is None:
+            first = name, facts
+        elif facts != first[1]:
+            return f"'{first[0]}' is {_said(first[1], facts)}, but '{name}' is {_said(facts, first[1])}; " + (
+                "the targets of one step are alike in size, samples and layers"
+            )
+    depths = list(dict.fromkeys(depths))
+    if len(depths) > 1:
+        return f"'{depths[0]}' and '{depths[1]}' are both depth; one step has one"
+    return None
+
+
+Facts = tuple[int, int, int, int]
+
+
+def _said(own: Facts, other: Facts) -> str:
+    """What differs, in words."""
+    words = []
+    if own[:2] != other[:2]:
+        words.append(f"{own[0]}×{own[1]}")
+    if own[2] != other[2]:
+        words.append(f"{own[2]} samples a texel" if own[2] > 1 else "not multisampled")
+    if own[3] != other[3]:
+        words.append(f"{own[3]} layers" if own[3] else "a plain 2D target")
+    return ", ".join(words)
