@@ -22,7 +22,7 @@ PARTS = Path(__file__).parent / "wrong_files" / "parts"
 LIGHTS = (LightFacts("key", "directional"), LightFacts("lamp", "spot"))
 MODULES = ("document", "settings", "catalog", "read", "resolve", "link")
 PAGES = {path.name[:5]: path for path in sorted(folder("rendergraph.errors").glob("RG*.yaml"))}
-ELSEWHERE = ("RG018", "RG204", "RG205", "RG206", "RG493", "RG494", "RG495", "RG496")  # need several files or a GPU
+ELSEWHERE = ("RG018", "RG204", "RG205", "RG206", "RG493", "RG494", "RG495", "RG496", "RG497", "RG498")  # need several files or a GPU
 
 
 def own_codes() -> set[str]:
@@ -32,6 +32,7 @@ def own_codes() -> set[str]:
     return {code for file in files for code in re.findall(r'"(RG\d{3})"', file.read_text(encoding="utf-8"))}
 
 
+NAMES = {"settings": "rendergraph.toml", "node": "glow.py", "shader": "glow.frag", "compute": "glow.comp"}
 CHECKED = sorted(own_codes() - set(ELSEWHERE))
 
 
@@ -42,7 +43,7 @@ def page_of(code: str) -> dict[str, Any]:
 
 def said(kind: str, text: str, where: Path, catalog: Catalog) -> list[str]:
     """Everything that is said about a text, without the file's name."""
-    file = where / {"settings": "rendergraph.toml", "node": "glow.py"}.get(kind, "pipeline.yaml")
+    file = where / NAMES.get(kind, "pipeline.yaml")
     file.write_text(text, encoding="utf-8")
     found: tuple[Problem, ...] = ()
     try:
@@ -57,7 +58,7 @@ def said(kind: str, text: str, where: Path, catalog: Catalog) -> list[str]:
         elif kind == "settings":
             load(file)
         else:
-            Catalog.discover([file], installed=False).get("glow")
+            found = Catalog.discover([file], installed=False).get("glow").warnings
     except RendergraphError as error:
         found = error.problems
     return [str(problem).splitlines()[0].removeprefix(f"{file}:").removeprefix(" ") for problem in found]

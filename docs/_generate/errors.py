@@ -16,7 +16,7 @@ GROUPS = {
     "RG3": "Scenes, meshes and images", "RG4": "Nodes and shaders", "RG5": "The command line",
     "RG6": "Order, limits, memory and devices",
 }  # fmt: skip
-LANGUAGES = {"pipeline": "yaml", "scene": "yaml", "node": "python", "shader": "glsl"}
+LANGUAGES = {"pipeline": "yaml", "scene": "yaml", "node": "python", "shader": "glsl", "compute": "glsl"}
 
 
 def pages() -> Iterator[tuple[str, str]]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from rendergraph.catalog import find, modules
 from rendergraph.catalog.extensions import extensions
+from rendergraph.catalog.surroundings import Named, surroundings
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, suggestion
 
 GROUP = "rendergraph.nodes"
 """The entry point group; an entry's value is a package of node modules in folders by family."""
@@ -22,12 +23,13 @@ class Catalog:
 
     def __init__(
         self,
-        listed: Mapping[str, list[Listed]],
+        listed: Mapping[str, Sequence[Listed]],
         types: Mapping[str, NodeType] | None = None,
         extensions: Extensions = NO_EXTENSIONS,
     ) -> None:
-        self._listed = dict(listed)
+        self._listed = {name: tuple(found) for name, found in listed.items()}
         self._types = dict(types or {})
+        self._loaded: dict[tuple[str, tuple[Listed, ...]], NodeType] = {}
         self.extensions = extensions
         """What plugins add beside node types, imported when the first name is asked for."""
 
@@ -35,23 +37,35 @@ class Catalog:
     def discover(cls, plugin_paths: Iterable[Path] = (), *, installed: bool = True) -> Catalog:
         """All installed node types, and those in files and folders the user named.
 
+        These are, in this order, packages by entry point, `plugins` of the settings of the project around the current
+        folder, `RENDERGRAPH_PATH`, and `plugin_paths`.
+
         Args:
-            plugin_paths: node modules, or folders of them; code, so never taken from a pipeline file.
-            installed: look at entry points too.
+            plugin_paths: node modules, shader files, or folders of them; code, so never taken from a pipeline file.
+            installed: look at more than `plugin_paths`.
 
         Raises:
-            InputError: a plugin path does not exist.
+            InputError: a plugin path does not exist, or the settings file is malformed.
         """
         from importlib.metadata import entry_points
 
-        plugin_paths = tuple(plugin_paths)
+        named = {entry.path.resolve(): entry for entry in surroundings()} if installed else {}
+        named |= {path.resolve(): Named(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
         for entry in entry_points(group=GROUP) if installed else ():
             _add(listed, find.package(entry.name, entry.value.partition(":")[0]))
-        for path in plugin_paths:
-            _add(listed, find.loose(path))
-        folders = [(find.package_of(path), path.resolve()) for path in plugin_paths if path.is_dir()]
+        for plugin in named.values():
+            _add(listed, find.loose(plugin.path, plugin.place, plugin.where))
+        folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         return cls(listed, extensions=extensions(folders, installed=installed))
+
+    def with_shaders(self, found: Iterable[tuple[str, Listed]]) -> Catalog:
+        """The same with shader files that a pipeline file names; what has been loaded is shared."""
+        listed = {name: list(those) for name, those in self._listed.items()}
+        _add(listed, found)
+        more = Catalog(listed, self._types, self.extensions)
+        more._loaded = self._loaded
+        return more
 
     @classmethod
     def of(cls, *classes: type[Node], shaders: Path = Path(), **named: type[Node]) -> Catalog:
@@ -81,13 +95,31 @@ class Catalog:
         Raises:
             InputError: there is none of that name, two plugins have one, its module fails, or it is declared wrongly.
         """
-        if name not in self._types:
-            if name not in self._listed:
-                raise InputError(Problem("RG102", f"there is no node type '{name}'{suggestion(name, self.names())}"))
-            self._types[name] = modules.load(name, self._listed[name])
-        return self._types[name]
+        if name in self._types:
+            return self._types[name]
+        if name not in self._listed:
+            raise InputError(Problem("RG102", f"there is no node type '{name}'{suggestion(name, self.names())}"))
+        key = (name, self._listed[name])
+        if key not in self._loaded:
+            self._loaded[key] = self._load(*key)
+        return self._loaded[key]
+
+    def _load(self, name: str, found: Sequence[Listed]) -> NodeType:
+        listed = found[0]
+        if len(found) > 1:
+            plugins = " and ".join(f"'{other.plugin}' ({other.file})" for other in found)
+            text = f"node type '{name}' comes from {plugins}; rename one"
+            raise InputError(Problem("RG493", text, Place(str(listed.file))))
+        if listed.module:
+            return modules.load(name, listed)
+        from rendergraph.catalog import shader  # what reads shaders is imported where there are any
+
+        return shader.load(name, listed, self.extensions)
 
 
 def _add(listed: dict[str, list[Listed]], found: Iterable[tuple[str, Listed]]) -> None:
-    for name, module in found:
-        listed.setdefault(name, []).append(module)
+    """Add what was found; a file that is named twice is one type."""
+    for name, one in found:
+        known = listed.setdefault(name, [])
+        if all(one.file != other.file for other in known):
+            known.append(one)

@@ -1,18 +1,31 @@
-"""Listing the node types of packages, folders and files, without importing anything."""
+"""Listing the node types of packages, folders and files, without importing or parsing anything.
+
+A module is a node type, and so is a shader file. Where Python stands in a folder or beneath it, shader files are most
+likely parts of those nodes; there only those with a header are types of their own.
+"""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import zlib
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
+from rendergraph.catalog import header
 from rendergraph.catalog.extensions import MODULE
 from rendergraph.catalog.reload import PREFIX, fresh_package
-from rendergraph.catalog.types import Listed
-from rendergraph.errors import InputError, Problem
+from rendergraph.catalog.types import SHADERS, Listed
+from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import look
+
+MOST_FILES = 10_000
+"""Files of a folder that a pipeline file names; a plugin has a few dozen."""
+
+_STEM = re.compile(r"[A-Za-z][A-Za-z0-9_-]*\Z")
+_HEAD_BYTES = 100_000
 
 
 def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
@@ -46,16 +59,59 @@ def _shader_folder(package: str) -> Path | None:
 
 
 def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> Iterator[tuple[str, Listed]]:
+    files = list(_files(folder))
+    has_python = any(suffix == ".py" for _, _, _, suffix in files)
+    for where, family, stem, suffix in files:
+        file = where / f"{stem}{suffix}"
+        if suffix == ".py":
+            module = ".".join([package, *filter(None, family.split("/")), stem])
+            yield stem, Listed(module, family, file, where if shaders is None else shaders / family, plugin)
+        elif not has_python or _has_header(file):
+            yield stem, Listed("", family, file, where, plugin)
+
+
+def _files(folder: Path) -> Iterator[tuple[Path, str, str, str]]:
+    """Folder, family, stem and ending of everything that may be a node type."""
     for where, subfolders, files in os.walk(folder):
         look(Path(where))
         subfolders[:] = sorted(name for name in subfolders if name.isidentifier() and not name.startswith("_"))
         family = Path(where).relative_to(folder).as_posix().removeprefix(".")
         for file in sorted(files):
             stem, suffix = os.path.splitext(file)
-            if suffix == ".py" and not stem.startswith("_") and (family, stem) != ("", MODULE):
-                module = ".".join([package, *filter(None, family.split("/")), stem])
-                beside = Path(where) if shaders is None else shaders / family
-                yield stem, Listed(module, family, Path(where) / file, beside, plugin)
+            is_module = suffix == ".py" and not stem.startswith("_") and (family, stem) != ("", MODULE)
+            if is_module or (suffix in SHADERS and _STEM.match(stem)):
+                yield Path(where), family, stem, suffix
+
+
+def _has_header(file: Path) -> bool:
+    try:
+        with file.open("rb") as opened:
+            return header.is_in(opened.read(_HEAD_BYTES).decode("utf-8", "replace"))
+    except OSError:
+        return False
+
+
+def shaders(folder: Path) -> tuple[list[tuple[str, Listed]], list[Path]]:
+    """The shader nodes of a folder that a pipeline file names, and the Python files beside them, which nobody runs.
+
+    Raises:
+        ValueError: it has more files than any plugin.
+    """
+    files = list(islice(_files(folder), MOST_FILES + 1))
+    if len(files) > MOST_FILES:
+        raise ValueError(f"it has more than {MOST_FILES:,} files; name the folder of the effects itself")
+    python = [where / f"{stem}{suffix}" for where, _, stem, suffix in files if suffix == ".py"]
+    found = [
+        (stem, Listed("", family, file, where, folder.name))
+        for where, family, stem, suffix in files
+        if suffix in SHADERS and (file := where / f"{stem}{suffix}") and (not python or _has_header(file))
+    ]
+    return found, python
+
+
+def shader(file: Path) -> Listed:
+    """One shader file that is used by its path."""
+    return Listed("", "", file, file.parent, file.parent.name)
 
 
 def package_of(path: Path) -> str:
@@ -64,15 +120,23 @@ def package_of(path: Path) -> str:
     return f"{PREFIX}{zlib.crc32(os.fsencode(folder)):08x}"
 
 
-def loose(path: Path) -> Iterator[tuple[str, Listed]]:
+def loose(path: Path, place: Place | None = None, where: str = "") -> Iterator[tuple[str, Listed]]:
     """The modules of a file or folder that is not installed, as a package of their own, so that they can import
     each other relatively.
+
+    Args:
+        path: the file or folder.
+        place: where it is named.
+        where: the same in words, for a place that is no file.
     """
     look(path)
     if not path.exists():
-        raise InputError(Problem("RG011", f"there is no plugin '{path}'"))
+        raise InputError(Problem("RG011", f"there is no plugin '{path}'{where}", place))
     path = path.resolve()
     folder = path if path.is_dir() else path.parent
+    if path.suffix in SHADERS:
+        yield path.stem, shader(path)
+        return
     package = package_of(path)
     fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem

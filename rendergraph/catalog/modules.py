@@ -11,17 +11,13 @@ from rendergraph.declare import Node, declaration_mistakes
 from rendergraph.errors import InputError, Place, Problem
 
 
-def load(name: str, found: list[Listed]) -> NodeType:
+def load(name: str, listed: Listed) -> NodeType:
     """The one node class of a module.
 
     Raises:
-        InputError: two plugins have the name, the module fails, or it declares its node wrongly.
+        InputError: the module fails, or it declares its node wrongly.
     """
-    listed = found[0]
     place = Place(str(listed.file))
-    if len(found) > 1:
-        plugins = " and ".join(f"'{other.plugin}' ({other.file})" for other in found)
-        raise InputError(Problem("RG493", f"node type '{name}' comes from {plugins}; rename one", place))
     try:
         module = importlib.import_module(listed.module)
     except Exception as error:  # whatever a stranger's module raises is a mistake in that module

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rendergraph.declare import Node
+from rendergraph.errors import Problem
+
+SHADERS = (".frag", ".comp")
+"""Endings of shader files that are nodes by themselves: full-screen and compute."""
 
 
 @dataclass(frozen=True)
@@ -13,12 +17,13 @@ class NodeType:
     """One node type.
 
     Attributes:
-        name: the stem of its module, the word after `type:`.
+        name: the word after `type:`: the stem of its file, or the path of a shader file that is used by path.
         family: the folder it lies in (`shadows`), empty for a single file.
         cls: the class.
-        file: its Python file.
+        file: its Python file, or the shader file that it is made of.
         shaders: the folder its shaders' names are relative to.
-        plugin: the name of the entry point it came by.
+        plugin: the name of the entry point, or of the folder, it came by.
+        warnings: what is missing in a shader file and can be done without.
     """
 
     name: str
@@ -27,11 +32,17 @@ class NodeType:
     file: Path
     shaders: Path
     plugin: str = "builtin"
+    warnings: tuple[Problem, ...] = ()
+
+    @property
+    def is_shader(self) -> bool:
+        """Whether it is a shader file without Python."""
+        return self.file.suffix in SHADERS
 
 
 @dataclass(frozen=True)
 class Listed:
-    """A module that has been seen but not imported."""
+    """A module, or a shader file, that has been seen but not loaded; `module` is empty for a shader file."""
 
     module: str
     family: str

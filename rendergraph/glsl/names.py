@@ -72,7 +72,7 @@ def declared(text: str) -> list[Declared]:
     """All names a text declares at its top level, macros included, whatever `#if` they stand in."""
     macros = [Declared(match[1], "macro") for line in text.split("\n") if (match := _DEFINE.match(line))]
     found: list[Declared] = []
-    for statement, body in _statements(tokens(without_directives(text))):
+    for statement, body in statements(tokens(without_directives(text))):
         found += _of_statement(statement, body)
     return macros + [name for name in found if not name.name.startswith("gl_")]
 
@@ -82,7 +82,7 @@ def interface(text: str) -> Interface:
     result = Interface()
     tables: dict[str, dict[str, str]] = {"uniform": result.uniforms, "in": result.inputs, "out": result.outputs}
     blocks: dict[str, dict[str, tuple[str, ...]]] = {"uniform": result.blocks, "buffer": result.buffers}
-    for statement, body in _statements(tokens(without_directives(text))):
+    for statement, body in statements(tokens(without_directives(text))):
         storage, rest = _split(statement)
         if body is not None and storage in blocks and rest:
             blocks[storage][rest[0]] = tuple(_members(body))
@@ -118,7 +118,7 @@ def renamed(text: str, rename: Callable[[str], str]) -> str:
 # --- scanning --------------------------------------------------------------------------------------------------------
 
 
-def _statements(words: list[str]) -> Iterator[tuple[list[str], list[str] | None]]:
+def statements(words: list[str]) -> Iterator[tuple[list[str], list[str] | None]]:
     """Top-level statements, each with the tokens of its braces where it has any.
 
     The tokens after the braces of a block or struct (`} name;`) are appended to the statement after a `}`.
@@ -230,7 +230,7 @@ def _declarators(words: list[str]) -> list[str]:
 
 def _members(body: list[str]) -> list[str]:
     names: list[str] = []
-    for statement, _ in _statements(body):
+    for statement, _ in statements(body):
         _, rest = _split(statement)
         position = _after_brackets(rest, 1) if rest[1:2] == ["["] else 1
         names += _declarators(rest[position:])

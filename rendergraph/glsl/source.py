@@ -82,6 +82,7 @@ _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 _OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
 _CLOSES = re.compile(r"\s*#\s*endif\b")
 _FORBIDDEN = re.compile(r"\s*#\s*(version|line)\b")
+_VERSION = re.compile(r"\s*#\s*version\s+(?:3[3-9]0|4[0-6]0)(?:\s+(?:core|compatibility))?\s*\Z")
 
 
 class Includes:
@@ -97,9 +98,16 @@ class Includes:
         self._certain: set[tuple[Path, str]] = set()
         self._guards: dict[tuple[Path, str], str] = {}
         self._plugged: dict[str, Path] = {}
+        self._versions = False
 
     def expand(
-        self, source: Path, *, root: Path | None = None, prefix: str = "", plugged: Mapping[str, Path] | None = None
+        self,
+        source: Path,
+        *,
+        root: Path | None = None,
+        prefix: str = "",
+        plugged: Mapping[str, Path] | None = None,
+        versions: bool = False,
     ) -> SourceText:
         """The text of a file with all its includes.
 
@@ -109,6 +117,7 @@ class Includes:
             prefix: noted in the origins of every line that is not shared.
             plugged: parameters in capitals whose choice is a plugin's: `#include <SHADING>` is the file given here,
                 and nothing where none is.
+            versions: take a `#version` of 330 to 460 in the file itself, and leave its line empty.
 
         Raises:
             InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
@@ -118,6 +127,7 @@ class Includes:
         origins: list[Origin] = []
         self._certain.add((source.resolve(), prefix))
         self._plugged = dict(plugged or {})
+        self._versions = versions
         self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
         return SourceText(tuple(lines), tuple(origins))
 
@@ -125,10 +135,14 @@ class Includes:
         self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
         depth: list[int],
     ) -> None:  # fmt: skip
-        raw = _read(file)
+        raw = read_text(file)
         stack = [*stack, file.resolve()]
         for number, line in enumerate(strip_comments(raw).split("\n"), start=1):
             origin = replace(base, file=file, line=number)
+            if self._versions and len(stack) == 1 and _VERSION.match(line):
+                lines.append("")
+                origins.append(origin)
+                continue
             if _FORBIDDEN.match(line):
                 word = _FORBIDDEN.match(line)[1]  # type: ignore[index]  # it has just matched
                 raise _error("RG404", f"'#{word}' is written by rendergraph; take the line out", origin, raw)
@@ -215,7 +229,12 @@ def expand(source: Path, include_folder: Path, *, root: Path | None = None) -> S
     return Includes(include_folder).expand(source, root=root)
 
 
-def _read(file: Path) -> str:
+def read_text(file: Path) -> str:
+    """A shader's text, with `\n` at the end of lines.
+
+    Raises:
+        InputError: there is none, it is too large, or no UTF-8.
+    """
     look(file)
     if not file.is_file():
         known = {path.name for path in file.parent.glob("*") if path.is_file()} if file.parent.is_dir() else set()

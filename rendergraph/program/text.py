@@ -123,14 +123,15 @@ def _stage(
     root = include_folder if shared else types[step.node].shaders
     file = root / (shared[1] if shared else name)
     # What the file calls decides which functions stand before it, so it is read once with includes of its own.
-    called = Includes(include_folder).expand(file, root=root, plugged=dict(step.includes)).text
+    versions = not shared and types[step.node].is_shader
+    called = Includes(include_folder).expand(file, root=root, plugged=dict(step.includes), versions=versions).text
     functions = SourceText()
     for signature in wanted.values():
         if calls(called, signature.name):
             functions += _functions(stage, signature, step, types, resources, views, includes)
         if mentions(called, f"{signature.name.upper()}_LIGHT_COUNT"):
             functions += generated(_light_table(signature, step, types[step.node], resources))
-    source = includes.expand(file, root=root, plugged=dict(step.includes))
+    source = includes.expand(file, root=root, plugged=dict(step.includes), versions=versions)
     extensions, source = _hoisted(source)
     body = functions.text + source.text
     head = [VERSION, *extensions, *(f"#define {key} {value}".rstrip() for key, value in macros.items())]

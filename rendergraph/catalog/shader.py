@@ -1,0 +1,93 @@
+"""A shader file as a node type: a class made of its header and of what its text declares. No GL, no Python of anyone's.
+
+The class is like any author's: checking, schema, docs and expansion see no difference.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import create_model
+
+from rendergraph.catalog.entries import Entries
+from rendergraph.catalog.header import Header, read_header
+from rendergraph.catalog.threads import Record, compute, fullscreen
+from rendergraph.catalog.types import Listed, NodeType
+from rendergraph.declare import Extensions, Node, declaration_mistakes
+from rendergraph.errors import InputError, Problem, shown_file
+from rendergraph.glsl import Includes, SourceText
+from rendergraph.glsl.source import read_text
+from rendergraph.resources import folder
+from rendergraph.textures import SEMANTICS, SIGNATURES
+
+_KEPT = 256
+_MADE: dict[tuple[object, ...], _Made] = {}  # so that a file is one class in all pipelines, which then share its passes
+
+
+@dataclass(frozen=True)
+class _Made:
+    cls: type[Node]
+    warnings: tuple[Problem, ...]
+
+
+def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
+    """The node type of a shader file.
+
+    Args:
+        name: the type's name.
+        listed: the file.
+        extensions: for semantics that plugins add.
+
+    Raises:
+        InputError: the file cannot be read, or something in it can be no node's; with all mistakes.
+    """
+    file = listed.file
+    raw = read_text(file)
+    shown = shown_file(file)
+    header = read_header(raw, file, shown)
+    source = Includes(folder("rendergraph.shaders") / "include").expand(file, versions=True)
+    key = (file, shown, raw, source, tuple(semantic.value for semantic in _plugged(header, extensions)))
+    made = _MADE.get(key)
+    if made is None:
+        made = _make(file, shown, raw, header, source, extensions)
+        if len(_MADE) >= _KEPT:
+            _MADE.clear()
+        _MADE[key] = made
+    return NodeType(name, listed.family, made.cls, file, file.parent, listed.plugin, made.warnings)
+
+
+def _plugged(header: Header, extensions: Extensions) -> list[Any]:
+    """The plugins' semantics, where the header has a word of theirs: part of what the class is made of."""
+    entries = [*header.inputs.values(), *header.outputs.values()]
+    own = {known.name for known in (*SEMANTICS, *SIGNATURES)}
+    foreign = any("semantic" in entry and entry["semantic"].data not in own for entry in entries)
+    return list(extensions.semantics()) if foreign else []
+
+
+def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, extensions: Extensions) -> _Made:
+    entries = Entries(file, shown, raw, header, source, extensions)
+    entries.collect()
+    if entries.problems:
+        raise InputError(entries.problems)
+    record: Record = compute(entries) if file.suffix == ".comp" else fullscreen(entries)
+    if entries.problems:
+        raise InputError(entries.problems)
+    doc = header.doc or f"The shader {file.name}."
+    words = "".join(part.capitalize() for part in file.stem.replace("-", "_").split("_")) or "Shader"
+    parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record, **entries.ports}
+    base = type(Node)(words, (Node,), parts)
+    cls: type[Node] = create_model(words, __base__=base, __module__=__name__, __doc__=doc, **entries.fields)
+    mistakes = [mistake for mistake in declaration_mistakes(cls) if not _is_forgiven(mistake)]
+    if mistakes:
+        problems = [Problem("RG490", f"shader '{file.name}': {text}", entries.place_of(text)) for text in mistakes]
+        raise InputError(problems)
+    return _Made(cls, tuple(entries.warnings()))
+
+
+def _is_forgiven(mistake: str) -> bool:
+    """What only a warning says of a shader file: docs, and names with capitals, which other tools' shaders have."""
+    odd = re.match(r"'([A-Za-z]\w*)' is not a lower-case GLSL identifier\Z", mistake, re.ASCII)
+    return mistake.endswith("has no doc") or (odd is not None and "__" not in odd[1] and not odd[1].startswith("gl_"))
