@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.cli.describe import describe, example, summary
+from rendergraph.cli.describe import describe, summary
+from rendergraph.cli.describe import example as placeholder
+from rendergraph.example import example
 
 from .markdown import block, code, folded, listing, page, prose, table
-from .pictures import Studio, uses
+from .pictures import Studio, View, example_and_base, exhibit
 
 STEPS = {"param": "uniform", "define": "compiled in", "structural": "plan"}
 
@@ -76,7 +78,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         f"*{found.family}* — {prose(first)}",
         prose(rest.strip()),
         _pictures(found, node["outputs"], studio),
-        f"## In a file\n\n{block(example(node), 'yaml')}",
+        f"## In a file\n\n{block(example(found, Catalog.discover()) or placeholder(node), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
         f"## Outputs\n\n{outputs}",
         f"## Parameters\n\n{parameters}" if parameters else "",
@@ -86,21 +88,33 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
 
 
 def _pictures(found: NodeType, outputs: list[dict[str, Any]], studio: Studio) -> str:
-    """What the outputs hold, each in the first shipped pipeline that can show it."""
-    figures, names = [], []
+    """What its textures hold, and before it what they were made of; without textures, what its readers make of it."""
+    figures = []
     for port in outputs:
-        example_of = None if port["kind"] in ("view", "function", "buffer", "scene") else uses(found, port["name"])
-        if example_of is None:
-            continue
-        pipeline, tap = example_of
-        file = studio.draw(pipeline, f"nodes/{found.name}-{port['name']}.png", tap)
-        if file:
-            figures.append(f"```{{figure}} {Path(file).name}\n:alt: {tap} of {pipeline.name}\n\n`{tap}`\n```")
-            names.append(f"`{pipeline.name}`")
+        textures = port["kind"] not in ("view", "function", "buffer", "scene")
+        if textures and (shown := exhibit(found, port["name"])):
+            figures += _pair(studio, f"{found.name}-{port['name']}", *shown)
     if not figures:
+        for pipeline, base in example_and_base(found):
+            figures += _pair(studio, f"{found.name}-image", View(pipeline, None), View(base, None))
+    return ":::{container} pictures\n" + "\n\n".join(figures) + "\n:::" if figures else ""
+
+
+def _pair(studio: Studio, stem: str, after: View, before: View | None) -> list[str]:
+    """Two figures of one scene, or one; none where there is nothing to see."""
+    for scene in studio.scenes(after, before):
+        figure = _figure(studio, after, stem, scene)
+        if figure:
+            return ([_figure(studio, before, f"{stem}-before", scene)] if before else []) + [figure]
+    return []
+
+
+def _figure(studio: Studio, view: View, name: str, scene: str) -> str:
+    if studio.draw(view.pipeline.with_scene(scene), f"nodes/{name}.png", view.tap) is None:
         return ""
-    where = " and ".join(dict.fromkeys(names))
-    return ":::{container} pictures\n" + "\n\n".join(figures) + f"\n:::\n\nAs {where} makes it of `shadow_study`."
+    where = "the file below" if view.pipeline.patches else f"`{view.pipeline.name}`"
+    caption = f"{'before: ' if name.endswith('-before') else ''}`{view.name}` of {where}, scene `{scene}`"
+    return f"```{{figure}} {name}.png\n:alt: {caption.replace('`', '')}\n\n{caption}\n```"
 
 
 def _meaning(port: dict[str, Any]) -> str:

@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
+import yaml
 
 import rendergraph as rg
+from rendergraph.catalog import Catalog
 from rendergraph.errors import DeviceError, InputError
+from rendergraph.example import example
+from rendergraph.link.graph import Endpoint
 
 if TYPE_CHECKING:
     from rendergraph.catalog import NodeType
+    from rendergraph.link.graph import GraphNode
 
 SIZE = (480, 270)
+SMALL = (96, 54)
+
+
+@dataclass(frozen=True)
+class View:
+    """One thing to look at: a port of a pipeline, or where `tap` is None its image."""
+
+    pipeline: rg.Pipeline
+    tap: str | None
+
+    @property
+    def name(self) -> str:
+        """What the frame calls it."""
+        return self.tap or "image"
 
 
 class Studio:
@@ -39,6 +60,22 @@ class Studio:
     ) -> None:
         if self._session is not None:
             self._session.close()
+
+    def scenes(self, after: View, before: View | None) -> list[str]:
+        """Scenes to try, the best first: that in which a node changes most of what it leaves."""
+        if self._session is None or before is None:
+            return list(SCENES)
+        found = {}
+        for scene in SCENES:
+            plain, shown = self._values(before, scene), self._values(after, scene)
+            found[scene] = float(np.minimum(np.abs(shown - plain), np.abs(shown)).mean() / max(plain.mean(), 1e-6))
+        return sorted(SCENES, key=lambda scene: -found[scene])
+
+    def _values(self, view: View, scene: str) -> npt.NDArray[np.float64]:
+        assert self._session is not None
+        pipeline = view.pipeline.with_scene(scene).with_size(SMALL)
+        outputs, taps = ([], [view.tap]) if view.tap else (["image"], [])
+        return self._session.render(pipeline, outputs=outputs, taps=taps, warm_up=False)[view.name].astype(np.float64)
 
     def draw(self, pipeline: rg.Pipeline, file: str, tap: str | None = None) -> str | None:
         """The image output of a pipeline, or one port of it.
@@ -75,24 +112,51 @@ def shipped(scenes: bool = False) -> list[Path]:
     return sorted(files, key=lambda file: "\nextends:" in file.read_text(encoding="utf-8"))
 
 
+SCENES = ("shadow_study", "cornell_box", "many_lights")
+"""Scenes for the pictures of nodes; the first one unless another shows more."""
+
+
+def exhibit(found: NodeType, port: str) -> tuple[View, View | None] | None:
+    """An output in the smallest pipeline that can show it, a shipped one or the example, and what it is made of.
+
+    The second is the texture that the output is a changed version of, where there is one.
+    """
+    needs = getattr(found.cls.outputs()[port], "needs", ())
+    for pipeline in [*_studies(), *(pipeline for pipeline, _ in example_and_base(found))]:
+        for node in pipeline.graph.nodes:
+            if node.type.name == found.name and all(name in node.inputs for name in needs):
+                tap, before = f"{node.id}.{port}", _changed(pipeline, node, port)
+                try:
+                    pipeline.plan(outputs=[], taps=[tap])
+                except InputError:
+                    continue
+                return View(pipeline, tap), View(pipeline, before) if before else None
+    return None
+
+
+def example_and_base(found: NodeType) -> list[tuple[rg.Pipeline, rg.Pipeline]]:
+    """The example on a type's page, and the shipped pipeline that it is a patch on; one such pair or none."""
+    text = example(found, Catalog.discover())
+    patch = yaml.safe_load(text) if text else {}
+    if "extends" not in patch:
+        return []
+    base = rg.load(patch.pop("extends")).with_scene(SCENES[0])
+    return [(base.patch(patch), base)]
+
+
 @cache
 def _studies() -> list[rg.Pipeline]:
     """Every shipped pipeline with a scene that shows something, the smallest first."""
-    pipelines = [rg.load(file.stem).with_scene("shadow_study") for file in shipped()]
+    pipelines = [rg.load(file.stem).with_scene(SCENES[0]) for file in shipped()]
     return sorted(pipelines, key=lambda pipeline: len(pipeline.graph.nodes))
 
 
-def uses(found: NodeType, port: str) -> tuple[rg.Pipeline, str] | None:
-    """The smallest shipped pipeline that can show a port of a node type, and where the port is in it."""
-    needs = getattr(found.cls.outputs()[port], "needs", ())
-    for pipeline in _studies():
-        for node in pipeline.graph.nodes:
-            if node.type.name != found.name or not all(name in node.inputs for name in needs):
-                continue
-            tap = f"{node.id}.{port}"
-            try:
-                pipeline.plan(outputs=[], taps=[tap])
-            except InputError:
-                continue
-            return pipeline, tap
+def _changed(pipeline: rg.Pipeline, node: GraphNode, port: str) -> str | None:
+    """The texture that an output is a changed version of: one of the same meaning, kind and size."""
+    textures = pipeline.graph.textures
+    made = textures.get(Endpoint(node.id, port))
+    for ends in node.inputs.values():
+        read = textures.get(ends[0])
+        if made and read and read.desc and made.semantic == read.semantic and made.desc == read.desc:
+            return str(ends[0])
     return None
