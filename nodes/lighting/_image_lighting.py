@@ -4,29 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from rendergraph.api import (
-    Albedo,
-    Depth,
-    Emissive,
-    Input,
-    Material,
-    Normal,
-    Occlusion,
-    Port,
-    ShadowLookup,
-    Steps,
-    Visibility,
-    param,
-)  # fmt: skip
+from rendergraph.api import Albedo, Depth, Emissive, Input, Material, Normal, Port, Steps, param
 from rendergraph.api import Any as AnyTexel
 
-from ._lighting import Color, Lighting
+from ._lighting import Color, SurfaceLighting
 
 
-class ImageLighting(Lighting):
-    """Base of the nodes that light a G-buffer: its textures as one group of inputs, and the shadows.
+class ImageLighting(SurfaceLighting):
+    """Base of the nodes that light a G-buffer: its textures as one group of inputs.
 
-    What the shading model has no use for is not read, and so not drawn.
+    What the shading model has no use for is not read, and so not drawn. A G-buffer does not hold surfaces with alpha
+    blending: they are drawn as `forward_lighting` draws them, over the picture and tested against its depth.
     """
 
     depth = Input(Depth, group="gbuffer", doc="Window depth; positions come from it and its view.")
@@ -39,11 +27,6 @@ class ImageLighting(Lighting):
     phong_diffuse = Input(AnyTexel, group="gbuffer", optional=True, doc="kd of the empirical models; else derived.")
     phong_specular = Input(AnyTexel, group="gbuffer", optional=True, doc="ks of the empirical models; else derived.")
     phong_ambient = Input(AnyTexel, group="gbuffer", optional=True, doc="ka of the empirical models; else derived.")
-    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
-    visibility = Input(
-        Visibility, kind="texture2d_array", many=True, optional=True, doc="Shadows in screen space, one layer a light."
-    )
-    occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
 
     background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance where nothing is, a number or RGB.")
 
@@ -66,6 +49,13 @@ class ImageLighting(Lighting):
     def ambient_light(self, steps: Steps) -> dict[str, Any]:
         """What scales ambient light."""
         return _connected(steps, [self.occlusion] if self.terms in ("all", "ambient") else [])
+
+    def blend_over(self, steps: Steps, radiance: Port) -> None:
+        """Surfaces with alpha blending, over the lit picture and seen as it is."""
+        if self.blended:
+            self.blend(
+                steps, {"radiance": radiance}, self.shadows_on_blended(steps), self.depth.tested(), view=self.depth
+            )
 
 
 def _connected(steps: Steps, ports: list[Port]) -> dict[str, Any]:

@@ -11,7 +11,8 @@ class DeferredLighting(ImageLighting):
     """Radiance of a G-buffer's surfaces under all lights of the scene, in one full-screen pass.
 
     Each pixel is shaded once, whatever the geometry behind it: the cost is that of the geometry plus pixels times
-    lights. The picture is `forward_lighting`'s, but for surfaces with alpha blending, which a G-buffer does not hold.
+    lights. Surfaces with alpha blending, which a G-buffer does not hold, are drawn over that, back to front. The
+    picture is `forward_lighting`'s.
     """
 
     radiance = Output(
@@ -19,6 +20,7 @@ class DeferredLighting(ImageLighting):
     )
 
     def record(self, steps: Steps) -> None:
-        """One step, which reads what the shading model and the wanted terms need."""
+        """A step that reads what the shading model and the wanted terms need, and one over what is blended."""
         reads = {**self.surface(steps), **self.shadows(steps), **self.ambient_light(steps)}
         steps.fullscreen("deferred_lighting.frag", out=self.radiance, **reads)
+        self.blend_over(steps, self.radiance)

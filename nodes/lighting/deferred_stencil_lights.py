@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rendergraph.api import ADD, Depth, Internal, Output, Radiance, State, Stencil, StencilFace, Steps
 
 from ._image_lighting import ImageLighting
@@ -27,13 +29,16 @@ class DeferredStencilLights(ImageLighting):
     marks = Internal(Depth, format="depth32f_stencil8", clear=1.0)
 
     def record(self, steps: Steps) -> None:
-        """A pass for all that has no volume, then two draws a local light."""
+        """A pass for all that has no volume, two draws a local light, and what is blended."""
         surface, shadows = self.surface(steps), self.shadows(steps)
         reads = {**surface, **shadows, **self.ambient_light(steps)}
         steps.fullscreen("deferred_lighting.frag", out=self.radiance, defines={"DIRECTIONALS_ONLY": 1}, **reads)
         local = [number for number, light in enumerate(steps.lights) if light.type != "directional"]
-        if not local or not self.wants_lights:
-            return
+        if local and self.wants_lights:
+            self._add_lights(steps, local, surface, shadows)
+        self.blend_over(steps, self.radiance)
+
+    def _add_lights(self, steps: Steps, local: list[int], surface: dict[str, Any], shadows: dict[str, Any]) -> None:
         # The stencil needs a depth of its own: a texture must not be attached and sampled at once.
         copied = State(depth_test=True, depth_func="always")
         steps.fullscreen("copy_depth.frag", out=self.marks, state=copied, depth=self.depth)

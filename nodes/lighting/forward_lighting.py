@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from rendergraph.api import (
-    PREMULTIPLIED,
-    Depth,
-    Output,
-    Port,
-    Radiance,
-    State,
-    Steps,
-    define,
-)  # fmt: skip
+from rendergraph.api import Depth, Output, Port, Radiance, State, Steps, define
 
 from ._lighting import GeometryLighting
 
@@ -22,8 +13,9 @@ class ForwardLighting(GeometryLighting):
     """Radiance of the scene under all its lights, in one pass over the geometry.
 
     Opaque surfaces first, front to back, then those with alpha blending, back to front. Shadows come as functions
-    looked up in place (`lookup`) or as pictures (`visibility`); all that are connected are multiplied. With `depth` of
-    a pre-pass no hidden fragment is shaded.
+    looked up in place (`lookup`) or as pictures (`visibility`); all that are connected are multiplied. Pictures show
+    the opaque surfaces alone: those with alpha blending take functions only. With `depth` of a pre-pass no hidden
+    fragment is shaded.
 
     `evaluate` says how often light is computed: at every fragment (Phong 1975), at every vertex with colours
     interpolated (Gouraud 1971), or once a face with the face's normal (flat). Textures and shadows stay per fragment.
@@ -54,9 +46,8 @@ class ForwardLighting(GeometryLighting):
             # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
             nearer = (0.0, -8.0)
         steps.geometry(
-            fragment, vertex=vertex, geometry=geometry, out=out, objects="opaque", state=State(polygon_offset=nearer)
-        )
-        steps.geometry(
-            fragment, vertex=vertex, geometry=geometry, out=out, objects="transparent", order="back_to_front",
-            state=State(blend=PREMULTIPLIED, depth_write=False),
+            fragment, vertex=vertex, geometry=geometry, out=out, objects="opaque", state=State(polygon_offset=nearer),
+            **self.opaque_reads(steps),
         )  # fmt: skip
+        blended = "forward_transparent.frag" if self.evaluate == "fragment" else fragment
+        self.blend_after(steps, out, fragment=blended, vertex=vertex, geometry=geometry)

@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import (
-    ADD,
-    PREMULTIPLIED,
-    Depth,
-    Output,
-    Port,
-    Radiance,
-    State,
-    Steps,
-)  # fmt: skip
+from rendergraph.api import ADD, Depth, Output, Port, Radiance, State, Steps
 
 from ._lighting import GeometryLighting
 
@@ -37,11 +28,11 @@ class ForwardMultipass(GeometryLighting):
         out: dict[str, Port] = {"radiance": self.radiance}
         if not steps.connected(self.depth):
             out["surface_depth"] = self.surface_depth
-        steps.geometry("forward_multipass.frag", out=out, objects="opaque", defines={"FIRST_PASS": 1})
+        reads = self.opaque_reads(steps)
+        steps.geometry("forward_multipass.frag", out=out, objects="opaque", defines={"FIRST_PASS": 1}, **reads)
         added = State(blend=ADD, depth_func="equal", depth_write=False)
         for light in range(len(steps.lights) if self.wants_lights else 0):
             steps.geometry(
-                "forward_multipass.frag", out=out, objects="opaque", state=added, per_light=light, light=light
+                "forward_multipass.frag", out=out, objects="opaque", state=added, per_light=light, light=light, **reads
             )
-        blended = State(blend=PREMULTIPLIED, depth_write=False)
-        steps.geometry("forward_lighting.frag", out=out, objects="transparent", order="back_to_front", state=blended)
+        self.blend_after(steps, out)

@@ -78,7 +78,7 @@ def merge(graphs: Sequence[Graph]) -> Merged:
         for name, end in graph.outputs.items()
     }
     first = graphs[0]
-    merged = Graph(first.name, _dag(nodes), outputs, first.size, first.lights, textures)
+    merged = Graph(first.name, _dag(nodes), outputs, first.size, first.lights, textures, unfilled=first.unfilled)
     return Merged(merged, names)
 
 

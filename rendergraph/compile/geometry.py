@@ -6,7 +6,7 @@ must be told apart depends on what the step's shader looks at: a depth pass puts
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -21,7 +21,8 @@ from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import CAMERA
-from rendergraph.scene.model import Material, Mesh, Object, Texture
+from rendergraph.scene.model import Material, Mesh, Scene, Texture
+from rendergraph.scene.selection import selected
 from rendergraph.steps import Step, ViewMatrices
 
 COMMAND = np.dtype(
@@ -82,7 +83,7 @@ class GeometryCompiler:
             step: a geometry step.
             make: compiles a batch's program.
         """
-        objects = select(self.scene.scene.objects, self.scene.scene.materials, step)
+        objects = select(self.scene.scene, step)
         if not objects:
             return []
         if step.order == "front_to_back":
@@ -180,28 +181,20 @@ class GeometryCompiler:
         return BatchKey(tuple(defines.items()), tuple(found.items()), cull, mirrored)
 
 
-def select(objects: Iterable[Object], materials: tuple[Material, ...], step: Step) -> list[int]:
+def select(scene: Scene, step: Step) -> list[int]:
     """The objects a step draws, in the scene's order.
 
     Raises:
         InputError: a name that no object has.
     """
-    placed = list(objects)
-    if isinstance(step.objects, tuple):
-        names = {p.name: number for number, p in enumerate(placed)}
-        missing = [name for name in step.objects if name not in names]
-        if missing:
-            text = f"node '{step.node}' draws object '{missing[0]}', which the scene does not have"
-            raise InputError(Problem("RG431", text))
-        return [names[name] for name in step.objects]
-    tests: dict[str, Callable[[Object], bool]] = {
-        "all": lambda p: True,
-        "opaque": lambda p: materials[p.material].alpha_mode != "blend",
-        "transparent": lambda p: materials[p.material].alpha_mode == "blend",
-        "casters": lambda p: p.casts_shadow and materials[p.material].alpha_mode != "blend",
-    }
-    test = tests[step.objects]
-    return [number for number, p in enumerate(placed) if not p.hidden and test(p)]
+    if isinstance(step.objects, str):
+        return selected(scene, step.objects)
+    names = {placed.name: number for number, placed in enumerate(scene.objects)}
+    missing = [name for name in step.objects if name not in names]
+    if missing:
+        text = f"node '{step.node}' draws object '{missing[0]}', which the scene does not have"
+        raise InputError(Problem("RG431", text))
+    return [names[name] for name in step.objects]
 
 
 def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str], dict[str, Texture]]:

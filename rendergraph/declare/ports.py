@@ -43,6 +43,10 @@ class Port:
         """The whole texture, read with this sampler; inputs have theirs declared."""
         return Part(self, sampler=Sampler(filter, wrap, compare))
 
+    def tested(self) -> Part:
+        """The texture attached read-only for the depth test, of an input that other steps sample."""
+        return Part(self, use="depth_test")
+
 
 @dataclass(frozen=True)
 class Part:
@@ -53,6 +57,7 @@ class Part:
     layer: int | None = None
     previous: bool = False
     sampler: Sampler | None = None
+    use: Literal["depth_test"] | None = None
 
     def at_mip(self, level: int) -> Part:
         """The same layer's level."""

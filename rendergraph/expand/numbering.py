@@ -121,7 +121,7 @@ class Numbering:
             if isinstance(port, Function):
                 functions += self._own_function(recorder, port)
             elif isinstance(port, Input) and port.kind == "function":
-                functions += [f for end in recorder.links[port.name] for f in self._function(end)]
+                functions += [f for end in recorder.links.get(port.name, ()) for f in self._function(end)]
             elif not (isinstance(port, Input) and port.kind in ("view", "scene")):
                 reads += self._reads(recorder, name, target if isinstance(target, Part) else Part(port))
         writes: list[Write] = []
@@ -174,7 +174,7 @@ class Numbering:
             ends = recorder.links.get(port.name, ())
             sampler = part.sampler or Sampler(filter_of(recorder.node, port), port.wrap, port.compare, port.anisotropy)
             return [
-                self._read(f"{name}_{number}" if port.many else name, end, part, sampler, port.use)
+                self._read(f"{name}_{number}" if port.many else name, end, part, sampler, part.use or port.use)
                 for number, end in enumerate(ends)
             ]
         own = Endpoint(recorder.node.id, port.name, part.previous)
@@ -282,6 +282,8 @@ class Numbering:
             return table, index
         name = port.name if isinstance(port, Input) else "view"
         ends = recorder.links.get(name, ())
+        if isinstance(port, Input) and port.kind != "view":
+            return (self.graph.textures[now(ends[0])].view if ends else None) or CAMERA, index
         return (str(ends[0]) if ends else CAMERA), index
 
     def _carry_view(self, writes: Iterable[Write], view: str | None) -> None:

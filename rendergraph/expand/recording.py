@@ -19,6 +19,7 @@ class Recorder:
 
     Attributes:
         requests: what the node asked for, in order.
+        unfilled: what it asked to draw and the scene has nothing of; left out where that changes nothing.
         links: connected inputs whose textures have layers.
         facts: what the node may ask.
     """
@@ -28,6 +29,7 @@ class Recorder:
         self.node = node
         self.used_ports = used
         self.requests: list[Request] = []
+        self.unfilled: list[str] = []
         self.links = {
             name: tuple(end for end in ends if not is_empty(graph.textures.get(now(end))))
             for name, ends in node.inputs.items()
@@ -62,8 +64,18 @@ class Recorder:
         return choice.needs if choice is not None else ()
 
     def add(self, request: Request) -> None:
-        """Keep a request."""
+        """Keep a request, unless it would draw nothing onto what is there already."""
+        objects = request.options.get("objects")
+        if request.kind == "geometry" and objects in self.graph.unfilled:
+            begun = {part for earlier in self.requests for _, part in earlier.out}
+            if all(part in begun or self.continues(part.port) for _, part in request.out):
+                self.unfilled.append(objects)
+                return
         self.requests.append(request)
+
+    def continues(self, port: Port) -> bool:
+        """Whether a port goes on with a texture of somebody else's."""
+        return isinstance(port, InOut) and bool(self.links.get(port.name))
 
     def reads_of(self, request: Request) -> Iterator[tuple[str, Port | Part]]:
         """Names and ports a request reads, with the default inputs filled in."""
@@ -156,9 +168,7 @@ def _recorded(
         reason = _nothing_to_do(graph, node, used)
         if reason:
             idle[name] = reason
-            for port in used:  # what it would continue is passed on as it is
-                for end in node.inputs.get(port, ()):
-                    demanded[end.node].add(end.port)
+            _pass_on(node, used, demanded)
             continue
         recorder = Recorder(graph, node, used)
         steps = Steps(node.node, name, node.type.name, recorder)
@@ -168,10 +178,22 @@ def _recorded(
             raise
         except (Exception, SystemExit) as error:  # whatever a stranger's node raises is a mistake in that node
             raise InputError(author_problem(node, error)) from error
+        ports = node.node.ports()
+        if recorder.unfilled and not recorder.requests and all(recorder.continues(ports[port]) for port in used):
+            idle[name] = f"the scene has no {recorder.unfilled[0]} objects: there is nothing to draw"
+            _pass_on(node, used, demanded)
+            continue
         recorders[name] = recorder
         for end in recorder.demands():
             demanded[end.node].add(end.port)
     return {name: recorders[name] for name in order if name in recorders}, idle
+
+
+def _pass_on(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:
+    """What an idle node would continue is demanded as it is."""
+    for port in used:
+        for end in node.inputs.get(port, ()):
+            demanded[end.node].add(end.port)
 
 
 def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rendergraph.catalog import Catalog, NodeType
@@ -23,18 +24,21 @@ if TYPE_CHECKING:
     import networkx as nx
 
 
-def link(spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = ()) -> Graph:
+def link(
+    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), unfilled: Collection[str] = ()
+) -> Graph:
     """A checked graph.
 
     Args:
         spec: the resolved pipeline.
         catalog: the node types.
         lights: the scene's lights in its order; sizes and layers may depend on them.
+        unfilled: what geometry steps may ask to draw and the scene has nothing of.
 
     Raises:
         InputError: something is wrong, here or already in `spec.problems`; with all mistakes.
     """
-    return _Linker(spec, catalog, lights).graph()
+    return replace(_Linker(spec, catalog, lights).graph(), unfilled=frozenset(unfilled))
 
 
 def endpoint(graph: Graph, text: str) -> Endpoint:

@@ -63,6 +63,7 @@ class Graph:
             `Endpoint(node, port)`; an `InOut` shares its source's.
         warnings: what was noticed and is no error.
         aliases: the outputs of sub-pipelines, `glow.radiance`, and the ports inside that they stand for.
+        unfilled: what geometry steps may ask to draw and the scene has nothing of: `transparent`, `casters`, ….
     """
 
     name: str
@@ -73,6 +74,7 @@ class Graph:
     textures: Mapping[Endpoint, TextureInfo] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
     aliases: Mapping[str, Endpoint] = field(default_factory=dict)
+    unfilled: frozenset[str] = frozenset()
 
     def __getitem__(self, node: str) -> GraphNode:
         found: GraphNode = self.dag.nodes[node]["node"]

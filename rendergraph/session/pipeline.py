@@ -196,8 +196,9 @@ class Pipeline:
         """
         from rendergraph.link import link
         from rendergraph.scene.cameras import light_facts
+        from rendergraph.scene.selection import unfilled_selections
 
-        return link(self.spec, self.catalog, light_facts(self.scene))
+        return link(self.spec, self.catalog, light_facts(self.scene), unfilled_selections(self.scene))
 
     @property
     def warnings(self) -> tuple[Problem, ...]:

@@ -112,8 +112,7 @@ class Step:
         samples: samples of the target.
         view: id of the view table a geometry step is drawn with.
         view_index: which view of it; None where the shader chooses by `gl_Layer`.
-        objects: which objects a geometry step draws: `all`, `opaque`, `masked_or_opaque`, `transparent`, `casters`, or
-            names.
+        objects: which objects a geometry step draws: `all`, `opaque`, `transparent`, `casters`, or names.
         materials: what of the material its shader looks at: `full`, `alpha` (only what an alpha mask needs) or `none`.
         order: `front_to_back` (free to regroup), `back_to_front` or `scene` (kept as given).
         per_light: a light's index where the step draws for one light alone.

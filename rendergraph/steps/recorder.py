@@ -154,7 +154,8 @@ class Steps:
             fragment: fragment shader, None for depth alone.
             vertex, geometry: other stages; the default vertex shader transforms by object and view.
             out, state, defines, bindings: see the class.
-            view: a `Views` port or a `view` input; the node's connected `view` input, else the pipeline's camera.
+            view: a `Views` port, a `view` input or a texture that carries one; the node's connected `view` input, else
+                the pipeline's camera.
             view_index: which view of it, None where a geometry shader sets `gl_Layer`.
             objects: `all`, `opaque`, `transparent`, `casters`, or object names.
             materials: what of the material the shader looks at.

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from rendergraph.api import ALPHA, Depth, Node, Output, Radiance, State, Steps, structural
+from rendergraph.api import (
+    ALPHA,
+    Depth,
+    InOut,
+    Input,
+    Node,
+    Output,
+    Radiance,
+    State,
+    Steps,
+    Views,
+    structural,
+)  # fmt: skip
+from rendergraph.api import Frame as FrameOfNode
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
@@ -70,6 +84,75 @@ def test_an_object_that_the_scene_lacks_is_named(draw: Draw) -> None:
     text = "nodes: {i: {type: ids, params: {objects: [nobody]}}}\noutputs: {image: i.color}"
     with pytest.raises(InputError, match="node 'i' draws object 'nobody', which the scene does not have"):
         draw(text, Ids, shaders=SHADERS, scene=BOXES)
+
+
+class Over(Node):
+    """Draws objects onto a picture that somebody else made."""
+
+    picture = InOut(Radiance, format="r32f", optional=True, clear=7.0, doc="The picture.")
+    objects: str = structural(default="transparent", doc="Which.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry("over.frag", objects=self.objects, materials="none")
+
+
+OVER = SHADERS | {"over.frag": "flat in int v_object; out float picture; void main() { picture = 100.0 + v_object; }"}
+OPAQUE = BOXES.replace("alpha_mode: blend", "roughness: 1")
+
+
+def test_what_would_draw_nothing_onto_a_picture_is_left_out_and_said(draw: Draw) -> None:
+    text = "nodes: {i: {type: ids}, o: {type: over, inputs: {picture: i.color}}}\noutputs: {image: o.picture}"
+    frame = draw(text, Ids, Over, shaders=OVER, scene=OPAQUE, size=(16, 16))
+    assert set(np.unique(frame["image"])) == {1, 2, 3}
+    assert frame.culled == {"o": "the scene has no transparent objects: there is nothing to draw"}
+    assert set(np.unique(draw(text, Ids, Over, shaders=OVER, scene=BOXES, size=(16, 16))["image"])) == {1, 2, 102}
+
+
+def test_what_begins_a_picture_is_drawn_even_if_empty(draw: Draw) -> None:
+    """Somebody must fill it with what it first holds."""
+    text = "nodes: {o: {type: over}}\noutputs: {image: o.picture}"
+    assert np.all(draw(text, Over, shaders=OVER, scene=OPAQUE, size=(16, 16))["image"] == 7.0)
+
+
+class Behind(Node):
+    """Draws objects where they are nearer than a depth that another of its steps samples, seen as that was."""
+
+    depth = Input(Depth, doc="Depth.")
+    color = Output(Radiance, format="r32f", doc="Object; the depth where none is.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("shown.frag", out=self.color, depth=self.depth)
+        steps.geometry(
+            "ids.frag", out=self.color, objects="all", materials="none", depth=self.depth.tested(), view=self.depth,
+            state=State(depth_write=False, depth_func="less"),
+        )  # fmt: skip
+
+
+class Turned(Node):
+    """Depth of one object, seen from the other side."""
+
+    views = Views(doc="From behind.")
+    depth = Output(Depth, format="depth32f", clear=1.0, view="views", doc="Depth.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(None, out=self.depth, objects=("left",), materials="none", view=self.views)
+
+    def update(self, frame: FrameOfNode) -> None:
+        turn = np.diag([-1.0, 1.0, -1.0, 1.0])
+        turn[2, 3] = -5.0
+        frame.set_views(self.views, [replace(frame.camera, view=turn)])
+
+
+def test_a_depth_is_tested_that_another_step_samples_and_brings_its_view(draw: Draw) -> None:
+    """Seen from behind, `left` is on the right and hides what is before it; where nothing was, all objects show."""
+    text = "nodes: {t: {type: turned}, b: {type: behind, inputs: {depth: t.depth}}}\noutputs: {image: b.color}"
+    shaders = SHADERS | {
+        "shown.frag": "uniform sampler2D depth; out float color; "
+        "void main() { color = -texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r; }"
+    }
+    image = draw(text, Turned, Behind, shaders=shaders, scene=BOXES, size=(16, 16))["image"][..., 0]
+    assert np.all(image[:, :8] == 2)
+    assert np.all((image[:, 8:] < 0) & (image[:, 8:] > -1))
 
 
 def _triangles(folder: Path, **material: Any) -> None:
