@@ -22,9 +22,9 @@ def emit(text: str) -> None:
         sys.stdout.write(_printable(text, sys.stdout) + "\n")
 
 
-def emit_json(document: Any) -> None:
-    """One JSON document to stdout; infinite and undefined numbers become null."""
-    emit(json.dumps(_plain(document), indent=2, ensure_ascii=False, default=str))
+def emit_json(document: Any, *, line: bool = False) -> None:
+    """One JSON document to stdout, in one line if asked; infinite and undefined numbers become null."""
+    emit(json.dumps(_plain(document), indent=None if line else 2, ensure_ascii=False, default=str))
 
 
 def say(text: str) -> None:
@@ -40,12 +40,31 @@ def warn(problems: Sequence[Problem]) -> None:
         say(text)
 
 
+class Warnings:
+    """Says each warning once, however often it comes up."""
+
+    def __init__(self) -> None:
+        self._said: set[str] = set()
+
+    def say(self, problems: Sequence[Problem]) -> None:
+        """Those that have not been said."""
+        for text in dict.fromkeys(str(problem) for problem in problems):
+            if text not in self._said:
+                say(text)
+        self._said.update(str(problem) for problem in problems)
+
+
 def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:
     """What stopped us: in words on stderr, and as the document of `--json` on stdout."""
     for problem in problems:
         say(str(problem))
     if as_json:
-        emit_json({"error": {"exit_code": exit_code, "problems": [problem.as_json() for problem in problems]}})
+        emit_json({"error": error_document(problems, exit_code)})
+
+
+def error_document(problems: Sequence[Problem], exit_code: int) -> dict[str, Any]:
+    """What `--json` prints under `error`."""
+    return {"exit_code": exit_code, "problems": [problem.as_json() for problem in problems]}
 
 
 class Progress:

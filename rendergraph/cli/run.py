@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
 from rendergraph.cli.options import Target
-from rendergraph.cli.output import Progress, emit, emit_json, say, warn
+from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say
 from rendergraph.cli.words import click
 from rendergraph.errors import Problem, UsageError
+
+if TYPE_CHECKING:
+    import rendergraph as rg
 
 
 @click.command("run", no_args_is_help=True)
@@ -23,6 +27,7 @@ from rendergraph.errors import Problem, UsageError
 @click.option("--tap", "taps", multiple=True, type=options.TAP, help="Write any port's texture to a file.")
 @options.json_option
 @options.device_option
+@click.option("--watch", is_flag=True, help="Stay, and render again whenever a file that went into it changes.")
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
 @click.option("--poison", is_flag=True, help="Overwrite textures that are dead, to show who still reads them.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
@@ -33,6 +38,7 @@ def command(
     taps: tuple[Target, ...],
     as_json: bool,
     device: int | None,
+    watch: bool,
     no_alias: bool,
     poison: bool,
     shuffle: int | None,
@@ -49,11 +55,38 @@ def command(
       rendergraph run forward --scene spheres --size 640x360 -o spheres.exr --json
       rendergraph run forward -s light.ambient=0 -o image=dark.jpg --tap sun.shadow_map=depth.exr
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
+      rendergraph run my.yaml --watch
     """
+    numbers = frames or range(1, 2)
+    modes = {"alias": not no_alias, "poison": poison, "shuffle": shuffle, "fps": fps, "device": device}
+    draw = partial(_draw, selection, numbers, outputs, taps, modes, quiet=as_json)
+    if watch:
+        from rendergraph.cli.watching import keep_drawing
+
+        keep_drawing(draw, selection, device, as_json=as_json)
+        return
+    report = draw(Warnings())
+    say_summary(report)
+    if as_json:
+        emit_json(report)
+
+
+def _draw(
+    selection: dict[str, Any],
+    numbers: range,
+    outputs: tuple[Target, ...],
+    taps: tuple[Target, ...],
+    modes: dict[str, Any],
+    warnings: Warnings,
+    session: rg.Session | None = None,
+    *,
+    quiet: bool,
+) -> dict[str, Any]:
+    """Read, draw and write everything; the document of `--json`. Paths are printed unless `quiet`."""
     from rendergraph import images
 
-    pipeline = options.load(**selection)
-    numbers = frames or range(1, 2)
+    pipeline = options.make(**selection)
+    warnings.say(pipeline.warnings)
     if not outputs and not taps:
         stem = Path(selection["pipeline"]).stem
         outputs = (Target(None, Path(f"{stem}.####.png" if len(numbers) > 1 else f"{stem}.png")),)
@@ -78,20 +111,14 @@ def command(
         progress.clear()
         for file in files:
             written.append(str(file.path))
-            if not as_json:
+            if not quiet:
                 emit(str(file.path))
         progress.show(len(written) // len(targets))
 
-    frame = pipeline.render(
-        frames=numbers, outputs=wanted, taps=tapped, alias=not no_alias, poison=poison, shuffle=shuffle, fps=fps,
-        device=device, on_frame=save,
-    )  # fmt: skip
+    frame = pipeline.render(frames=numbers, outputs=wanted, taps=tapped, on_frame=save, session=session, **modes)
     progress.clear()
-    warn(frame.warnings)
-    report = frame.as_json()
-    _say_summary(report)
-    if as_json:
-        emit_json(report | {"outputs": written})
+    warnings.say(frame.warnings)
+    return frame.as_json() | {"outputs": written}
 
 
 def _check(targets: Sequence[Target], numbers: range, selection: dict[str, Any]) -> None:
@@ -116,7 +143,8 @@ def _check(targets: Sequence[Target], numbers: range, selection: dict[str, Any])
         images.check_target(target.path)
 
 
-def _say_summary(report: dict[str, Any]) -> None:
+def say_summary(report: dict[str, Any]) -> None:
+    """What was not drawn, how large, how long and on what."""
     for node, reason in report["culled"].items():
         say(f"not drawn: {node}: {reason}")
     device, (width, height) = report["device"], report["size"]

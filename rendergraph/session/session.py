@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import moderngl
     import numpy.typing as npt
 
+    from rendergraph.declare import Node
     from rendergraph.expand import Expansion
     from rendergraph.link import Endpoint
 
@@ -166,15 +167,13 @@ class Session:
         expansion = pipeline.expansion(outputs, taps)
         scene = self._scene(pipeline)
         types = {node.id: node.type for node in pipeline.graph.nodes}
-        sources = tuple((name, found.file, found.shaders) for name, found in types.items())
+        sources = tuple((name, found.shaders, _declared(found.cls)) for name, found in types.items())
         key = (_structure(expansion), sources, id(pipeline.scene), alias, poison, shuffle)
         executable = self._kept.take(key)
         if executable is None:
             plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
             self._kept.make_room(plan.memory.allocated_bytes)
             with stamps.looking() as files:
-                for found in types.values():
-                    stamps.look(found.file)
                 executable = compile_plan(
                     self.device, plan, types, expansion.views, scene, self.programs, poison=poison
                 )
@@ -258,6 +257,20 @@ class Session:
             "rendergraph:versions": ", ".join(f"{name} {version(name)}" for name in names),
             "rendergraph:device": f"{self.device.renderer}, OpenGL {self.device.as_json()['version']}",
         }
+
+
+def _declared(cls: type[Node]) -> tuple[Any, ...]:
+    """What program text takes from a class beside the steps it recorded: a module that is imported anew may differ."""
+    return tuple(
+        (
+            name,
+            type(port),
+            getattr(port, "kind", None),
+            getattr(port, "semantic", None),
+            getattr(port, "signature", None),
+        )
+        for name, port in cls.ports().items()
+    )
 
 
 def _structure(expansion: Expansion) -> tuple[Any, ...]:
