@@ -15,13 +15,16 @@ deviation 1.5, K1 = 0.01, K2 = 0.03. FLIP is Andersson et al., "FLIP: A Differen
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.errors import InputError, Problem
+from rendergraph.declare import Added
+from rendergraph.declare.extension import Metric
+from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.images import from_srgb, to_srgb
 
 Pixels: TypeAlias = npt.NDArray[Any]
@@ -36,16 +39,18 @@ _SIGMA = 1.5
 
 @dataclass(frozen=True)
 class Metrics:
-    """The four figures of one pair; equal pictures have 0, None, 1 and 0."""
+    """The four figures of one pair; equal pictures have 0, None, 1 and 0. Plugins' figures by name."""
 
     rmse: float
     psnr: float | None
     ssim: float
     flip: float
+    plugins: Mapping[str, float] = field(default_factory=dict)
 
-    def as_json(self) -> dict[str, float | None]:
-        """The fields by name."""
-        return asdict(self)
+    def as_json(self) -> dict[str, Any]:
+        """The fields by name; `plugin_metrics` where there are any."""
+        found: dict[str, Any] = {"rmse": self.rmse, "psnr": self.psnr, "ssim": self.ssim, "flip": self.flip}
+        return found | ({"plugin_metrics": dict(self.plugins)} if self.plugins else {})
 
 
 SAME = Metrics(0.0, None, 1.0, 0.0)
@@ -58,6 +63,7 @@ def measure(
     *,
     encoding: Encoding = "display",
     names: tuple[str, str] = ("the picture", "the reference"),
+    plugins: Sequence[Added[Metric]] = (),
 ) -> tuple[Metrics, Pixels]:
     """All figures of a picture against a reference, and FLIP's map of where they differ.
 
@@ -65,19 +71,43 @@ def measure(
         image, reference: (height, width, 3 or more), uint8 or 0…1 where `display`, linear light where `linear`.
         encoding: what the values of both are.
         names: what messages call them.
+        plugins: metrics that plugins add.
 
     Returns:
         The figures, and FLIP at each pixel: (height, width), 0…1.
 
     Raises:
-        InputError: the sizes differ.
+        InputError: the sizes differ, or a plugin's metric fails.
     """
     a, b = colors(image), colors(reference)
     check_sizes(a, b, names)
+    more = {metric.name: _figure(metric, a, b, names) for metric in plugins}
     error = rmse(a, b)
     shown = (a, b) if encoding == "display" else (to_srgb(a), to_srgb(b))
     map_ = flip(a, b, encoding=encoding)
-    return Metrics(error, psnr(error), ssim(*shown), float(map_.mean(dtype=np.float64))), map_
+    return Metrics(error, psnr(error), ssim(*shown), float(map_.mean(dtype=np.float64)), more), map_
+
+
+def same(pixels: Pixels, plugins: Sequence[Added[Metric]] = ()) -> Metrics:
+    """A picture against itself; what a plugin thinks of that, it is asked.
+
+    Raises:
+        InputError: a plugin's metric fails.
+    """
+    own = colors(pixels)
+    more = {metric.name: _figure(metric, own, own, ("a picture", "itself")) for metric in plugins}
+    return replace(SAME, plugins=more)
+
+
+def _figure(metric: Added[Metric], a: Floats, b: Floats, names: tuple[str, str]) -> float:
+    """What a plugin's metric says; it gets copies, so that it cannot spoil what others see."""
+    what = f"metric '{metric.name}' of '{names[0]}' against '{names[1]}'"
+    found = metric.run("RG497", f"{what} cannot be computed", a.copy(), b.copy())
+    try:
+        return float(found)
+    except (TypeError, ValueError):
+        text = f"{what} cannot be computed: plugin '{metric.plugin}' gave {type(found).__name__}, not a number"
+        raise InputError(Problem("RG498", text, Place(shown_file(metric.file)))) from None
 
 
 def check_sizes(a: Pixels, b: Pixels, names: tuple[str, str]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
-from rendergraph.declare import Function, InOut, Input, Node, Port, Views
+from rendergraph.declare import Extensions, Function, InOut, Input, Node, Port, Views, open_name, own_choices
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.read import INPUT_KEYS, NAME, NODE_KEYS, PARAMETER_KEYS, TOP_KEYS, VERSION
@@ -24,7 +24,7 @@ Schema = dict[str, Any]
 _NAMES = {"pattern": "^" + NAME.pattern.replace("\\Z", "$")}
 _LINK: Schema = {"type": ["string", "null"], "description": "`node.port`, a node's id, or null for nothing."}
 _SIDE: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_SIDE}
-_OWN_WORDS = ("role", "unit", "glsl", "title")
+_OWN_WORDS = ("role", "unit", "glsl", "choices", "needs", "title")
 _ROLES = {
     "param": "Changing it rebuilds nothing.",
     "define": "Changing it recompiles a program.",
@@ -72,7 +72,7 @@ def schema(catalog: Catalog) -> Schema:
                 "optional": {"type": "boolean", "description": "Whether it may stay unconnected."},
                 "doc": {"type": "string", "description": "What it is for, in a line."},
             }),
-            "node": _node(types),
+            "node": _node(types, catalog.extensions),
         },
     }  # fmt: skip
     _as_markdown(found)
@@ -113,7 +113,7 @@ def _nullable(values: Schema) -> Schema:
     return values
 
 
-def _node(types: Mapping[str, type[Node] | None]) -> Schema:
+def _node(types: Mapping[str, type[Node] | None], extensions: Extensions) -> Schema:
     known: list[Schema] = [{"const": name, "description": _about(cls) if cls else ""} for name, cls in types.items()]
     file = f"[./]|^({'|'.join(shipped_pipelines())})$"
     elsewhere: list[Schema] = [
@@ -128,7 +128,7 @@ def _node(types: Mapping[str, type[Node] | None]) -> Schema:
     found["allOf"] = [
         {
             "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
-            "then": {"properties": {"inputs": _inputs(name, cls), "params": _params(name, cls)}},
+            "then": {"properties": {"inputs": _inputs(name, cls), "params": _params(name, cls, extensions)}},
         }
         for name, cls in types.items()
         if cls is not None
@@ -186,10 +186,22 @@ def port_type(port: Port) -> str:
     return ", ".join(words)
 
 
-def _params(type_name: str, cls: type[Node]) -> Schema:
+def _params(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
     properties: Schema = cls.model_json_schema().get("properties", {})
-    own = {name: _param(found) for name, found in properties.items()}
+    own = {name: _param(_opened(cls, name, found, extensions)) for name, found in properties.items()}
     return _known_names(own, f"'{type_name}' has no such param.")
+
+
+def _opened(cls: type[Node], name: str, found: Schema, extensions: Extensions) -> Schema:
+    """A parameter that plugins add choices to: any word in its type, its own and the plugins' in the schema."""
+    info = cls.parameters()[name]
+    if not open_name(info):
+        return found
+    added = extensions.choices(open_name(info))
+    doc = " ".join([found["description"], *(f"`{one.name}` ({one.plugin}): {one.value.doc}" for one in added)])
+    words = [*own_choices(info.annotation), *(one.name for one in added)]
+    rest = {key: value for key, value in found.items() if key != "anyOf"}
+    return {**rest, "description": doc, "type": "string", "enum": list(dict.fromkeys(words))}
 
 
 def _param(found: Schema) -> Schema:

@@ -136,7 +136,10 @@ def test_plugins_may_share_a_meaning_but_not_disagree(write: Write) -> None:
         ("EXTENSION = Extension(choices={'shading': 'toon.glsl'})", "maps a choice to its include, it is str"),
         ("EXTENSION = Extension(choices={'shading': {'Toon': 'toon.glsl'}})", "a choice is of small letters"),
         ("EXTENSION = Extension(choices={'shading': {'toon': 3}})", "is 3, not a Choice or the name of an include"),
-        ("EXTENSION = Extension(choices={'shading': {'toon': Choice('toon.glsl', 'a')}})", "'needs' is a tuple of words"),
+        (
+            "EXTENSION = Extension(choices={'shading': {'toon': Choice('toon.glsl', 'a')}})",
+            "'needs' is a tuple of words",
+        ),
     ],
 )
 def test_mistakes_name_the_plugin_and_its_file(write: Write, wrong: str, said: str) -> None:
@@ -150,7 +153,9 @@ def test_mistakes_name_the_plugin_and_its_file(write: Write, wrong: str, said: s
 
 def test_what_a_choice_needs_must_be_on_offer(write: Write) -> None:
     home = write('EXTENSION = Extension(choices={"shading": {"toon": Choice("toon.glsl", needs=("fong",))}})')
-    with pytest.raises(InputError, match=r"RG495 choices\['shading'\]\['toon'\] .* needs 'fong', .*; did you mean 'phong'"):
+    with pytest.raises(
+        InputError, match=r"RG495 choices\['shading'\]\['toon'\] .* needs 'fong', .*; did you mean 'phong'"
+    ):
         rg.load("forward", plugins=[home], size=(8, 8)).set("light.shading", "toon").check()
 
 
@@ -286,3 +291,152 @@ def test_a_meaning_in_a_node_and_in_a_sub_pipeline(write: Write, tmp_path: Path,
         return
     with pytest.raises(InputError, match=r"'cellar\.x' takes het, but .* carries heat; did you mean 'heat'\?"):
         pipeline.check()
+
+
+# --- loaders -------------------------------------------------------------------------------------------------------
+
+LOADERS = """
+import numpy as np
+from .loaders import read_tri, read_raw
+EXTENSION = Extension(meshes={".tri": read_tri}, images={".raw": read_raw})
+"""
+READ = """
+import numpy as np
+from rendergraph.api import MeshData
+
+def read_tri(path):
+    numbers = np.loadtxt(path, ndmin=2)
+    if numbers.shape[1] != 3:
+        raise ValueError("a row has three numbers")
+    return [MeshData(numbers, np.arange(len(numbers)).reshape(-1, 3), name="Piece", colors=numbers * 0 + [0.2, 0, 0])]
+
+def read_raw(data):
+    return np.frombuffer(data, np.float32).reshape(2, -1, 3)
+"""
+TRI = "-1 0 0\n1 0 0\n0 1 0\n"
+SCENE = """scene: 1
+objects:
+  one: {file: a.tri, at: [2, 0, 0]}
+  two: {file: a.tri, material: red, overrides: {Piece: {hidden: true}}}
+materials:
+  red: {base_color: [1, 0, 0]}
+environment: {file: sky.raw}
+"""
+
+
+@pytest.fixture
+def loaders(write: Write, tmp_path: Path) -> Path:
+    home = write(LOADERS, loaders_py=READ)
+    (tmp_path / "a.tri").write_text(TRI)
+    (tmp_path / "s.yaml").write_text(SCENE)
+    np.arange(24, dtype=np.float32).tofile(tmp_path / "sky.raw")
+    return home
+
+
+def test_a_plugins_mesh_is_a_scene(gl: rg.Session, loaders: Path, tmp_path: Path) -> None:
+    pipeline = rg.load("forward", plugins=[loaders], scene=tmp_path / "a.tri", size=(32, 32))
+    (mesh,) = pipeline.scene.meshes
+    np.testing.assert_array_equal(mesh.positions, [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 3)
+    assert mesh.colors is not None
+    np.testing.assert_allclose(mesh.colors[0], [0.2, 0, 0, 1])
+    assert (mesh.name, mesh.indices.dtype) == ("Piece", np.uint32)
+    drawn = gl.render(pipeline)["image"].reshape(-1, 4)
+    assert (drawn[:, 0] > 2 * drawn[:, 1].astype(int)).mean() > 0.1
+
+
+def test_a_plugins_mesh_and_image_in_a_scene_file(gl: rg.Session, loaders: Path, tmp_path: Path) -> None:
+    from rendergraph.images import decode
+
+    pipeline = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml", size=(8, 8))
+    scene = pipeline.scene
+    assert [thing.name for thing in scene.objects] == ["one/Piece", "two/Piece"]
+    assert [thing.hidden for thing in scene.objects] == [False, True]
+    assert len(scene.meshes) == 1
+    assert scene.materials[scene.objects[1].material].base_color[:3] == (1, 0, 0)
+    assert scene.environment is not None
+    pixels = decode(scene.environment.image, srgb=False)
+    assert pixels.shape == (2, 4, 4)
+    assert pixels.dtype == np.float16
+    np.testing.assert_array_equal(pixels[1, 3], [21, 22, 23, 1])
+    gl.render(pipeline)
+
+
+def test_a_plugins_texture(gl: rg.Session, loaders: Path, tmp_path: Path) -> None:
+    reader = "def read_raw(data):\n    return np.full((2, 2, 3), [255, 0, 0], np.uint8)\n"
+    (loaders / "loaders.py").write_text(READ.partition("def read_raw")[0] + reader)
+    (tmp_path / "t.yaml").write_text(
+        "scene: 1\nobjects: {a: {shape: sphere, material: m}}\nmaterials: {m: {base_color_texture: sky.raw}}\n"
+    )
+    drawn = gl.render(rg.load("forward", plugins=[loaders], scene=tmp_path / "t.yaml", size=(16, 16)))["image"]
+    red, green = drawn[8, 8, :2].astype(int)
+    assert red > 4 * green + 50
+
+
+def test_without_the_plugin_its_files_are_nothing(loaders: Path, tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"RG303 'a\.tri' is no scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb$"
+    ):
+        rg.load("forward", scene=tmp_path / "a.tri").check()
+    with pytest.raises(InputError, match=r"s\.yaml:3:\d+: RG303 'a\.tri' is no mesh file; a mesh ends in \.obj"):
+        rg.load("forward", scene=tmp_path / "s.yaml").check()
+    (tmp_path / "a.try").write_text(TRI)
+    with pytest.raises(InputError, match=r"a mesh ends in .*, \.tri$|a scene ends in .*, \.tri$"):
+        rg.load("forward", plugins=[loaders], scene=tmp_path / "a.try").check()
+
+
+def test_a_loader_that_raises_is_named_with_its_line(loaders: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.tri").write_text("1 2\n")
+    line = READ.splitlines().index('        raise ValueError("a row has three numbers")') + 1
+    for scene in ("a.tri", "s.yaml"):
+        with pytest.raises(InputError) as caught:
+            rg.load("forward", plugins=[loaders], scene=tmp_path / scene).check()
+        assert (
+            f"loaders.py:{line}:1: RG497 mesh 'a.tri' cannot be read: ValueError: a row has three numbers (plugin "
+            in (str(caught.value))
+        )
+
+
+@pytest.mark.parametrize(
+    ("gives", "said"),
+    [
+        ("None", "gave NoneType, not MeshData or a list of it"),
+        ("[1]", "gave list, not MeshData or a list of it"),
+        ("MeshData([[0, 0]], [[0, 0, 0]])", r"whose positions have the shape \(1, 2\), not \(n, 3\)"),
+        ("MeshData([[0, 0, float('nan')]], [[0, 0, 0]])", "whose positions are not all finite"),
+        ("MeshData([], [])", r"whose positions have the shape \(0,\)"),
+        ("MeshData([[0, 0, 0]], [[0, 0, 1]])", "whose indices go from 0 to 1, its positions are 1"),
+        ("MeshData([[0, 0, 0]], [[0, 0, -1]])", "whose indices go from -1 to 0"),
+        ("MeshData([[0, 0, 0]], [[0., 0, 0]])", "whose indices are float64 of shape"),
+        ("MeshData([[0, 0, 0]], [[0, 0, 0]], normals=[[0, 0, 1]] * 2)", "whose normals are 2, its positions 1"),
+        ("MeshData([['a', 0, 0]], [[0, 0, 0]])", "whose could not convert string to float"),
+        ("MeshData([[0, 0, 0]], [[0, 0, 0]], roughness=2)", "whose roughness is 2, not from 0 to 1"),
+    ],
+)
+def test_what_a_mesh_loader_gives_is_checked(loaders: Path, tmp_path: Path, gives: str, said: str) -> None:
+    with (loaders / "loaders.py").open("a") as file:
+        file.write(f"\ndef read_tri(path):\n    return {gives}\n")
+    with pytest.raises(InputError, match=f"RG498 .*{said}"):
+        rg.load("forward", plugins=[loaders], scene=tmp_path / "a.tri").check()
+
+
+@pytest.mark.parametrize(
+    ("gives", "said"),
+    [
+        ("None", "RG498 .* gave NoneType, not an array"),
+        ("np.zeros(3)", r"RG498 .* gave an array of shape \(3,\)"),
+        ("np.zeros((2, 2, 5))", r"RG498 .* gave an array of shape \(2, 2, 5\)"),
+        ("np.zeros((2, 2), int)", "RG498 .* gave int64 values, not uint8 or floats"),
+        ("np.zeros((1, 20000), np.uint8)", "RG498 .* gave 20000×1 pixels; the limit is 16384"),
+        ("1 / 0", r"loaders\.py:\d+:1: RG497 image 'sky\.raw' cannot be read: ZeroDivisionError"),
+    ],
+)
+def test_what_an_image_loader_gives_is_checked(loaders: Path, tmp_path: Path, gives: str, said: str) -> None:
+    from rendergraph.images import decode
+
+    with (loaders / "loaders.py").open("a") as file:
+        file.write(f"\ndef read_raw(data):\n    return {gives}\n")
+    environment = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml").scene.environment
+    assert environment is not None
+    with pytest.raises(InputError, match=said):
+        decode(environment.image, srgb=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from rendergraph.errors import Problem, UsageError, suggestion
 if TYPE_CHECKING:
     import rendergraph as rg
     from rendergraph.compare.values import Comparison, Result
+    from rendergraph.declare import Extensions
 
 BEYOND = 4
 """Exit code of a comparison beyond its threshold."""
@@ -41,9 +43,20 @@ def _limit(text: str) -> Limit:
         raise ValueError(f"'{text}' is not METRIC=NUMBER, as in flip=0.02")
     if metric in ("psnr", "ssim"):
         raise ValueError(f"{metric} falls as errors grow; limit {', '.join(_LIMITED)}")
-    if metric not in _LIMITED:
-        raise ValueError(f"there is no metric '{metric}'{suggestion(metric, _LIMITED)}")
     return Limit(metric, most)
+
+
+def check_limits(limits: Sequence[Limit], extensions: Extensions) -> None:
+    """Say that a limit is of no metric; plugins are asked where we do not know it.
+
+    Raises:
+        UsageError: nobody computes it.
+    """
+    for metric in dict.fromkeys(limit.metric for limit in limits if limit.metric not in _LIMITED):
+        known = [*_LIMITED, *(added.name for added in extensions.metrics())]
+        if metric not in known:
+            text = f"--fail-above: there is no metric '{metric}'{suggestion(metric, known)}"
+            raise UsageError([Problem("RG500", text), *extensions.problems])
 
 
 LIMIT = options.Parsed("METRIC=NUMBER", _limit)
@@ -105,6 +118,7 @@ def command(
     if output is not None:
         check_page(output)
     loaded = [options.load(pipeline=name, **selection) for name in pipelines]
+    check_limits(thresholds, loaded[0].catalog.extensions)
     bar = Bar("steps")
     found = compare(
         loaded, load_reference(reference, selection), frames=frames, frame=frame, device=device, progress=bar.show
@@ -164,9 +178,9 @@ def exceeded(results: Sequence[Result], limits: Sequence[Limit]) -> list[str]:
     """What is above its limit, in words; a figure that is no number is above every limit."""
     found = []
     for result in results:
-        values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse}
+        values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse, **result.metrics.plugins}
         for limit in limits:
-            value = values[limit.metric]
+            value = values.get(limit.metric)
             if value is None or not value <= limit.most:
                 shown = "unknown" if value is None else f"{value:.6g}"
                 found.append(f"{result.name}: {limit.metric} is {shown}, above {limit.most:g}")
@@ -182,9 +196,15 @@ def _reference_words(reference: str | None) -> list[str]:
     return [] if reference is None else ["--reference", reference]
 
 
+def plugin_metrics(results: Sequence[Result]) -> list[str]:
+    """The names of plugins' metrics."""
+    return list(dict.fromkeys(name for result in results for name in result.metrics.plugins))
+
+
 def summary_rows(results: Sequence[Result]) -> list[tuple[object, ...]]:
     """A row a variant: errors, times, passes, bytes."""
     rows: list[tuple[object, ...]] = []
+    plugins = plugin_metrics(results)
     for result in results:
         m, times = result.metrics, result.times
         psnr = "∞" if m.psnr is None else f"{m.psnr:.2f}"
@@ -192,20 +212,25 @@ def summary_rows(results: Sequence[Result]) -> list[tuple[object, ...]]:
         spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
         size = megabytes(int(str(result.memory["allocated_bytes"])))
         rows.append(
-            (result.name, f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}", gpu, spread,
+            (result.name, f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}",
+             *(f"{m.plugins.get(name, math.nan):.4g}" for name in plugins), gpu, spread,
              f"{times.cpu_ms.median:.2f}", result.pass_count, size)
         )  # fmt: skip
     return rows
 
 
-HEADS = ("", "FLIP", "RMSE", "PSNR", "SSIM", "GPU ms", "10–90 %", "CPU ms", "passes", "textures")
+def heads(results: Sequence[Result]) -> tuple[str, ...]:
+    """What stands above the columns."""
+    times = ("GPU ms", "10–90 %", "CPU ms", "passes", "textures")
+    return ("", "FLIP", "RMSE", "PSNR", "SSIM", *plugin_metrics(results), *times)
 
 
 def _text(found: Comparison) -> str:
     width, height = found.size
+    head = heads(found.results)
     lines = [
         f"{found.scene}, {width}×{height}, against {found.reference.name}, on {found.device.get('renderer')}",
-        table(summary_rows(found.results), HEADS, right=range(1, len(HEADS))),
+        table(summary_rows(found.results), head, right=range(1, len(head))),
     ]
     if found.software:
         lines.append(SOFTWARE)

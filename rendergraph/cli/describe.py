@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
 
 if TYPE_CHECKING:
     from rendergraph.catalog import NodeType
+    from rendergraph.declare import Extensions
 
 
 def summary(found: NodeType) -> str:
@@ -15,9 +16,14 @@ def summary(found: NodeType) -> str:
     return (inspect.getdoc(found.cls) or "").partition("\n")[0]
 
 
-def describe(found: NodeType) -> dict[str, Any]:
-    """Everything its declaration says, as plain JSON values."""
-    from rendergraph.declare import History, Internal
+def describe(found: NodeType, extensions: Extensions | None = None) -> dict[str, Any]:
+    """Everything its declaration says, as plain JSON values.
+
+    Args:
+        found: the type.
+        extensions: where the choices come from that plugins add.
+    """
+    from rendergraph.declare import NO_EXTENSIONS, History, Internal
 
     cls = found.cls
     groups = {member: group for group, members in cls.groups().items() for member in members}
@@ -32,7 +38,7 @@ def describe(found: NodeType) -> dict[str, Any]:
         "inputs": [_input(name, port) | _group(groups.get(name)) for name, port in cls.inputs().items()],
         "outputs": [_output(name, port) for name, port in outputs.items()],
         "internal": [_made(name, port) for name, port in internal.items()],
-        "parameters": [_parameter(cls, name) for name in cls.parameters()],
+        "parameters": [_parameter(cls, name, extensions or NO_EXTENSIONS) for name in cls.parameters()],
     }
 
 
@@ -99,19 +105,29 @@ def _size(rule: Any) -> str:
     return "viewport" if rule == 1 else f"viewport × {rule:g}"
 
 
-def _parameter(cls: Any, name: str) -> dict[str, Any]:
+def _parameter(cls: Any, name: str, extensions: Extensions) -> dict[str, Any]:
+    from rendergraph.declare import closed, open_name
+
     info = cls.parameters()[name]
+    added = extensions.choices(open_name(info)) if open_name(info) else []
+    annotation = closed(info, tuple(one.name for one in added))
     extra = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
     found: dict[str, Any] = {
         "name": name,
-        "type": type_words(info.annotation),
+        "type": type_words(annotation),
         "default": list(info.default) if isinstance(info.default, tuple) else info.default,
         "role": cls.role_of(name),
         "unit": extra.get("unit", ""),
         "doc": info.description or "",
     }
-    if choices := _choices(info.annotation):
+    if choices := _choices(annotation):
         found["choices"] = choices
+    if open_name(info):
+        found["open"] = open_name(info)
+        found["added"] = [
+            {"name": one.name, "plugin": one.plugin, "doc": one.value.doc, "needs": list(one.value.needs)}
+            for one in added
+        ]
     found |= {word: extra[key] for word, key in (("min", "minimum"), ("max", "maximum")) if key in extra}
     return found
 

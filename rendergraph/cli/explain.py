@@ -10,7 +10,7 @@ from typing import Any
 
 from rendergraph.cli import options
 from rendergraph.cli.describe import describe, example
-from rendergraph.cli.output import emit, emit_json, table
+from rendergraph.cli.output import emit, emit_json, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
 
@@ -47,7 +47,9 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
         known = [*catalog.names(), *_FILES]
         text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
         raise InputError(Problem("RG511", text))
-    described = describe(catalog.get(topic))
+    described = describe(catalog.get(topic), catalog.extensions)
+    if any("added" in parameter for parameter in described["parameters"]):
+        warn(catalog.extensions.warnings)
     emit_json(described) if as_json else emit(_node_text(described))
 
 
@@ -193,6 +195,11 @@ def _node_text(node: dict[str, Any]) -> str:
             for p in node["parameters"]
         ]
         parts.append("Parameters\n" + _block(knobs, ("name", "value", "default", "range", "")))
+    added = [
+        (f"{p['name']}: {c['name']}", c["plugin"], c["doc"]) for p in node["parameters"] for c in p.get("added", ())
+    ]
+    if added:
+        parts.append("Choices of plugins\n" + _block(added))
     parts.append("In a file\n" + _indented(example(node)))
     return "\n\n".join(parts)
 

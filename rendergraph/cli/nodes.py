@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rendergraph.cli import options
 from rendergraph.cli.describe import describe, summary
-from rendergraph.cli.output import emit, emit_json, table
+from rendergraph.cli.output import emit, emit_json, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
 
@@ -18,7 +18,8 @@ from rendergraph.errors import InputError, Problem, suggestion
 def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> None:
     """List the node types, all or of one family.
 
-    `rendergraph explain NODE` tells everything about one.
+    `rendergraph explain NODE` tells everything about one. What plugins add beside node types comes last: meanings,
+    choices of parameters, loaders, metrics.
 
     \b
     Examples:
@@ -33,9 +34,16 @@ def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> Non
         text = f"there is no family of nodes '{family}'{suggestion(family, families)}"
         raise InputError(Problem("RG511", text))
     found = [catalog.get(name) for key, names in families.items() if family in (None, key) for name in names]
+    added = catalog.extensions.listed() if family is None else []
+    if family is None:
+        warn(catalog.extensions.warnings)
     if as_json:
-        emit_json({"nodes": [describe(entry) for entry in found]})
-    elif found:
+        emit_json({"nodes": [describe(entry) for entry in found], "extensions": added})
+        return
+    if found:
         emit(
             table([(entry.family, entry.name, summary(entry)) for entry in found], ("family", "type", "what it makes"))
         )
+    if added:
+        rows = [(entry["kind"], entry["name"], entry["plugin"], entry["doc"]) for entry in added]
+        emit("\n" + table(rows, ("added", "name", "plugin", "")))

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from rendergraph.cli import options
+from rendergraph.cli.output import warn
 from rendergraph.cli.words import click
 
 
@@ -25,5 +26,7 @@ def command(plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> No
     from rendergraph.catalog import Catalog
     from rendergraph.schema import schema
 
-    text = json.dumps(schema(Catalog.discover(plugins)), indent=2, ensure_ascii=False)
+    catalog = Catalog.discover(plugins)
+    text = json.dumps(schema(catalog), indent=2, ensure_ascii=False)
+    warn(catalog.extensions.warnings)
     options.put(text, output, as_json=as_json)

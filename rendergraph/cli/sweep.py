@@ -82,12 +82,13 @@ def command(
         selection["sets"] = (*file.sets, *selection["sets"])
     bar = Bar("runs")
     base = options.make(pipeline=pipeline, **selection)
+    shared.check_limits(thresholds, base.catalog.extensions)
     found = sweep(
         base, axes, out, shared.load_reference(reference, selection), frames=frames or 5, frame=frame, resume=resume,
         device=device, progress=bar.show,
     )  # fmt: skip
     bar.clear()
-    warn(found.comparison.warnings)
+    warn([*found.comparison.warnings, *base.catalog.extensions.warnings])
     page = out / "report.html"
     options.write(sweep_page(found, shared.typed([*words, "-o", str(out)])), page)
     if found.torn:
@@ -112,7 +113,7 @@ def _text(found: Sweep) -> str:
     rows = [
         (*row, "front" if row[0] in front else "") for row in shared.summary_rows(comparison.results)
     ]  # fmt: skip
-    heads = (*shared.HEADS, "Pareto")
+    heads = (*shared.heads(comparison.results), "Pareto")
     lines = [
         f"{len(rows)} runs against {comparison.reference.name}: {found.executed} passes drawn, {found.alone} one by one"
         + (f"; {found.resumed} runs were there" if found.resumed else ""),

@@ -104,7 +104,13 @@ def compare(
         frame=frame,
         device=drawn[0].frame.device,
         notes=tuple(notes),
-        warnings=tuple(dict.fromkeys(problem for each in drawn for problem in each.frame.warnings)),
+        warnings=tuple(
+            dict.fromkeys(
+                problem
+                for each in drawn
+                for problem in (*each.frame.warnings, *each.pipeline.catalog.extensions.warnings)
+            )
+        ),
     )
 
 
@@ -112,10 +118,14 @@ def _result(
     name: str, drawn: _Drawn, base: _Drawn, reference: Reference, times: Times, first: Difference | None
 ) -> Result:
     graph, pixels = drawn.pipeline.graph, drawn.frame[reference.output]
-    found, map_ = metrics.SAME, None
-    if reference.pixels is not pixels:
+    plugins = drawn.pipeline.catalog.extensions.metrics()
+    if reference.pixels is pixels:
+        found, map_ = metrics.same(pixels, plugins), None
+    else:
         names = (name, reference.name)
-        found, map_ = metrics.measure(pixels, reference.pixels, encoding=reference.encoding, names=names)
+        found, map_ = metrics.measure(
+            pixels, reference.pixels, encoding=reference.encoding, names=names, plugins=plugins
+        )
     light = None if reference.kind == "file" else base.frame.get("radiance")
     return Result(
         name=name, source=drawn.pipeline.source, pixels=pixels, encoding=reference.encoding, metrics=found,

@@ -206,10 +206,14 @@ def _draw_missing(
 
 def _measured(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None) -> Result:
     pixels, own = drawn.arrays[run.output], drawn.arrays.get("radiance")
-    found, map_ = metrics.SAME, None
-    if reference.pixels is not pixels:
+    plugins = run.pipeline.catalog.extensions.metrics()
+    if reference.pixels is pixels:
+        found, map_ = metrics.same(pixels, plugins), None
+    else:
         names = (run.name, reference.name)
-        found, map_ = metrics.measure(pixels, reference.pixels, encoding=reference.encoding, names=names)
+        found, map_ = metrics.measure(
+            pixels, reference.pixels, encoding=reference.encoding, names=names, plugins=plugins
+        )
     plan = run.pipeline.plan()
     return Result(
         name=run.name, source=run.pipeline.source, pixels=pixels, encoding=reference.encoding, metrics=found,

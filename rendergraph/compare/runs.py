@@ -58,6 +58,7 @@ def key_of(pipeline: Pipeline, frame: int, against: str) -> str:
         stamp += [str(scene.stat().st_mtime_ns), str(scene.stat().st_size)]
     spec = pipeline.spec.to_yaml(origins=False)
     parts = [__version__, spec, stamp, str(pipeline.environment), pipeline.camera, pipeline.graph.size, frame, against]
+    parts += sorted(metric.name for metric in pipeline.catalog.extensions.metrics())
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -129,9 +130,16 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
     plan = run.pipeline.plan()
     return Result(
         name=run.name, source=run.pipeline.source, pixels=read(run.picture), encoding=encoding,
-        metrics=Metrics(_number(record["rmse"]), record["psnr"], _number(record["ssim"]), _number(record["flip"])),
+        metrics=_metrics(record),
         times=Times.from_json(record), memory=plan.memory.as_json(), pass_count=len(passes(plan)),
         settings=run.settings, radiance_rmse=record["radiance_rmse"], graph=run.pipeline.graph, plan=plan,
+    )  # fmt: skip
+
+
+def _metrics(record: Mapping[str, Any]) -> Metrics:
+    plugins = {name: _number(value) for name, value in record.get("plugin_metrics", {}).items()}
+    return Metrics(
+        _number(record["rmse"]), record["psnr"], _number(record["ssim"]), _number(record["flip"]), plugins
     )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,6 +30,13 @@ class Choice:
 
     shader: str | Path
     needs: tuple[str, ...] = ()
+
+    @property
+    def doc(self) -> str:
+        """The include's opening comment, as one line; empty where it has none."""
+        lines = Path(self.shader).read_text(encoding="utf-8", errors="replace").splitlines()
+        opening = itertools.takewhile(lambda line: line.startswith("//"), lines)
+        return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
 @dataclass(frozen=True, eq=False)

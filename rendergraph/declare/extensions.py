@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -92,6 +93,11 @@ class Extensions:
         """What is wrong with extensions: it may be why a name is unknown, so it is said beside that."""
         return tuple(problem for source in self.sources for problem in source.problems)
 
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """The same for whoever lists everything: what is broken is left out."""
+        return tuple(replace(problem, severity="warning") for problem in self.problems)
+
     # By name; two plugins that bring one name are an error for whoever asks for it ------------------------------------
 
     def semantic(self, name: str) -> Semantic | None:
@@ -177,6 +183,18 @@ class Extensions:
             self._one(metric.name, found, "metric")
         return found
 
+    def listed(self) -> list[dict[str, str]]:
+        """Everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
+        kinds: list[tuple[str, Sequence[Added[Any]]]] = [("semantic", self.semantics())]
+        kinds += [(parameter, [added]) for parameter, added in self.all_choices()]
+        tables = (("meshes", "mesh loader"), ("images", "image loader"), ("metrics", "metric"))
+        kinds += [(word, [Added(*row) for row in self._table(kind)]) for kind, word in tables]
+        return [
+            {"kind": kind, "name": added.name, "plugin": added.plugin, "doc": _doc(added.value)}
+            for kind, found in kinds
+            for added in found
+        ]
+
     def _usable(self) -> Iterator[tuple[Source, Extension]]:
         for source in self.sources:
             if source.extension is not None:
@@ -194,6 +212,12 @@ class Extensions:
             text = f"{what} '{name}' comes from {plugins}; rename one, or uninstall one plugin"
             raise InputError(Problem("RG496", text, Place(shown_file(found[0].file))))
         return found[0] if found else None
+
+
+def _doc(value: object) -> str:
+    """The first line of what a thing says about itself."""
+    doc = value.doc if isinstance(value, Semantic | Choice) else inspect.getdoc(value) or ""
+    return doc.partition("\n")[0]
 
 
 NO_EXTENSIONS = Extensions()

@@ -14,36 +14,18 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.images.encode import HALF_MAX, PREFIX
+from rendergraph.images.encode import PREFIX
+from rendergraph.images.pixels import Limits, Pixels, as_rgba, finite, name_of
+from rendergraph.images.plugin_image import decode_by_plugin
 from rendergraph.scene.model import ImageSource
 
 if TYPE_CHECKING:
     import OpenImageIO as oiio
-
-Pixels: TypeAlias = npt.NDArray[Any]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What an image may claim.
-
-    Attributes:
-        side: pixels of the longer side; a driver's own limit may be lower.
-        bytes: decoded size as RGBA.
-        ratio: decoded to encoded size, where the decoded size is above `ratio_from` bytes.
-    """
-
-    side: int = 16384
-    bytes: int = 2 << 30
-    ratio: int = 1000
-    ratio_from: int = 64 << 20
-
 
 _KINDS: tuple[tuple[bytes, str], ...] = (
     (b"\x89PNG\r\n\x1a\n", ".png"),
@@ -82,14 +64,16 @@ def decode(
     Raises:
         InputError: missing, of another kind, broken, or beyond a limit.
     """
+    if source.loader is not None:
+        return decode_by_plugin(source, source.loader, srgb=srgb, warn=warn, limits=limits)
     with _opened(source, limits) as image:
         light = image.kind in (".hdr", ".exr")
         wide = image.spec.format.basesize() > 1
         pixels = image.read(_color_channels(image), "half" if light or (wide and not srgb) else "uint8")
         pixels = _in_display_window(image, pixels, limits)
     if light:
-        pixels = _finite(image, pixels, warn)
-    return _as_rgba(pixels)
+        pixels = finite(image.source, pixels, warn)
+    return as_rgba(pixels)
 
 
 def read(path: Path | str) -> Pixels:
@@ -240,12 +224,8 @@ def _check_size(image: _Image, channels: int, item: int) -> None:
         _refuse(image.source, "RG353", text)
 
 
-def _name(source: ImageSource) -> str:
-    return source.label or str(source.path)
-
-
 def _refuse(source: ImageSource, code: str, text: str) -> NoReturn:
-    raise InputError(Problem(code, text, Place(_name(source))))
+    raise InputError(Problem(code, text, Place(name_of(source))))
 
 
 def _broken(image: _Image, problem: str) -> NoReturn:
@@ -336,34 +316,6 @@ def _in_display_window(image: _Image, pixels: Pixels, limits: Limits) -> Pixels:
         part = pixels[top - spec.y : bottom - spec.y, left - spec.x : right - spec.x]
         whole[top - spec.full_y : bottom - spec.full_y, left - spec.full_x : right - spec.full_x] = part
     return whole
-
-
-def _finite(image: _Image, pixels: Pixels, warn: Callable[[Problem], None] | None) -> Pixels:
-    if np.isfinite(pixels).all():
-        return pixels
-    unknown = int((np.isnan(pixels) | np.isneginf(pixels)).any(axis=-1).sum())
-    large = int(np.isposinf(pixels).any(axis=-1).sum())
-    said = [f"{_pixels(unknown)} NaN or -inf, taken as 0"] if unknown else []
-    said += [f"{_pixels(large)} infinite or beyond {HALF_MAX:.0f}, taken as {HALF_MAX:.0f}"] if large else []
-    if warn:
-        warn(Problem("RG355", "; ".join(said), Place(_name(image.source)), severity="warning"))
-    return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0)
-
-
-def _pixels(count: int) -> str:
-    return f"{count} pixels are" if count != 1 else "1 pixel is"
-
-
-def _as_rgba(pixels: Pixels) -> Pixels:
-    height, width, count = pixels.shape
-    one = 255 if pixels.dtype == np.uint8 else 1
-    rgba = np.full((height, width, 4), one, dtype=pixels.dtype)
-    if count <= 2:
-        rgba[..., :3] = pixels[..., :1]
-        rgba[..., 3:] = pixels[..., 1:] if count == 2 else one
-    else:
-        rgba[..., :count] = pixels
-    return rgba
 
 
 def _channel_order(name: str) -> tuple[str, int, str]:

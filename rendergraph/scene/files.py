@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene import image_header
@@ -88,11 +89,12 @@ class Names:
 
 @dataclass
 class Reading:
-    """One file being read: its path, the root rule, the limits, and the warnings so far (once a kind and file)."""
+    """One file being read: its path, the root rule, the limits, what plugins read, and the warnings so far."""
 
     path: Path
     check_path: CheckPath
     limits: Limits = Limits()
+    extensions: Extensions = NO_EXTENSIONS
     _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
     _images: dict[Path, tuple[ImageSource, image_header.Header]] = field(default_factory=dict)
 
@@ -183,6 +185,13 @@ class Reading:
         if path in self._images:
             return self._images[path]
         self.exists(path, what, line=line, code="RG350")
+        loader = None if path.suffix.lower() in ("", *READ_IMAGES) else self.extensions.image_loader(path.suffix)
+        if loader is not None:
+            if path.stat().st_size > self.limits.file_bytes:
+                raise self.over(f"{what} '{self.named(path)}' has {path.stat().st_size:,} bytes", "file_bytes")
+            source = ImageSource(path, None, shown(path.name), loader)
+            self._images[path] = source, image_header.Header(path.suffix.lower()[1:])
+            return self._images[path]
         try:
             size = path.stat().st_size
             with path.open("rb") as file:

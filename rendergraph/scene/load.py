@@ -5,22 +5,31 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from rendergraph.declare import NO_EXTENSIONS, Extensions
 from rendergraph.document import shown
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import Place, Problem
 from rendergraph.scene.files import CheckPath, Limits, Reading, inside
+from rendergraph.scene.meshes import MESHES, read_mesh
 from rendergraph.scene.model import Scene
 
-EXTENSIONS = (".yaml", ".yml", ".obj", ".gltf", ".glb")
+EXTENSIONS = (".yaml", ".yml", *MESHES)
 
 
-def load(path: Path, *, check_path: CheckPath | None = None, limits: Limits = Limits()) -> Scene:
+def load(
+    path: Path,
+    *,
+    check_path: CheckPath | None = None,
+    limits: Limits = Limits(),
+    extensions: Extensions = NO_EXTENSIONS,
+) -> Scene:
     """The scene in a file, checked whole; the extension says what it is.
 
     Args:
-        path: a scene file (.yaml), or a mesh (.obj, .gltf, .glb).
+        path: a scene file (.yaml), or a mesh (.obj, .gltf, .glb, or what a plugin reads).
         check_path: the root rule for every path the file names: returns it resolved or raises InputError. By default
             paths stay under the file's own folder, links followed.
         limits: how much the file may ask for.
+        extensions: what plugins read.
 
     Returns:
         The scene as the file has it: `animate.complete` adds a camera and a light where there are none. What a reader
@@ -29,22 +38,15 @@ def load(path: Path, *, check_path: CheckPath | None = None, limits: Limits = Li
     Raises:
         InputError: the file or one it names is missing, malformed, out of range, outside the roots, or beyond a limit.
     """
-    reading = Reading(path, check_path or inside(path.parent), limits)
+    reading = Reading(path, check_path or inside(path.parent), limits, extensions)
     suffix = path.suffix.lower()
-    if suffix not in EXTENSIONS:
-        text = f"'{shown(path.name)}' is no scene; a scene ends in {', '.join(EXTENSIONS)}"
-        raise InputError(Problem("RG303", text, Place(str(path))))
-    reading.exists(path, "scene file")
+    if suffix in EXTENSIONS:
+        reading.exists(path, "scene file")
     if suffix in (".yaml", ".yml"):
         from rendergraph.scene.scene_yaml import read_scene
 
         scene = read_scene(path, reading)
-    elif suffix == ".obj":
-        from rendergraph.scene.obj import read_obj
-
-        scene = read_obj(path, reading)
     else:
-        from rendergraph.scene.gltf import read_gltf
-
-        scene = read_gltf(path, reading)
+        unknown = Problem("RG303", f"'{shown(path.name)}' is no scene; a scene ends in", Place(str(path)))
+        scene = read_mesh(path, reading, unknown, EXTENSIONS)
     return replace(scene, warnings=reading.warnings)

@@ -15,6 +15,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.declare import Added
+from rendergraph.declare.extension import ImageLoader
 from rendergraph.stamps import Stamp
 
 Floats: TypeAlias = npt.NDArray[np.float32]
@@ -59,11 +61,13 @@ class ImageSource:
         path: the file it comes from (also where `data` holds its bytes, for messages).
         data: the encoded bytes where the image is embedded, else None.
         label: how messages name it.
+        loader: the plugin's function that decodes it, None where we do.
     """
 
     path: Path
     data: bytes | None = None
     label: str = ""
+    loader: Added[ImageLoader] | None = None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from rendergraph.scene import scene_build, scene_keys
 from rendergraph.scene.files import Reading
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.keys import Key
+from rendergraph.scene.meshes import MESHES, read_mesh
 from rendergraph.scene.model import (
     Camera,
     Environment,
@@ -31,7 +32,6 @@ from rendergraph.scene.model import (
 from rendergraph.scene.scene_check import Checker
 from rendergraph.scene.shapes import SHAPES, Part, build
 
-_MESHES = (".obj", ".gltf", ".glb")
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
 _SRGB = ("base_color", "emissive", "specular_color")
 
@@ -268,18 +268,11 @@ class _Reader:
         path = self.reading.beside(file, line=place.line)
         if path in self.made.files:
             return self.made.files[path]
-        if path.suffix.lower() not in _MESHES:
-            raise self.reading.error("RG303", f"'{shown(file)}' is no mesh file; a mesh ends in {', '.join(_MESHES)}")
-        self.reading.exists(path, "file")
-        inner = Reading(path, self.reading.check_path, self.reading.limits)
-        if path.suffix.lower() == ".obj":
-            from rendergraph.scene.obj import read_obj
-
-            scene = read_obj(path, inner)
-        else:
-            from rendergraph.scene.gltf import read_gltf
-
-            scene = read_gltf(path, inner)
+        if path.suffix.lower() in MESHES:
+            self.reading.exists(path, "file")
+        inner = Reading(path, self.reading.check_path, self.reading.limits, self.reading.extensions)
+        unknown = Problem("RG303", f"'{shown(file)}' is no mesh file; a mesh ends in")
+        scene = read_mesh(path, inner, unknown)
         self.reading.add_warnings(inner.warnings)
         made = self.made
         made.files[path] = _File(scene, len(made.meshes), len(made.materials))

@@ -173,15 +173,18 @@ class Pipeline:
         stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
         limits = Limits(**self.allowed("scene"))
         roots = self.spec.roots.folders if file is not None else ()
-        key = (Path.cwd(), file, self.environment, self.camera, roots, limits)
+        key = (Path.cwd(), file, self.environment, self.camera, roots, limits, self.plugins)
         found = _SCENES.get(key)
         if found is not None and not stamps.changed(found.files):
             stamps.again(found.files)
             return found
         with stamps.looking() as files:
-            scene = Scene("empty") if file is None else load(file, check_path=self.spec.roots.check, limits=limits)
+            extensions, check = self.catalog.extensions, self.spec.roots.check
+            scene = Scene("empty")
+            if file is not None:
+                scene = load(file, check_path=check, limits=limits, extensions=extensions)
             if self.environment is not None:
-                reading = Reading(self.environment, lambda path, place: path, limits)
+                reading = Reading(self.environment, lambda path, place: path, limits, extensions)
                 image = reading.image(self.environment, "environment")
                 scene = replace(scene, environment=Environment(image))
         _SCENES[key] = found = replace(complete(scene, self.camera), files=files)

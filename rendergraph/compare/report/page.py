@@ -129,8 +129,9 @@ def _page(title: str, comparison: Comparison, sections: Sequence[str], command: 
 
 
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
-    heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", "#light RMSE", "#GPU ms", "#CPU ms", "#frame ms", "#passes",
-             "#textures", ""]  # fmt: skip
+    plugins = list(dict.fromkeys(name for result in comparison.results for name in result.metrics.plugins))
+    heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", *(f"#{name}" for name in plugins), "#light RMSE", "#GPU ms",
+             "#CPU ms", "#frame ms", "#passes", "#textures", ""]  # fmt: skip
     whole = any(result.times.frame_ms for result in comparison.results)
     heads = heads if whole else [head for head in heads if head != "#frame ms"]
     most = max(result.times.headline.median for result in comparison.results)
@@ -150,6 +151,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
             *(f'<td class="num">{number(value)}</td>' for value in (m.flip, m.rmse)),
             f'<td class="num">{"∞" if m.psnr is None else number(m.psnr, 2)}</td>',
             f'<td class="num">{number(m.ssim)}</td>',
+            *(f'<td class="num">{number(m.plugins.get(name))}</td>' for name in plugins),
             f'<td class="num">{number(result.radiance_rmse)}</td>',
             milliseconds(times.gpu_ms, most if times.gpu_ms else 0),
             milliseconds(times.cpu_ms),

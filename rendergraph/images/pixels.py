@@ -1,0 +1,67 @@
+"""Decoded pixels as they go to the GPU: finite, with four channels, within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import Place, Problem
+from rendergraph.images.encode import HALF_MAX
+from rendergraph.scene.model import ImageSource
+
+Pixels: TypeAlias = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an image may claim.
+
+    Attributes:
+        side: pixels of the longer side; a driver's own limit may be lower.
+        bytes: decoded size as RGBA.
+        ratio: decoded to encoded size, where the decoded size is above `ratio_from` bytes.
+    """
+
+    side: int = 16384
+    bytes: int = 2 << 30
+    ratio: int = 1000
+    ratio_from: int = 64 << 20
+
+
+def name_of(source: ImageSource) -> str:
+    """What messages call an image."""
+    return source.label or str(source.path)
+
+
+def finite(source: ImageSource, pixels: Pixels, warn: Callable[[Problem], None] | None) -> Pixels:
+    """Light without NaN and infinity; `warn` is told how much was replaced."""
+    if np.isfinite(pixels).all():
+        return pixels
+    unknown = int((np.isnan(pixels) | np.isneginf(pixels)).any(axis=-1).sum())
+    large = int(np.isposinf(pixels).any(axis=-1).sum())
+    said = [f"{_pixels(unknown)} NaN or -inf, taken as 0"] if unknown else []
+    said += [f"{_pixels(large)} infinite or beyond {HALF_MAX:.0f}, taken as {HALF_MAX:.0f}"] if large else []
+    if warn:
+        warn(Problem("RG355", "; ".join(said), Place(name_of(source)), severity="warning"))
+    return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+
+
+def as_rgba(pixels: Pixels) -> Pixels:
+    """Four channels from one to four: grey three times, and an alpha of one."""
+    height, width, count = pixels.shape
+    one = 255 if pixels.dtype == np.uint8 else 1
+    rgba = np.full((height, width, 4), one, dtype=pixels.dtype)
+    if count <= 2:
+        rgba[..., :3] = pixels[..., :1]
+        rgba[..., 3:] = pixels[..., 1:] if count == 2 else one
+    else:
+        rgba[..., :count] = pixels
+    return rgba
+
+
+def _pixels(count: int) -> str:
+    return f"{count} pixels are" if count != 1 else "1 pixel is"
