@@ -15,8 +15,8 @@ from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import what_happened
 from rendergraph.errors import Misuse, Problem, RenderError
 from rendergraph.expand import CAMERA
-from rendergraph.gl import state as gl_state
 from rendergraph.gl import textures
+from rendergraph.gl.surroundings import settle
 from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import bounds
@@ -198,21 +198,26 @@ class Runner:
                     call()
             return None
         taken: list[tuple[str, float, Timer]] = []
+        measured = executable.device.can_time
         for step, timer in zip(executable.steps[parity], executable.timers, strict=True):
             before = perf_counter()
-            timer.start()
+            if measured:
+                timer.start()
             for call in step.calls:
                 call()
-            timer.stop()
+            if measured:
+                timer.stop()
             taken.append((step.step.node, perf_counter() - before, timer))
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        steps = tuple(StepTime(node, cpu * 1e3, timer.milliseconds()) for node, cpu, timer in taken)
+        steps = tuple(
+            StepTime(node, cpu * 1e3, timer.milliseconds() if measured else None) for node, cpu, timer in taken
+        )
         return FrameTimes(frame_ms, steps)
 
     def activate(self) -> None:
         """Write what holds for all frames; needed once, and again when another pipeline used the programs."""
-        gl_state.baseline(self.executable.device.raw)
+        settle(self.executable.device.raw)
         for call in self.executable.statics:
             call()
         self.executable.fresh = False

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import moderngl
 
 from rendergraph.errors import DeviceError, Problem
 from rendergraph.gl.raw import RawGL
+from rendergraph.gl.surroundings import Surroundings, settle
 
 REQUIRED_VERSION = 450
+TIME_ELAPSED = 0x88BF
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 
 
@@ -44,8 +47,31 @@ class Device:
         self._idle.use()
 
     def current(self) -> AbstractContextManager[Any]:
-        """Makes an owned context the thread's current one meanwhile; a borrowed one is the caller's matter."""
-        return self.ctx if self.owned else nullcontext()
+        """Where everything that touches GL is done.
+
+        An owned context is the thread's current one meanwhile; what was current before is again afterwards. A borrowed
+        one, which its owner makes current, is set to what drawing needs, and is given back as it was found.
+        """
+        return self._own() if self.owned else self._borrowed()
+
+    @contextmanager
+    def _own(self) -> Iterator[None]:
+        with previous_context(), self.ctx:
+            yield
+
+    @contextmanager
+    def _borrowed(self) -> Iterator[None]:
+        surroundings = Surroundings(self)
+        try:
+            settle(self.raw)
+            yield
+        finally:
+            surroundings.restore()
+
+    @property
+    def can_time(self) -> bool:
+        """Whether a time query can begin: the owner of a borrowed context may have one under way."""
+        return self.owned or not self.raw.current_query(TIME_ELAPSED)
 
     @property
     def renderer(self) -> str:
@@ -89,24 +115,58 @@ def open_device(index: int | None = None) -> Device:
     """
     import glcontext  # type: ignore[import-untyped]  # ships no types
 
-    chosen = index if index is not None else int(os.environ.get("RENDERGRAPH_DEVICE", "0"))
+    named = os.environ.get("RENDERGRAPH_DEVICE", "0")
+    if index is None and not named.isdecimal():
+        text = f"RENDERGRAPH_DEVICE is '{named}', not the number of a device as `rendergraph doctor` lists them"
+        raise DeviceError(Problem("RG611", text))
+    chosen = index if index is not None else int(named)
     try:
-        backend = glcontext.get_backend_by_name("egl")
-        context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen)
-        ctx = moderngl.create_context(context=context)
+        with previous_context():
+            backend = glcontext.get_backend_by_name("egl")
+            context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen)
+            ctx = moderngl.create_context(context=context)
+            return wrap(ctx, context.load, owned=True)
+    except DeviceError:
+        raise
     except Exception as error:  # glcontext raises bare Exception, with a different text a cause
         text = f"no usable OpenGL 4.5 device: {error}; `rendergraph doctor` says what to install"
         raise DeviceError(Problem("RG611", text)) from error
-    return wrap(ctx, context.load, owned=True)
 
 
 def borrow_device(ctx: moderngl.Context) -> Device:
-    """The caller's current context; it stays the caller's, and its state is set afresh each frame.
+    """The caller's current context; it stays the caller's, state and all.
 
     Raises:
         DeviceError: it is older than OpenGL 4.5, or no loader of GL functions is found.
     """
     return wrap(ctx, _system_loader(), owned=False)
+
+
+@contextmanager
+def previous_context() -> Iterator[None]:
+    """Makes current again what is current now: moderngl leaves a context with none being current."""
+    egl = _egl()
+    if egl is None or not (before := egl.eglGetCurrentContext()):
+        yield
+        return
+    display, draw, read = egl.eglGetCurrentDisplay(), egl.eglGetCurrentSurface(0x3059), egl.eglGetCurrentSurface(0x305A)
+    try:
+        yield
+    finally:
+        egl.eglMakeCurrent(display, draw, read, before)
+
+
+@cache
+def _egl() -> Any:
+    """The functions about current contexts, None where there is no EGL."""
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return None
+    handle = ctypes.c_void_p
+    egl.eglGetCurrentContext.restype = egl.eglGetCurrentDisplay.restype = egl.eglGetCurrentSurface.restype = handle
+    egl.eglMakeCurrent.argtypes = [handle] * 4
+    return egl
 
 
 def _system_loader() -> Callable[[str], int]:
@@ -135,7 +195,11 @@ def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "uniform_bindings": raw.integer(0x8A2F),
         "texture_size": raw.integer(0x0D33),
         "layers": raw.integer(0x88FF),
-        "samples": raw.integer(0x8D57),
+        "samples": raw.integer(0x910E),  # of colour textures
+        "depth_samples": raw.integer(0x910F),
+        "integer_samples": raw.integer(0x9110),
+        "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
+        "images": raw.integer(0x8F38),
+        **{f"groups_{axis}": raw.integer_at(0x91BE, number) for number, axis in enumerate("xyz")},
     }
-    raw.glEnable(0x884F)  # TEXTURE_CUBE_MAP_SEAMLESS
     return Device(ctx, raw, owned, limits)

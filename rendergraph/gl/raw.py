@@ -28,6 +28,8 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glCopyImageSubData": (None, _U, _U, _I, _I, _I, _I, _U, _U, _I, _I, _I, _I, _I, _I, _I),
     "glClearTexSubImage": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _P),
     "glClearNamedBufferData": (None, _U, _U, _U, _U, _P),
+    "glActiveTexture": (None, _U),
+    "glBindTexture": (None, _U, _U),
     "glBindTextureUnit": (None, _U, _U),
     "glBindTextures": (None, _U, _I, _P),
     "glBindSamplers": (None, _U, _I, _P),
@@ -61,6 +63,7 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glProgramUniformMatrix3fv": (None, _U, _I, _I, ctypes.c_ubyte, _P),
     "glProgramUniformMatrix4fv": (None, _U, _I, _I, ctypes.c_ubyte, _P),
     "glProgramUniform1i": (None, _U, _I, _I),
+    "glGetProgramiv": (None, _U, _U, _P),
     "glGetProgramInterfaceiv": (None, _U, _U, _U, _P),
     "glGetProgramResourceName": (None, _U, _U, _U, _I, _P, _P),
     "glShaderStorageBlockBinding": (None, _U, _U, _U),
@@ -70,7 +73,20 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glEnablei": (None, _U, _U),
     "glDisablei": (None, _U, _U),
     "glBlendFuncSeparatei": (None, _U, _U, _U, _U, _U),
+    "glIsEnabled": (ctypes.c_ubyte, _U),
+    "glIsEnabledi": (ctypes.c_ubyte, _U, _U),
     "glBlendEquationi": (None, _U, _U),
+    "glBlendEquationSeparatei": (None, _U, _U, _U),
+    "glColorMaski": (None, _U, *[ctypes.c_ubyte] * 4),
+    "glDepthMask": (None, ctypes.c_ubyte),
+    "glDepthRangeIndexed": (None, _U, ctypes.c_double, ctypes.c_double),
+    "glViewportIndexedf": (None, _U, _F, _F, _F, _F),
+    "glScissorIndexed": (None, _U, _I, _I, _I, _I),
+    "glClipControl": (None, _U, _U),
+    "glProvokingVertex": (None, _U),
+    "glPointParameteri": (None, _U, _I),
+    "glHint": (None, _U, _U),
+    "glLineWidth": (None, _F),
     "glDepthFunc": (None, _U),
     "glCullFace": (None, _U),
     "glFrontFace": (None, _U),
@@ -80,15 +96,30 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glStencilOpSeparate": (None, _U, _U, _U, _U),
     "glStencilMaskSeparate": (None, _U, _U),
     "glUseProgram": (None, _U),
+    "glBindVertexArray": (None, _U),
+    "glBindFramebuffer": (None, _U, _U),
+    "glBindRenderbuffer": (None, _U, _U),
+    "glBindTransformFeedback": (None, _U, _U),
+    "glPauseTransformFeedback": (None,),
+    "glResumeTransformFeedback": (None,),
+    "glBeginConditionalRender": (None, _U, _U),
+    "glEndConditionalRender": (None,),
     "glMemoryBarrier": (None, _U),
     "glPixelStorei": (None, _U, _I),
     "glBindBuffer": (None, _U, _U),
+    "glBindBufferBase": (None, _U, _U, _U),
+    "glBindBufferRange": (None, _U, _U, _U, _S, _S),
     "glCreateQueries": (None, _U, _I, _P),
     "glDeleteQueries": (None, _I, _P),
     "glBeginQuery": (None, _U, _U),
     "glEndQuery": (None, _U),
     "glGetQueryObjectui64v": (None, _U, _U, _P),
+    "glGetQueryiv": (None, _U, _U, _P),
     "glGetIntegerv": (None, _U, _P),
+    "glGetIntegeri_v": (None, _U, _U, _P),
+    "glGetInteger64i_v": (None, _U, _U, _P),
+    "glGetDoublev": (None, _U, _P),
+    "glGetDoublei_v": (None, _U, _U, _P),
     "glGetError": (_U,),
     "glIsTexture": (ctypes.c_ubyte, _U),
     "glIsBuffer": (ctypes.c_ubyte, _U),
@@ -135,6 +166,18 @@ class RawGL:
         """`glGetIntegerv` of one value."""
         value = _I()
         self.glGetIntegerv(parameter, ctypes.byref(value))
+        return value.value
+
+    def integer_at(self, parameter: int, index: int) -> int:
+        """`glGetIntegeri_v` of one value."""
+        value = _I()
+        self.glGetIntegeri_v(parameter, index, ctypes.byref(value))
+        return value.value
+
+    def current_query(self, target: int) -> int:
+        """The query of a target that has begun, 0 where none has."""
+        value = _I()
+        self.glGetQueryiv(target, 0x8865, ctypes.byref(value))
         return value.value
 
     def error(self) -> str | None:

@@ -18,7 +18,6 @@ _FACTOR = {"zero": 0, "one": 1, "src_color": 0x300, "one_minus_src_color": 0x301
 _EQUATION = {"add": 0x8006, "min": 0x8007, "max": 0x8008, "subtract": 0x800A, "reverse_subtract": 0x800B}
 _CULL = {"front": 0x404, "back": 0x405}
 _BLEND, _CULL_FACE, _DEPTH_TEST, _STENCIL_TEST, _OFFSET, _CLAMP = 0x0BE2, 0x0B44, 0x0B71, 0x0B90, 0x8037, 0x864F
-_FRAMEBUFFER_SRGB, _MULTISAMPLE = 0x8DB9, 0x809D
 
 Call = Callable[[], object]
 Pieces = dict[str, tuple[Call, ...]]
@@ -113,11 +112,3 @@ def changes(before: Pieces | None, after: Pieces) -> list[Call]:
 
 def _describe(calls: tuple[Call, ...]) -> list[tuple[int, tuple[object, ...]]]:
     return [(id(call.func), call.args) for call in calls if isinstance(call, partial)]
-
-
-def baseline(raw: RawGL) -> None:
-    """State that no step states; set once a frame on a borrowed context, once for ever on our own."""
-    raw.glEnable(_FRAMEBUFFER_SRGB)
-    raw.glEnable(_MULTISAMPLE)
-    raw.glDisable(0x0BD0)  # DITHER
-    raw.glEnable(0x8642)  # PROGRAM_POINT_SIZE

@@ -126,7 +126,6 @@ def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[An
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
     texels: npt.NDArray[Any] = np.empty((desc.layers, height, width, channels), dtype)
     device.ctx.finish()
-    device.raw.glBindBuffer(0x88EB, 0)  # PIXEL_PACK_BUFFER: a borrowed context may have left one
     device.raw.glPixelStorei(0x0D05, 1)
     device.raw.glGetTextureSubImage(
         texture.glo, mip, 0, 0, 0, width, height, desc.layers, gl_format, gl_type, texels.nbytes, texels.ctypes.data
@@ -151,7 +150,6 @@ def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
     data = np.ascontiguousarray(texels, dtype)
     assert data.size == width * height * desc.layers * channels, (data.shape, desc)
-    device.raw.glBindBuffer(0x88EC, 0)  # PIXEL_UNPACK_BUFFER
     device.raw.glPixelStorei(0x0CF5, 1)
     if desc.kind == "texture2d":
         device.raw.glTextureSubImage2D(texture.glo, mip, 0, 0, width, height, gl_format, gl_type, data.ctypes.data)
@@ -165,7 +163,6 @@ def upload_bytes(device: Device, texture: GpuTexture, texels: npt.NDArray[np.uin
     """Write (height, width, 4) bytes into mip 0 as they are, sRGB-encoded where the format says so."""
     data = np.ascontiguousarray(texels)
     height, width = data.shape[:2]
-    device.raw.glBindBuffer(0x88EC, 0)
     device.raw.glPixelStorei(0x0CF5, 1)
     device.raw.glTextureSubImage2D(texture.glo, 0, 0, 0, width, height, 0x1908, _UBYTE, data.ctypes.data)
 

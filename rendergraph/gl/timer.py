@@ -5,9 +5,9 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 
-from rendergraph.gl.device import Device
+from rendergraph.gl.device import TIME_ELAPSED, Device
 
-_TIME_ELAPSED, _QUERY_RESULT = 0x88BF, 0x8866
+_QUERY_RESULT = 0x8866
 _NO_ANSWER = 1 << 40
 """Nanoseconds, 18 minutes: a driver that has nothing to say answers with its largest number."""
 
@@ -19,15 +19,15 @@ class Timer:
     device: Device
 
     def __post_init__(self) -> None:
-        self._glo = self.device.raw.make("glCreateQueries", _TIME_ELAPSED)
+        self._glo = self.device.raw.make("glCreateQueries", TIME_ELAPSED)
 
     def start(self) -> None:
         """Begin."""
-        self.device.raw.glBeginQuery(_TIME_ELAPSED, self._glo)
+        self.device.raw.glBeginQuery(TIME_ELAPSED, self._glo)
 
     def stop(self) -> None:
         """End; the answer comes when the device is done."""
-        self.device.raw.glEndQuery(_TIME_ELAPSED)
+        self.device.raw.glEndQuery(TIME_ELAPSED)
 
     def milliseconds(self) -> float | None:
         """What it took, None where the driver does not know; waits for the device."""

@@ -52,7 +52,7 @@ class Session:
 
         Args:
             device: EGL device number as `doctor` lists them.
-            ctx: the caller's own current context, borrowed.
+            ctx: the caller's own current context, borrowed: drawn in whatever its state, and given back as it was found.
 
         Raises:
             DeviceError: there is no usable GL device.

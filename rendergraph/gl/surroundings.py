@@ -1,0 +1,298 @@
+"""The state around a frame that no step states: set to what every frame needs, and given back on a borrowed context.
+
+One table says how each piece of OpenGL's state is read, how it is set, and what frames need of it. `settle` sets what
+is needed; `Surroundings` keeps all that drawing changes and puts it back.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.errors import Problem, RenderError
+
+if TYPE_CHECKING:
+    from rendergraph.gl.device import Device
+    from rendergraph.gl.raw import RawGL
+
+_FRONT, _BACK = 0x0404, 0x0405
+_DRAW_BUFFERS, _VIEWPORTS, _IMAGE_UNITS = 0x8824, 0x825B, 0x8F38  # MAX_…
+_ACTIVE_TEXTURE, _TEXTURE0, _SAMPLER_BINDING = 0x84E0, 0x84C0, 0x8919
+_FEEDBACK, _FEEDBACK_PAUSED, _FEEDBACK_ACTIVE = 0x8E22, 0x8E23, 0x8E24
+_SAMPLES_PASSED, _QUERY_NO_WAIT = 0x8914, 0x8E14
+
+NEEDED: dict[int, bool] = {
+    0x8DB9: True,  # FRAMEBUFFER_SRGB
+    0x809D: True,  # MULTISAMPLE
+    0x8642: True,  # PROGRAM_POINT_SIZE
+    0x884F: True,  # TEXTURE_CUBE_MAP_SEAMLESS
+    0x0BD0: False,  # DITHER
+    0x0BF2: False,  # COLOR_LOGIC_OP
+    0x0B20: False,  # LINE_SMOOTH
+    0x0B41: False,  # POLYGON_SMOOTH
+    0x2A01: False,  # POLYGON_OFFSET_POINT
+    0x2A02: False,  # POLYGON_OFFSET_LINE
+    0x8C89: False,  # RASTERIZER_DISCARD
+    0x8F9D: False,  # PRIMITIVE_RESTART
+    0x8D69: False,  # PRIMITIVE_RESTART_FIXED_INDEX
+    0x809E: False,  # SAMPLE_ALPHA_TO_COVERAGE
+    0x809F: False,  # SAMPLE_ALPHA_TO_ONE
+    0x80A0: False,  # SAMPLE_COVERAGE
+    0x8E51: False,  # SAMPLE_MASK
+    0x8C36: False,  # SAMPLE_SHADING
+    **{0x3000 + plane: False for plane in range(8)},  # CLIP_DISTANCE0…
+}
+"""Capabilities that no step states, and whether they are enabled while frames are drawn."""
+
+_STATED = (0x0B44, 0x0B71, 0x0B90, 0x8037, 0x864F)
+"""Capabilities that each step states: CULL_FACE, DEPTH_TEST, STENCIL_TEST, POLYGON_OFFSET_FILL, DEPTH_CLAMP."""
+
+_INDEXED = ((0x0BE2, _DRAW_BUFFERS), (0x0C11, _VIEWPORTS))
+"""Capabilities of each draw buffer or viewport, which steps and framebuffers state: BLEND, SCISSOR_TEST."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A function that sets state, and how what it takes is found.
+
+    Attributes:
+        call: the raw function.
+        first: what it takes before the values.
+        queries: parameter and number of values, in the order the function takes them.
+        kind: `i` for whole numbers, `f` for fractions.
+        count: for state of which there are several, the parameter that says how many; the function then takes an index
+            after `first`.
+        needed: the values while frames are drawn, None where steps say or it does not matter.
+    """
+
+    call: str
+    queries: tuple[tuple[int, int], ...]
+    first: tuple[int, ...] = ()
+    kind: str = "i"
+    count: int = 0
+    needed: tuple[float, ...] | None = None
+
+
+def _each(*parameters: int) -> tuple[tuple[int, int], ...]:
+    return tuple((parameter, 1) for parameter in parameters)
+
+
+def _pixel_store(*parameters: int, needed: int = 0) -> list[Setting]:
+    return [Setting("glPixelStorei", _each(p), (p,), needed=(needed,)) for p in parameters]
+
+
+def _buffer(target: int, binding: int, needed: tuple[float, ...] | None = None) -> Setting:
+    return Setting("glBindBuffer", _each(binding), (target,), needed=needed)
+
+
+SETTINGS: tuple[Setting, ...] = (
+    # fixed function
+    Setting("glClipControl", _each(0x935C, 0x935D), needed=(0x8CA1, 0x935E)),  # LOWER_LEFT, NEGATIVE_ONE_TO_ONE
+    Setting("glProvokingVertex", _each(0x8E4F), needed=(0x8E4E,)),  # LAST_VERTEX_CONVENTION
+    Setting("glPointParameteri", _each(0x8CA0), (0x8CA0,), needed=(0x8CA2,)),  # SPRITE_COORD_ORIGIN, UPPER_LEFT
+    Setting("glHint", _each(0x8B8B), (0x8B8B,), needed=(0x1100,)),  # FRAGMENT_SHADER_DERIVATIVE_HINT, DONT_CARE
+    Setting("glLineWidth", _each(0x0B21), kind="f", needed=(1.0,)),
+    Setting("glDepthRangeIndexed", ((0x0B70, 2),), kind="f", count=_VIEWPORTS, needed=(0.0, 1.0)),
+    Setting("glViewportIndexedf", ((0x0BA2, 4),), kind="f", count=_VIEWPORTS),
+    Setting("glScissorIndexed", ((0x0C10, 4),), count=_VIEWPORTS),
+    Setting("glDepthFunc", _each(0x0B74)),
+    Setting("glDepthMask", _each(0x0B72)),
+    Setting("glColorMaski", ((0x0C23, 4),), count=_DRAW_BUFFERS),
+    Setting("glBlendFuncSeparatei", _each(0x80C9, 0x80C8, 0x80CB, 0x80CA), count=_DRAW_BUFFERS),
+    Setting("glBlendEquationSeparatei", _each(0x8009, 0x883D), count=_DRAW_BUFFERS),
+    Setting("glCullFace", _each(0x0B45)),
+    Setting("glFrontFace", _each(0x0B46)),
+    Setting("glPolygonMode", _each(0x0B40), (0x0408,)),
+    Setting("glPolygonOffset", _each(0x8038, 0x2A00), kind="f"),
+    Setting("glStencilFuncSeparate", _each(0x0B92, 0x0B97, 0x0B93), (_FRONT,)),
+    Setting("glStencilFuncSeparate", _each(0x8800, 0x8CA3, 0x8CA4), (_BACK,)),
+    Setting("glStencilOpSeparate", _each(0x0B94, 0x0B95, 0x0B96), (_FRONT,)),
+    Setting("glStencilOpSeparate", _each(0x8801, 0x8802, 0x8803), (_BACK,)),
+    Setting("glStencilMaskSeparate", _each(0x0B98), (_FRONT,)),
+    Setting("glStencilMaskSeparate", _each(0x8CA5), (_BACK,)),
+    # how texels travel: bytes swapped, first bit, row length, rows, texels, images skipped, image height; alignment
+    *_pixel_store(0x0CF0, 0x0CF1, 0x0CF2, 0x0CF3, 0x0CF4, 0x806D, 0x806E),
+    *_pixel_store(0x0D00, 0x0D01, 0x0D02, 0x0D03, 0x0D04, 0x806B, 0x806C),
+    *_pixel_store(0x0CF5, 0x0D05, needed=1),
+    # what is bound
+    _buffer(0x8892, 0x8894),  # ARRAY
+    _buffer(0x8F36, 0x8F36),  # COPY_READ
+    _buffer(0x8F37, 0x8F37),  # COPY_WRITE
+    _buffer(0x8F3F, 0x8F43),  # DRAW_INDIRECT
+    _buffer(0x90EE, 0x90EF),  # DISPATCH_INDIRECT
+    _buffer(0x8A11, 0x8A28),  # UNIFORM
+    _buffer(0x90D2, 0x90D3),  # SHADER_STORAGE
+    _buffer(0x88EB, 0x88ED, (0,)),  # PIXEL_PACK
+    _buffer(0x88EC, 0x88EF, (0,)),  # PIXEL_UNPACK
+    _buffer(0x9192, 0x9193, (0,)),  # QUERY
+    Setting("glBindRenderbuffer", _each(0x8CA7), (0x8D41,)),
+    Setting("glBindFramebuffer", _each(0x8CAA), (0x8CA8,)),  # READ
+    Setting("glBindFramebuffer", _each(0x8CA6), (0x8CA9,)),  # DRAW
+    Setting("glBindVertexArray", _each(0x85B5)),
+    Setting("glUseProgram", _each(0x8B8D)),
+    Setting("glBindTransformFeedback", _each(0x8E25), (_FEEDBACK,), needed=(0,)),
+)
+
+_BLOCKS = (
+    (0x8A11, 0x8A2F, (0x8A28, 0x8A29, 0x8A2A)),  # UNIFORM_BUFFER
+    (0x90D2, 0x90DD, (0x90D3, 0x90D4, 0x90D5)),  # SHADER_STORAGE_BUFFER
+)
+"""Target, number of binding points; parameters for the buffer, its start and its size at each."""
+
+_TEXTURES = {
+    0x0DE0: 0x8068, 0x0DE1: 0x8069, 0x806F: 0x806A, 0x8C18: 0x8C1C, 0x8C1A: 0x8C1D, 0x84F5: 0x84F6, 0x8513: 0x8514,
+    0x9009: 0x900A, 0x8C2A: 0x8C2C, 0x9100: 0x9104, 0x9102: 0x9105,
+}  # fmt: skip
+"""Texture target to the parameter that says what is bound to it."""
+
+_READERS: dict[tuple[str, bool], tuple[str, Any]] = {
+    ("i", False): ("glGetIntegerv", ctypes.c_int), ("f", False): ("glGetDoublev", ctypes.c_double),
+    ("i", True): ("glGetIntegeri_v", ctypes.c_int), ("f", True): ("glGetDoublei_v", ctypes.c_double),
+}  # fmt: skip
+
+
+def settle(raw: RawGL) -> None:
+    """Set what frames need and no step states."""
+    for capability, on in NEEDED.items():
+        (raw.glEnable if on else raw.glDisable)(capability)
+    for setting in SETTINGS:
+        if setting.needed is None:
+            continue
+        call = getattr(raw, setting.call)
+        for index in _indices(raw, setting):
+            call(*setting.first, *index, *setting.needed)
+
+
+class Surroundings:
+    """A borrowed context's state as its owner has it, and the way back to it.
+
+    Not kept, since drawing does not touch it: program pipelines, tessellation, hints but one, clear values, atomic
+    counters, debug output. A query that the owner has begun counts what is drawn meanwhile.
+    """
+
+    def __init__(self, device: Device) -> None:
+        """Read everything; a transform feedback under way is paused.
+
+        Raises:
+            RenderError: conditional rendering is under way, which can neither be paused nor taken up again.
+        """
+        raw = self._raw = device.raw
+        self._ctx = device.ctx
+        raw.error()  # the owner's own, which must not be taken for ours
+        _refuse_conditional(raw)
+        self._feedback = bool(raw.integer(_FEEDBACK_ACTIVE)) and not raw.integer(_FEEDBACK_PAUSED)
+        if self._feedback:
+            raw.glPauseTransformFeedback()
+        self._framebuffer = device.ctx.fbo, device.ctx.mglo.fbo  # moderngl binds again what it believes bound
+        self._enabled = [(capability, raw.glIsEnabled(capability)) for capability in (*NEEDED, *_STATED)]
+        self._indexed = [
+            (capability, index, raw.glIsEnabledi(capability, index))
+            for capability, count in _INDEXED
+            for index in range(raw.integer(count))
+        ]
+        self._units = raw.integer(_ACTIVE_TEXTURE), list(_units(raw, device.limits["units"]))
+        self._images = list(_images(raw))
+        self._blocks = list(_blocks(raw))
+        self._settings = [
+            (getattr(raw, setting.call), (*setting.first, *index, *_values(raw, setting, index)))
+            for setting in SETTINGS
+            for index in _indices(raw, setting)
+        ]
+
+    def restore(self) -> None:
+        """Set everything as it was."""
+        raw = self._raw
+        self._ctx.fbo, self._ctx.mglo.fbo = self._framebuffer
+        for capability, on in self._enabled:
+            (raw.glEnable if on else raw.glDisable)(capability)
+        for capability, index, on in self._indexed:
+            (raw.glEnablei if on else raw.glDisablei)(capability, index)
+        active, units = self._units
+        raw.glBindTextures(0, len(units), None)
+        raw.glBindSamplers(0, len(units), (ctypes.c_uint * len(units))(*(sampler for _, sampler, _ in units)))
+        for unit, _, bound in units:
+            for target, texture in bound:
+                raw.glActiveTexture(_TEXTURE0 + unit)
+                raw.glBindTexture(target, texture)
+        raw.glActiveTexture(active)
+        for image in self._images:
+            raw.glBindImageTexture(*image)
+        for target, index, buffer, start, size in self._blocks:
+            if size:
+                raw.glBindBufferRange(target, index, buffer, start, size)
+            else:
+                raw.glBindBufferBase(target, index, buffer)
+        for call, arguments in self._settings:  # after the points of blocks, which change what is bound beside them
+            call(*arguments)
+        if self._feedback:
+            raw.glResumeTransformFeedback()
+
+
+def _indices(raw: RawGL, setting: Setting) -> list[tuple[int, ...]]:
+    return [(index,) for index in range(raw.integer(setting.count))] if setting.count else [()]
+
+
+def _values(raw: RawGL, setting: Setting, index: tuple[int, ...]) -> Iterator[float]:
+    name, ctype = _READERS[setting.kind, bool(index)]
+    found = (ctype * 4)()
+    for parameter, count in setting.queries:
+        getattr(raw, name)(parameter, *index, ctypes.byref(found))
+        yield from found[:count]
+
+
+def _units(raw: RawGL, count: int) -> Iterator[tuple[int, int, list[tuple[int, int]]]]:
+    """Each unit with its sampler and its textures by target."""
+    value = ctypes.c_int()
+    address = ctypes.byref(value)
+    for unit in range(count):
+        raw.glActiveTexture(_TEXTURE0 + unit)
+        bound = []
+        for target, parameter in _TEXTURES.items():
+            raw.glGetIntegerv(parameter, address)
+            if value.value:
+                bound.append((target, value.value))
+        yield unit, raw.integer(_SAMPLER_BINDING), bound
+
+
+def _images(raw: RawGL) -> Iterator[tuple[Any, ...]]:
+    """What `glBindImageTexture` takes for each image unit: unit, texture, level, layered, layer, access, format."""
+    value = ctypes.c_int()
+    for unit in range(raw.integer(_IMAGE_UNITS)):
+        raw.glGetIntegeri_v(0x8F3A, unit, ctypes.byref(value))
+        if not value.value:
+            yield unit, 0, 0, 0, 0, 0x88B8, 0x8229  # READ_ONLY, R8: as a context begins
+            continue
+        found = []
+        for parameter in (0x8F3A, 0x8F3B, 0x8F3C, 0x8F3D, 0x8F3E, 0x906E):
+            raw.glGetIntegeri_v(parameter, unit, ctypes.byref(value))
+            found.append(value.value)
+        yield unit, *found
+
+
+def _blocks(raw: RawGL) -> Iterator[tuple[int, int, int, int, int]]:
+    """Target, index, buffer, start and size of each binding point; size 0 is the whole buffer."""
+    value = ctypes.c_int64()
+    for target, count, parameters in _BLOCKS:
+        for index in range(raw.integer(count)):
+            found = [0, 0, 0]
+            for number, parameter in enumerate(parameters):
+                raw.glGetInteger64i_v(parameter, index, ctypes.byref(value))
+                found[number] = value.value
+                if not found[0]:
+                    break
+            yield target, index, found[0], found[1], found[2]
+
+
+def _refuse_conditional(raw: RawGL) -> None:
+    """OpenGL has no query for it, but begins none inside another."""
+    query = raw.make("glCreateQueries", _SAMPLES_PASSED)
+    raw.glBeginConditionalRender(query, _QUERY_NO_WAIT)
+    under_way = raw.error() is not None
+    if not under_way:
+        raw.glEndConditionalRender()
+    raw.delete("glDeleteQueries", query)
+    if under_way:
+        text = "conditional rendering is under way in the borrowed context; end it with glEndConditionalRender first"
+        raise RenderError(Problem("RG618", text))
