@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.cli.describe import describe, summary
-from rendergraph.cli.describe import example as placeholder
-from rendergraph.example import example
+from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts, summary
 
 from .markdown import block, code, folded, listing, page, prose, table
 from .pictures import Studio, View, example_and_base, exhibit
@@ -52,16 +50,20 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
     inputs = table(
         ("input", "takes", "", "", "made by"),
         [
-            (code(p["name"]), code(_meaning(p)), _input_facts(p), prose(p["doc"]), _makers(p, described))
+            (code(p["name"]), code(meaning(p)), ", ".join(input_facts(p)), prose(p["doc"]), _makers(p, described))
             for p in node["inputs"]
         ],
     )
     outputs = table(
         ("output", "carries", "as", ""),
-        [(code(p["name"]), code(_meaning(p)), _output_facts(p), prose(p["doc"])) for p in node["outputs"]],
+        [
+            (code(p["name"]), code(meaning(p)), prose(", ".join(output_facts(p))), prose(p["doc"]))
+            for p in node["outputs"]
+        ],
     )
     internal = table(
-        ("texture", "as", ""), [(code(p["name"]), _output_facts(p), prose(p["doc"])) for p in node["internal"]]
+        ("texture", "as", ""),
+        [(code(p["name"]), prose(", ".join(output_facts(p))), prose(p["doc"])) for p in node["internal"]],
     )
     parameters = table(
         ("parameter", "value", "default", "range", "as", ""),
@@ -78,7 +80,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         f"*{found.family}* — {prose(first)}",
         prose(rest.strip()),
         _pictures(found, node["outputs"], studio),
-        f"## In a file\n\n{block(example(found, Catalog.discover()) or placeholder(node), 'yaml')}",
+        f"## In a file\n\n{block(in_a_file(found, Catalog.discover()), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
         f"## Outputs\n\n{outputs}",
         f"## Parameters\n\n{parameters}" if parameters else "",
@@ -117,20 +119,6 @@ def _figure(studio: Studio, view: View, name: str, scene: str) -> str:
     return f"```{{figure}} {name}.png\n:alt: {caption.replace('`', '')}\n\n{caption}\n```"
 
 
-def _meaning(port: dict[str, Any]) -> str:
-    return str(port["semantic"] or f"like {port['like']}")
-
-
-def _input_facts(port: dict[str, Any]) -> str:
-    words = [] if port["kind"] in ("texture2d", port["semantic"]) else [code(port["kind"])]
-    words += ["optional"] if port["optional"] else []
-    words += ["one or a list"] if port.get("many") else []
-    words += ["continued"] if port.get("continues") else []
-    words += [f"in group {code(port['group'])}"] if port.get("group") else []
-    words += ["any size"] if port.get("size") == "any" else []
-    return ", ".join(words)
-
-
 def _makers(port: dict[str, Any], described: dict[str, dict[str, Any]]) -> str:
     """The standard nodes with an output that fits."""
     if port["semantic"] in (None, "any", "view", "scene"):
@@ -141,16 +129,6 @@ def _makers(port: dict[str, Any], described: dict[str, dict[str, Any]]) -> str:
         if any(o["semantic"] == port["semantic"] and o["kind"] == port["kind"] for o in node["outputs"])
     ]
     return ", ".join(f"[`{name}`]({name}.md)" for name in names)
-
-
-def _output_facts(port: dict[str, Any]) -> str:
-    words = [] if port["kind"] == "texture2d" else [code(port["kind"])]
-    words += [code(port["format"])] if port.get("format") else []
-    words += [str(port["size"])] if port.get("size") else []
-    words += [f"{port[key]} {key}" for key in ("mips", "layers", "samples") if port.get(key)]
-    words += [f"needs {' and '.join(map(code, port['needs']))}"] if port.get("needs") else []
-    words += [f"`{port['declaration']}`"] if port.get("declaration") else []
-    return ", ".join(words)
 
 
 def _value(value: Any, unit: str) -> str:

@@ -7,7 +7,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
 
 if TYPE_CHECKING:
-    from rendergraph.catalog import NodeType
+    from rendergraph.catalog import Catalog, NodeType
     from rendergraph.declare import Extensions
 
 
@@ -56,7 +56,12 @@ def _input(name: str, port: Any) -> dict[str, Any]:
         "optional": port.optional,
         "many": port.many,
         "size": port.size,
-        "filter": port.filter if isinstance(port.filter, str) else _COMPUTED,
+        "filter": _constant(port.filter),
+        "wrap": port.wrap,
+        "compare": port.compare,
+        "anisotropy": port.anisotropy,
+        "samples": port.samples,
+        "use": port.use,
         "doc": port.doc,
     }
 
@@ -65,8 +70,11 @@ _COMPUTED = "computed"
 
 
 def _output(name: str, port: Any) -> dict[str, Any]:
-    from rendergraph.declare import Function, Views
+    from rendergraph.declare import Function, InOut, Views
 
+    if isinstance(port, InOut) and not port.optional:  # its texture is what is connected
+        return {"name": name, "kind": port.kind, "semantic": port.semantic and port.semantic.name, "like": port.like,
+                "continues": True, "doc": port.doc}  # fmt: skip
     if isinstance(port, Views):
         return {"name": name, "kind": "view", "semantic": "view", "doc": port.doc}
     if isinstance(port, Function):
@@ -79,13 +87,18 @@ def _output(name: str, port: Any) -> dict[str, Any]:
 def _made(name: str, port: Any) -> dict[str, Any]:
     semantic = port.semantic.name if port.semantic else None
     found = {"name": name, "kind": port.kind, "semantic": semantic, "like": port.like, "doc": port.doc}
-    if port.like is None and port.kind != "buffer":
+    if port.kind == "buffer":
+        found["bytes"] = _constant(port.bytes)
+    elif port.like is None:
         found |= {"format": _constant(port.format or "rgba16f"), "size": _size(1.0 if port.size is None else port.size)}
-        found |= {
-            key: _constant(getattr(port, key))
-            for key in ("mips", "layers", "samples")
-            if getattr(port, key) not in (None, 1)
-        }
+    else:
+        found |= {"format": _constant(port.format)} if port.format is not None else {}
+        found |= {"size": _size(port.size)} if port.size is not None else {}
+    for key in ("mips", "layers", "samples"):
+        if getattr(port, key) not in (None, 1):
+            found[key] = _constant(getattr(port, key))
+    if port.clear is not None:
+        found["clear"] = _constant(list(port.clear) if isinstance(port.clear, tuple) else port.clear)
     if getattr(port, "needs", ()):
         found["needs"] = list(port.needs)
     return found
@@ -151,7 +164,14 @@ def type_words(annotation: Any) -> str:
     return names.get(annotation, getattr(annotation, "__name__", str(annotation)))
 
 
-def example(described: dict[str, Any]) -> str:
+def in_a_file(found: NodeType, catalog: Catalog) -> str:
+    """A pipeline that runs with this node in it; where none can be put together, its entry with gaps to fill in."""
+    from rendergraph.example import example
+
+    return (example(found, catalog) or _entry(describe(found))).rstrip()
+
+
+def _entry(described: dict[str, Any]) -> str:
     """A node of this type in a pipeline file, with every input it must have."""
     needed = [port for port in described["inputs"] if not port.get("optional")]
     groups = list(dict.fromkeys(port["group"] for port in needed if port.get("group")))
@@ -159,3 +179,50 @@ def example(described: dict[str, Any]) -> str:
     links += [f"{p['name']}: NODE.{p['name']}" for p in needed if not p.get("group")]
     parts = [f"type: {described['name']}"] + ([f"inputs: {{{', '.join(links)}}}"] if links else [])
     return f"{described['name']}: {{{', '.join(parts)}}}"
+
+
+# --- facts of a port in words ----------------------------------------------------------------------------------------
+
+
+def meaning(port: dict[str, Any]) -> str:
+    """What a port carries: `radiance`, or `like source`."""
+    return str(port["semantic"] or (f"like {port['like']}" if port["like"] else ""))
+
+
+def input_facts(port: dict[str, Any]) -> list[str]:
+    """What an input takes beyond its meaning, where it is not the usual."""
+    words = ["optional"] if port["optional"] else []
+    words += ["one or a list"] if port.get("many") else []
+    words += ["continued"] if port.get("continues") else []
+    words += [f"in group {port['group']}"] if port.get("group") else []
+    words += [port["kind"]] if port["kind"] not in ("texture2d", port["semantic"]) else []
+    words += ["any size"] if port.get("size") == "any" else []
+    words += [{"depth_test": "for the depth test alone", "image": "as an image"}.get(port.get("use", ""), "")]
+    words += [{"multi": "multisampled", "any": "multisampled or not"}.get(port.get("samples", ""), "")]
+    words += [{"nearest": "", _COMPUTED: "filter computed"}.get(port.get("filter", ""), port.get("filter", ""))]
+    words += [{"clamp": ""}.get(port.get("wrap", ""), port.get("wrap", ""))]
+    words += ["compared"] if port.get("compare") else []
+    words += [f"anisotropy {port['anisotropy']}"] if port.get("anisotropy", 1) > 1 else []
+    return [word for word in words if word]
+
+
+def output_facts(port: dict[str, Any]) -> list[str]:
+    """How an output or internal texture is allocated."""
+    words = [port["kind"]] if port["kind"] not in ("texture2d", port["semantic"]) else []
+    words += ["the input of its name, continued"] if port.get("continues") else []
+    for key in ("format", "size"):
+        if key in port:
+            words.append(f"{key} computed" if port[key] == _COMPUTED else str(port[key]))
+    words += [f"{port['bytes']} bytes"] if "bytes" in port else []
+    words += ["all mips" if port["mips"] == 0 else f"{port['mips']} mips"] if "mips" in port else []
+    words += [f"{port[key]} {key}" for key in ("layers", "samples") if key in port]
+    words += [f"cleared to {_number_words(port['clear'])}"] if "clear" in port else []
+    words += [f"needs {' and '.join(port['needs'])}"] if port.get("needs") else []
+    words += [port["declaration"]] if port.get("declaration") else []
+    return words
+
+
+def _number_words(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(f"{part:g}" for part in value) + "]"
+    return value if isinstance(value, str) else f"{value:g}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.cli import options
-from rendergraph.cli.describe import describe, example
+from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts
 from rendergraph.cli.output import emit, emit_json, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
@@ -47,7 +47,8 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
         known = [*catalog.names(), *_FILES]
         text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
         raise InputError(Problem("RG511", text))
-    described = describe(catalog.get(topic), catalog.extensions)
+    found = catalog.get(topic)
+    described = describe(found, catalog.extensions) | {"example": in_a_file(found, catalog)}
     if any("added" in parameter for parameter in described["parameters"]):
         warn(catalog.extensions.warnings)
     emit_json(described) if as_json else emit(_node_text(described))
@@ -185,10 +186,11 @@ def _node_text(node: dict[str, Any]) -> str:
     origin = node["family"] or "single file"
     parts = [f"{node['name']}  ({origin})", node["doc"]]
     if node["inputs"]:
-        rows = [(p["name"], _meaning(p), _input_facts(p), p["doc"]) for p in node["inputs"]]
+        rows = [(p["name"], meaning(p), ", ".join(input_facts(p)), p["doc"]) for p in node["inputs"]]
         parts.append("Inputs\n" + _block(rows))
-    rows = [(p["name"], _meaning(p), _output_facts(p), p["doc"]) for p in node["outputs"]]
-    parts.append("Outputs\n" + _block(rows))
+    for title, ports in (("Outputs", node["outputs"]), ("Textures of its own", node["internal"])):
+        rows = [(p["name"], meaning(p), ", ".join(output_facts(p)), p["doc"]) for p in ports]
+        parts.append(f"{title}\n{_block(rows)}" if rows else "")
     if node["parameters"]:
         knobs = [
             (p["name"], p["type"], f"{_value(p['default'])} {p['unit']}".strip(), _range(p), p["doc"])
@@ -200,32 +202,12 @@ def _node_text(node: dict[str, Any]) -> str:
     ]
     if added:
         parts.append("Choices of plugins\n" + _block(added))
-    parts.append("In a file\n" + _indented(example(node)))
-    return "\n\n".join(parts)
+    parts.append("In a file\n" + _indented(node["example"]))
+    return "\n\n".join(filter(None, parts))
 
 
 def _block(rows: Sequence[tuple[Any, ...]], heads: tuple[str, ...] = ()) -> str:
     return _indented(table(rows, heads))
-
-
-def _meaning(port: dict[str, Any]) -> str:
-    return str(port["semantic"] or f"like {port['like']}")
-
-
-def _input_facts(port: dict[str, Any]) -> str:
-    words = ["optional"] if port["optional"] else []
-    words += ["list"] if port.get("many") else []
-    words += ["continued"] if port.get("continues") else []
-    words += [f"in {port['group']}"] if port.get("group") else []
-    words += [port["kind"]] if port["kind"] != "texture2d" else []
-    return ", ".join(words)
-
-
-def _output_facts(port: dict[str, Any]) -> str:
-    words = [port["kind"]] if port["kind"] != "texture2d" else []
-    words += [str(port[key]) for key in ("format", "size") if port.get(key)]
-    words += [f"needs {' and '.join(port['needs'])}"] if port.get("needs") else []
-    return ", ".join(words)
 
 
 def _range(parameter: dict[str, Any]) -> str:

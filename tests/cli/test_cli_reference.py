@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 
-from rendergraph.api import DisplayColor, Function, InOut, Input, Internal, Node, Output, Radiance, ShadowLookup, param
+from rendergraph.api import (
+    Depth,
+    DisplayColor,
+    Function,
+    InOut,
+    Input,
+    Internal,
+    Node,
+    Output,
+    Radiance,
+    ShadowLookup,
+    param,
+)
 from rendergraph.catalog import Catalog
-from rendergraph.cli.describe import describe, example, type_words
+from rendergraph.cli.describe import describe, in_a_file, input_facts, output_facts, type_words
 from rendergraph.cli.output import table
 from rendergraph.resources import folder
 
@@ -72,10 +85,11 @@ class Sample(Node):
     More.
     """
 
-    radiance = Input(Radiance, group="all", doc="In.")
+    radiance = Input(Radiance, group="all", filter="linear", wrap="repeat", doc="In.")
+    depth = Input(Depth, optional=True, use="depth_test", doc="Tested.")
     shadows = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows.")
     target = InOut(Radiance, optional=True, doc="Continued.")
-    color = Output(DisplayColor, format="rgba8", size=0.5, doc="Out.")
+    color = Output(DisplayColor, format="rgba8", size=0.5, mips=0, clear=(0, 0, 0, 1), doc="Out.")
     same = Output(like="radiance", doc="Same.")
     lookup = Function(ShadowLookup, "s.glsl", needs=("radiance",), doc="Lookup.")
     scratch = Internal(like="radiance")
@@ -106,8 +120,40 @@ def test_a_description_says_everything() -> None:
     }  # fmt: skip
     assert parameters["tint"]["type"] == "number | [number, number, number]"
     assert parameters["mode"]["choices"] == ["a", "b"]
-    assert example(found) == "sample: {type: sample, inputs: {all: NODE}}"
     json.dumps(found)
+    facts = {port["name"]: ", ".join(input_facts(port)) for port in found["inputs"]}
+    assert facts == {
+        "radiance": "in group all, linear, repeat",
+        "depth": "optional, for the depth test alone",
+        "shadows": "optional, one or a list, function",
+        "target": "optional, continued",
+    }
+    facts = {port["name"]: ", ".join(output_facts(port)) for port in found["outputs"]}
+    assert facts == {
+        "target": "rgba16f, viewport",
+        "color": "rgba8, viewport × 0.5, all mips, cleared to [0, 0, 0, 1]",
+        "same": "",
+        "lookup": "function, needs radiance, float shadow(int light, vec3 position, vec3 normal)",
+    }
+
+
+class Cube(Node):
+    """Takes what no standard node makes."""
+
+    sky = Input(Radiance, kind="texture_cube", doc="In.")
+    color = Output(DisplayColor, format="rgba8", doc="Out.")
+
+
+def test_an_example_has_gaps_where_nothing_fits() -> None:
+    catalog = Catalog.of(Cube, Sample)
+    assert in_a_file(catalog.get("cube"), catalog) == "cube: {type: cube, inputs: {sky: NODE.sky}}"
+
+
+def test_an_example_runs_as_it_is_printed(cli: Any, tmp_path: Path) -> None:
+    text = cli("explain", "gaussian_blur").out.partition("In a file\n")[2]
+    (tmp_path / "a.yaml").write_text(textwrap.dedent(text))
+    assert (tmp_path / "a.yaml").read_text().rstrip() == cli("explain", "gaussian_blur", "--json").json["example"]
+    assert cli("check", "a.yaml").code == 0
 
 
 def test_types_read_as_in_the_file() -> None:
