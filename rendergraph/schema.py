@@ -52,6 +52,10 @@ def schema(catalog: Catalog) -> Schema:
         "size": {"type": "array", "items": [_SIDE, _SIDE], "minItems": 2, "maxItems": 2,
                  "description": "Width and height in pixels."},
         "scene": _one_of(shipped_scenes(), "A shipped scene, a scene file, .obj, .gltf or .glb."),
+        "plugins": {
+            "type": "array", "items": {"type": "string"},
+            "description": "Folders of shader nodes, and installed packages that the pipeline needs.",
+        },
         "parameters": _mapping({"$ref": "#/definitions/parameter"}, "Knobs of the whole pipeline, used as $name."),
         "inputs": _mapping({"$ref": "#/definitions/input"}, "What the file takes as the type of a node."),
         "nodes": _mapping({"$ref": "#/definitions/node"}, "Nodes by id."),
@@ -117,7 +121,7 @@ def _node(types: Mapping[str, type[Node] | None], extensions: Extensions) -> Sch
     known: list[Schema] = [{"const": name, "description": _about(cls) if cls else ""} for name, cls in types.items()]
     file = f"[./]|^({'|'.join(shipped_pipelines())})$"
     elsewhere: list[Schema] = [
-        {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's."},
+        {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's, or a shader file."},
         {"$ref": "#"},
     ]
     found = _object(NODE_KEYS, {
