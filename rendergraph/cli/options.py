@@ -143,7 +143,7 @@ def selection_options(function: F) -> F:
                 help="A further folder that files may be read from.",
             ),
             click.option(
-                "--limit", "limits", multiple=True, type=LIMIT, help="Allow a file more than usual; messages say when."
+                "--limit", "limits", multiple=True, type=LIMIT, help="Allow more than usual; messages say when."
             ),
             plugin_option,
         ]

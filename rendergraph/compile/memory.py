@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -54,7 +53,6 @@ class Memory:
     _dummies: dict[tuple[int, bool], moderngl.Renderbuffer] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        check_size(sum(physical.bytes for physical in self.plan.physicals))
         try:
             for physical in self.plan.physicals:
                 if isinstance(physical.desc, BufferDesc):
@@ -201,38 +199,6 @@ class Memory:
         for table in (self._framebuffers, self._dummies, self._views, self._samplers):
             table.clear()
         self.physicals.clear()
-
-
-def check_size(needed: int) -> None:
-    """Refuse a plan before the driver is asked: some drivers end the process where others return an error.
-
-    Raises:
-        RenderError: it needs more than three quarters of the free memory, or than RENDERGRAPH_MEMORY_LIMIT MiB.
-    """
-    named = os.environ.get("RENDERGRAPH_MEMORY_LIMIT", "")
-    if named.isdigit():
-        limit = int(named) * 2**20
-    else:
-        available = _available()
-        if available is None:
-            return  # this system does not say
-        limit = available * 3 // 4
-    if needed > limit:
-        text = (f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used; a smaller "
-                "--size helps, RENDERGRAPH_MEMORY_LIMIT=MiB sets the limit")  # fmt: skip
-        raise RenderError(Problem("RG616", text))
-
-
-def _available() -> int | None:
-    """Bytes of memory that can be had: what the system would give up of its file cache counts too."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            for line in lines:
-                if line.startswith("MemAvailable:"):
-                    return int(line.split()[1]) * 1024
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError):
-        return None
 
 
 def _key(attachment: Attachment | None) -> tuple[object, ...] | None:

@@ -50,7 +50,8 @@ def load(
         sets: what `-s` takes on the command line, such as `ao.radius=0.8`.
         patches: merge patches, as files or mappings.
         asset_roots: more folders that the file may reach.
-        limits: what files may ask for, by the names that messages give: `yaml-depth`, `scene-vertices`, …
+        limits: what files may ask for, by the names that messages give: `yaml-depth`, `scene-vertices`, …;
+            `plan-memory`, in MiB, is what textures may take.
         plugins: Python files or folders with node types.
 
     Raises:
@@ -79,10 +80,11 @@ def _limit_names() -> dict[str, dict[str, str]]:
     from rendergraph.document import Limits as YamlLimits
     from rendergraph.scene.files import Limits as SceneLimits
 
-    return {
+    names = {
         kind: {f"{kind}-{entry.name.replace('_', '-')}": entry.name for entry in fields(limits)}
         for kind, limits in (("yaml", YamlLimits), ("scene", SceneLimits))
     }
+    return {**names, "plan": {"plan-memory": "memory"}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +125,7 @@ class Pipeline:
         return self if self.size == size else replace(self, size=size)
 
     def allowed(self, kind: str) -> dict[str, int]:
-        """The limits set for `yaml` or `scene` files, by field."""
+        """The limits set for `yaml` or `scene` files, or for the `plan`, by field."""
         names = _limit_names()[kind]
         return {names[name]: most for name, most in self.limits if name in names}
 
@@ -170,7 +172,6 @@ class Pipeline:
         from rendergraph.scene.model import Environment, Scene
 
         file = self.spec.scene
-        stamp = (file.stat().st_mtime_ns, file.stat().st_size) if file is not None and file.is_file() else None
         limits = Limits(**self.allowed("scene"))
         roots = self.spec.roots.folders if file is not None else ()
         key = (Path.cwd(), file, self.environment, self.camera, roots, limits, self.plugins)

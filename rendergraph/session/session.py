@@ -13,6 +13,7 @@ from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
 from rendergraph.errors import Problem, RenderError, UsageError
 from rendergraph.execute import FrameTimes, Runner, median_times, summary
 from rendergraph.gl.device import Device, borrow_device, open_device
+from rendergraph.gl.memory import check_memory
 from rendergraph.images import decode
 from rendergraph.images.decode import Limits
 from rendergraph.scene import animate, pack
@@ -52,7 +53,7 @@ class Session:
 
         Args:
             device: EGL device number as `doctor` lists them.
-            ctx: the caller's own current context, borrowed: drawn in whatever its state, and given back as it was found.
+            ctx: the caller's own current context, borrowed: drawn in whatever its state, given back as it was found.
 
         Raises:
             DeviceError: there is no usable GL device.
@@ -172,7 +173,9 @@ class Session:
         executable = self._kept.take(key)
         if executable is None:
             plan = allocate(schedule(expansion, shuffle=shuffle), alias=alias)
-            self._kept.make_room(plan.memory.allocated_bytes)
+            needed = plan.memory.allocated_bytes
+            self._kept.make_room(needed)
+            check_memory(self.device, needed, pipeline.allowed("plan").get("memory"))
             with stamps.looking() as files:
                 executable = compile_plan(
                     self.device, plan, types, expansion.views, scene, self.programs, poison=poison

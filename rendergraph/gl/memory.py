@@ -1,0 +1,92 @@
+"""How much memory a plan may take: what the driver says is free on the device, or the machine's own."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from pathlib import Path
+
+from rendergraph.errors import Problem, RenderError, UsageError
+from rendergraph.gl.device import Device
+
+VARIABLE = "RENDERGRAPH_MEMORY_LIMIT"
+_NVX_CURRENT_AVAILABLE, _ATI_TEXTURE_FREE = 0x9049, 0x87FC
+_GROUP = Path("/sys/fs/cgroup")
+
+
+def check_memory(device: Device, needed: int, allowed: int | None = None) -> None:
+    """Refuse a plan before the driver is asked: some drivers end the process where others return an error.
+
+    Args:
+        device: where the textures would be.
+        needed: bytes.
+        allowed: MiB that may be used; by default what RENDERGRAPH_MEMORY_LIMIT says, else three quarters of what is
+            free on the device.
+
+    Raises:
+        RenderError: it needs more than that.
+        UsageError: RENDERGRAPH_MEMORY_LIMIT is no whole number.
+    """
+    named = os.environ.get(VARIABLE, "")
+    if allowed is None and named:
+        if not named.isdecimal():
+            raise UsageError(Problem("RG500", f"{VARIABLE} is '{named}', not a number of MiB, as in 4096"))
+        allowed = int(named)
+    if allowed is not None:
+        limit = allowed << 20
+        of = ""
+    else:
+        free = free_on_device(device) or free_on_machine()
+        if free is None:
+            return  # nobody says
+        limit = free * 3 // 4
+        of = f", three quarters of the {free / 2**20:.0f} MiB that are free"
+    if needed > limit:
+        text = (
+            f"the plan needs {needed / 2**20:.0f} MiB of textures, {limit / 2**20:.0f} MiB may be used{of}; "
+            f"a smaller --size helps, --limit plan-memory=MiB allows more, as does {VARIABLE}"
+        )
+        raise RenderError(Problem("RG616", text))
+
+
+def free_on_device(device: Device) -> int | None:
+    """Bytes the driver says are free for textures, None where it does not say or the device is the CPU itself."""
+    if device.software:
+        return None
+    for extension, parameter in (
+        ("GL_NVX_gpu_memory_info", _NVX_CURRENT_AVAILABLE), ("GL_ATI_meminfo", _ATI_TEXTURE_FREE),
+    ):  # fmt: skip
+        if extension in device.ctx.extensions:
+            kibibytes = (ctypes.c_int * 4)()  # the second answers with four numbers, of which the first is the total
+            device.raw.glGetIntegerv(parameter, ctypes.byref(kibibytes))
+            if kibibytes[0] > 0:
+                return kibibytes[0] * 1024
+    return None
+
+
+def free_on_machine() -> int | None:
+    """Bytes that can be had: what the system would give up of its file cache counts, and so does a container's bound."""
+    found = [bytes for bytes in (_of_system(), _of_group()) if bytes is not None]
+    return min(found, default=None)
+
+
+def _of_system() -> int | None:
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            for line in lines:
+                if line.startswith("MemAvailable:"):
+                    return int(line.split()[1]) * 1024
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError):
+        return None
+
+
+def _of_group() -> int | None:
+    """What is left of a control group's memory (version 2), None where it has no bound."""
+    try:
+        bound = (_GROUP / "memory.max").read_text(encoding="ascii").strip()
+        used = int((_GROUP / "memory.current").read_text(encoding="ascii"))
+        cached = dict(line.split() for line in (_GROUP / "memory.stat").read_text(encoding="ascii").splitlines())
+        return None if bound == "max" else max(0, int(bound) - used + int(cached.get("inactive_file", 0)))
+    except (ValueError, OSError):
+        return None
