@@ -178,6 +178,29 @@ def test_the_picture_is_what_the_file_draws(gl: Any, tmp_path: Path) -> None:
     assert difference.mean() < 1.0, "render README's study.yaml again: docs/images/study.png"
 
 
+def test_the_comparison_is_what_the_files_give(gl: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table's figures but for times, which are a machine's, and the pictures beside it."""
+    from rendergraph.images import read
+
+    monkeypatch.syspath_prepend(DOCS)
+    made: Any = importlib.import_module("_generate.comparison")
+    found = made.readme_comparison(tmp_path)
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for result in found.results:
+        row = re.search(rf"^{result.name} +(.*)$", text, re.MULTILINE)
+        assert row is not None, f"README's table lacks {result.name}"
+        flip, rmse, psnr, ssim, *_, passes, size, unit = row[1].split()
+        m = result.metrics
+        for shown, value in ((flip, m.flip), (rmse, m.rmse), (ssim, m.ssim)):
+            assert float(shown) == pytest.approx(value, abs=5e-4)
+        assert psnr == "∞" if m.psnr is None else float(psnr) == pytest.approx(m.psnr, abs=0.2)
+        assert int(passes) == result.pass_count
+        assert unit == "MB"
+        assert float(size) == pytest.approx(float(str(result.memory["allocated_bytes"])) / (1 << 20), abs=0.06)
+    difference = np.abs(made.side_by_side(found).astype(np.float64) - read(made.PICTURE)[..., :3])
+    assert difference.mean() < 1.0, "run docs/_generate/comparison.py again"
+
+
 def test_links_of_the_readme_lead_somewhere() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     for target in re.findall(r"\]\((?!https?:)([^)#]+)", text):
