@@ -21,7 +21,7 @@ NODE_KEYS = ("type", "inputs", "params")
 PARAMETER_KEYS = ("default", "min", "max", "doc")
 INPUT_KEYS = ("semantic", "optional", "doc")
 TOP_KEYS = (
-    "rendergraph", "description", "extends", "size", "scene", "parameters", "inputs", "nodes", "outputs",
+    "rendergraph", "description", "extends", "size", "scene", "plugins", "parameters", "inputs", "nodes", "outputs",
 )  # fmt: skip
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")
@@ -121,6 +121,7 @@ class _Grammar:
             "extends": self.extends,
             "size": self.size,
             "scene": self.text,
+            "plugins": self.texts,
             "parameters": self.named(self.keyed(PARAMETER_KEYS, self.parameter_part)),
             "inputs": self.named(self.keyed(INPUT_KEYS, self.input_part)),
             "nodes": self.named(self.keyed(NODE_KEYS, self.node_part), "node id"),
@@ -178,6 +179,12 @@ class _Grammar:
             return value
         what = "empty" if value.data == "" else value.kind
         self.say(value, "RG106", f"'{key}' takes text, this is {what}")
+        return None
+
+    def texts(self, value: Value, key: str) -> Value | None:
+        if isinstance(value.data, list):
+            return value.with_data([part for part in value.data if self.text(part, key) is not None])
+        self.say(value, "RG106", f"'{key}' takes a list as in [./effects, some-package], this is {value.kind}")
         return None
 
     def version(self, value: Value, key: str) -> Value | None:

@@ -121,7 +121,7 @@ def _node(types: Mapping[str, type[Node] | None], extensions: Extensions) -> Sch
     known: list[Schema] = [{"const": name, "description": _about(cls) if cls else ""} for name, cls in types.items()]
     file = f"[./]|^({'|'.join(shipped_pipelines())})$"
     elsewhere: list[Schema] = [
-        {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's, or a shader file."},
+        {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's; a shader."},
         {"$ref": "#"},
     ]
     found = _object(NODE_KEYS, {

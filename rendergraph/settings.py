@@ -134,8 +134,14 @@ class Roots:
             raise InputError(Problem(*mistake, place))
         return _resolved(path)
 
-    def mistake(self, path: Path, written: str | None = None) -> tuple[str, str] | None:
-        """Code and text of what forbids reading a path, None where nothing does."""
+    def mistake(self, path: Path, written: str | None = None, *, folder: bool = False) -> tuple[str, str] | None:
+        """Code and text of what forbids reading a path, None where nothing does.
+
+        Args:
+            path: the path.
+            written: how it is written in the file.
+            folder: a folder is meant.
+        """
         name = shown(written or path, 120)
         look(path)
         if "://" in (written or str(path)):
@@ -148,15 +154,17 @@ class Roots:
                     f"'{name}' lies outside the folder of the file it is reached from; --asset-root DIR allows DIR too"
                 )
                 return "RG012", text
-            if resolved.is_file():
+            if resolved.is_dir() if folder else resolved.is_file():
                 return None
             if resolved.is_dir():
                 return "RG011", f"'{name}' is a folder, a file is needed"
+            if resolved.is_file():
+                return "RG011", f"'{name}' is a file, a folder is needed"
             if resolved.exists():
                 return "RG011", f"'{name}' is not a regular file"
         except (OSError, ValueError, RuntimeError):
             return "RG011", f"'{name}' cannot be a file's path"
-        return "RG011", f"there is no file '{name}'{_neighbour(resolved)}"
+        return "RG011", f"there is no {'folder' if folder else 'file'} '{name}'{_neighbour(resolved)}"
 
 
 def _neighbour(path: Path) -> str:

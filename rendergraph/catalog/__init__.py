@@ -7,6 +7,6 @@ it uses.
 from __future__ import annotations
 
 from rendergraph.catalog.catalog import GROUP, Catalog
-from rendergraph.catalog.types import Listed, NodeType
+from rendergraph.catalog.types import SHADERS, Listed, NodeType
 
-__all__ = ["GROUP", "Catalog", "Listed", "NodeType"]
+__all__ = ["GROUP", "SHADERS", "Catalog", "Listed", "NodeType"]

@@ -81,6 +81,10 @@ class Catalog:
         """The names of all types, sorted; nothing is imported."""
         return sorted(self._types.keys() | self._listed.keys())
 
+    def files(self) -> set[Path]:
+        """The files of everything that has been listed."""
+        return {one.file for found in self._listed.values() for one in found}
+
     def families(self) -> dict[str, list[str]]:
         """Family to the names of its types, both sorted; nothing is imported."""
         table: dict[str, list[str]] = {}

@@ -24,6 +24,7 @@ class NodeType:
         shaders: the folder its shaders' names are relative to.
         plugin: the name of the entry point, or of the folder, it came by.
         warnings: what is missing in a shader file and can be done without.
+        missing: nobody has it; it stands in a graph that is only looked at.
     """
 
     name: str
@@ -33,6 +34,7 @@ class NodeType:
     shaders: Path
     plugin: str = "builtin"
     warnings: tuple[Problem, ...] = ()
+    missing: bool = False
 
     @property
     def is_shader(self) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import InOut, Input, LightFacts, TextureInfo
-from rendergraph.document import Value, shown
+from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
@@ -16,6 +16,7 @@ from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import instance, plugged
+from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Signature
@@ -41,6 +42,28 @@ def link(
     return replace(_Linker(spec, catalog, lights).graph(), unfilled=frozenset(unfilled))
 
 
+def sketch(
+    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), unfilled: Collection[str] = ()
+) -> tuple[Graph, tuple[Problem, ...]]:
+    """A graph to look at, where nothing is wrong but that node types are missing; those are drawn as far as known.
+
+    Returns:
+        The graph, and what is missing; nothing is where `link` gives the same graph.
+
+    Raises:
+        InputError: something else is wrong; with all mistakes.
+    """
+    try:
+        return link(spec, catalog, lights, unfilled), ()
+    except InputError as error:
+        linker = _Linker(spec, catalog, lights, sketching=True)
+        graph = linker.graph()
+        lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
+        if any(problem not in lacking for problem in error.problems):
+            raise
+        return replace(graph, unfilled=frozenset(unfilled)), error.problems
+
+
 def endpoint(graph: Graph, text: str) -> Endpoint:
     """The port of a linked graph that `node.port` names, internals included; for taps.
 
@@ -64,9 +87,20 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
 
 
 class _Linker:
-    def __init__(self, spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts]) -> None:
+    """Links one pipeline.
+
+    Attributes:
+        problems: mistakes; a sketch has been linked before, and pays no heed to them.
+        missing: those that say that a type is not there or cannot be used.
+    """
+
+    def __init__(
+        self, spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts], *, sketching: bool = False
+    ) -> None:
         self.spec = spec
-        self.catalog = catalog
+        self.sketching = sketching
+        self.missing: list[Problem] = []
+        self.catalog = spec.catalog or catalog
         self.lights = tuple(lights)
         self.problems: list[Problem] = []
 
@@ -91,7 +125,7 @@ class _Linker:
             self._shown(nodes, outputs, infer)
             self.problems += infer.problems
         problems = [*self.spec.problems, *self.problems]
-        if problems:
+        if problems and not self.sketching:
             raise InputError(_in_order(problems))
         return Graph(
             name=self.spec.name,
@@ -101,11 +135,12 @@ class _Linker:
             lights=self.lights,
             textures=textures,
             aliases=self._aliases(names),
+            warnings=tuple(dict.fromkeys(warning for one in types.values() for warning in one.warnings)),
         )
 
     def _say(self, problem: Problem) -> None:
         self.problems.append(problem)
-        if len(self.problems) >= MOST_PROBLEMS:
+        if len(self.problems) >= MOST_PROBLEMS and not self.sketching:
             raise InputError(_in_order([*self.spec.problems, *self.problems]))
 
     def _types(self) -> dict[str, NodeType]:
@@ -115,16 +150,19 @@ class _Linker:
             value = node.value.get("type")
             if not node.type or value is None:
                 continue  # said by resolve
-            if node.type not in self.catalog:
-                text = f"there is no node type '{shown(node.type)}'{suggestion(node.type, self.catalog.names())}"
-                self._say(value.problem("RG102", text))
-                continue
             try:
+                if node.type not in self.catalog:
+                    raise InputError(value.problem("RG102", unknown_type(self.spec, self.catalog, node.type)))
                 found[node.id] = self.catalog.get(node.type)
             except InputError as error:
-                if node.type not in failed:
+                self.missing += error.problems
+                if node.type not in failed or node.type not in self.catalog:
                     self.problems += error.problems
                 failed.add(node.type)
+                if self.sketching:
+                    found[node.id] = stand_in(self.spec, node)
+                elif len(self.problems) >= MOST_PROBLEMS:
+                    raise InputError(_in_order([*self.spec.problems, *self.problems])) from None
         return found
 
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
@@ -358,4 +396,4 @@ def _in_order(problems: Sequence[Problem]) -> list[Problem]:
     )
 
 
-__all__ = ["Endpoint", "Graph", "GraphNode", "endpoint", "link"]
+__all__ = ["Endpoint", "Graph", "GraphNode", "endpoint", "link", "sketch"]

@@ -142,6 +142,8 @@ class Infer:
     def _evaluate(self, end: Endpoint) -> TextureInfo | None:
         bound = self.nodes[end.node]
         port = bound.ports[end.port]
+        if bound.type.missing:
+            return None
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):

@@ -11,11 +11,12 @@ from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Limits, Source, Value
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import checked, entries, read, word
-from rendergraph.resolve.files import Files, is_bare
+from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
 from rendergraph.resolve.merge import diff, merge_patch
 from rendergraph.resolve.sets import from_plain, patch_of, settings
 from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, Parameter, PipelineSpec, Scope
+from rendergraph.resolve.words import is_bare
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.settings import Roots
 
@@ -56,6 +57,7 @@ def resolve(
     wanted = settings(sets)
     files = Files(catalog, asset_roots, limits)
     document = _entry(source, limits)
+    files.plugins.start(*_home(document, files))
     files.own(document)
     tree = files.chain(document)
     for patch in patches:
@@ -74,7 +76,7 @@ def resolve(
     tree = flat.flatten(tree, "", {}, [s for s in wanted if s.scope])
     _complete(tree, files)
     found, roots = _scene(tree, files, scene)
-    tree = _with_scene(tree, found, document)
+    tree = _with_plugins(_with_scene(tree, found, document), files)
     return PipelineSpec(
         name=document.path.stem if document.path else Path(document.file).stem,
         path=document.path,
@@ -87,9 +89,11 @@ def resolve(
         parameters=parameters(tree),
         scopes=flat.scopes,
         tree=tree,
-        notes=tuple(files.notes),
+        notes=(*files.notes, *files.plugins.notes),
         problems=tuple(files.problems),
         dropped=frozenset(files.dropped),
+        catalog=files.catalog,
+        missing=tuple(files.plugins.missing),
     )
 
 
@@ -109,6 +113,14 @@ def _entry(source: str | Path | Document, limits: Limits) -> Document:
             raise InputError(Problem("RG015", f"there is no shipped pipeline '{source}'{hint}"))
         return read(shipped[source], None, limits, keep_going=True)
     return read(Path(source), None, limits, keep_going=True)
+
+
+def _home(document: Document, files: Files) -> tuple[Path, Roots]:
+    """Where the resolved file will stand, and what may be reached from there."""
+    path = document.path
+    shipped = path is not None and path in shipped_pipelines().values()
+    home = Path() if path is None or shipped else path.parent
+    return home, Roots.around(home / "x", files.asset_roots)
 
 
 def _patch(patch: Path | Mapping[str, Any], files: Files, limits: Limits) -> Value:
@@ -175,6 +187,16 @@ def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
     text = os.path.relpath(path, home) if path.is_relative_to(home) else str(path)
     text = text if not is_bare(text) else f"./{text}"
     return tree.with_data({**_parts(tree), "scene": value.with_data(text)})
+
+
+def _with_plugins(tree: Value, files: Files) -> Value:
+    """All plugins of all files as the resolved file has to name them."""
+    written = files.plugins.written
+    if not written:
+        return tree
+    named = tree.get("plugins") or next(iter(written.values()))
+    listed = [value.with_data(text) for text, value in written.items()]
+    return tree.with_data({**_parts(tree), "plugins": named.with_data(list(listed))})
 
 
 __all__ = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,23 +11,19 @@ from rendergraph.document import Document, Limits, Source, Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import MOST_PROBLEMS, checked, entries, read, word
 from rendergraph.resolve.merge import TypeNames, merge_pipeline
+from rendergraph.resolve.plugins import Plugins, is_shader
+from rendergraph.resolve.words import is_bare
 from rendergraph.resources import shipped_pipelines
 from rendergraph.settings import Roots
 
 _MOST_EXTENDED = 32
-_BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
-
-
-def is_bare(text: str) -> bool:
-    """Whether a word names something shipped or installed, rather than a path."""
-    return bool(_BARE.match(text))
 
 
 class Files:
     """Reads and merges files, each once; collects what is wrong with them."""
 
     def __init__(self, catalog: Catalog, asset_roots: Sequence[Path], limits: Limits) -> None:
-        self.catalog = catalog
+        self.plugins = Plugins(catalog, self.say)
         self.asset_roots = [Path(root) for root in asset_roots]
         self.limits = limits
         self.problems: list[Problem] = []
@@ -38,6 +33,11 @@ class Files:
         self._open: list[Path] = []
         self._trees: dict[Path, Value | None] = {}
         self._names: dict[str, TypeNames | None] = {}
+
+    @property
+    def catalog(self) -> Catalog:
+        """The node types, with those that the files read so far bring along."""
+        return self.plugins.catalog
 
     def say(self, problem: Problem) -> None:
         """Note a mistake.
@@ -60,6 +60,17 @@ class Files:
         around = document.path or Path("x")
         self._roots[document.source] = roots or Roots.around(around, self.asset_roots)
         self.dropped |= document.dropped
+        self.bring(document.root)
+
+    def bring(self, tree: Value) -> None:
+        """Add the node types that a file's `plugins` name."""
+        named = tree.get("plugins")
+        for value in named.data if named is not None and isinstance(named.data, list) else ():
+            self.plugins.add(value, self.beside(value), self.roots_of(value))
+
+    def typed_roots(self, value: Value) -> Roots:
+        """Where a `type` may lead; a path typed on the command line is the user's own."""
+        return self._roots.get(value.source) or Roots.around(self.beside(value), self.asset_roots)
 
     def beside(self, value: Value) -> Path:
         """A path that a file's value holds, joined to the file's folder."""
@@ -77,7 +88,7 @@ class Files:
                 hint = "; a file beside this one is named with its extension"
             self.say(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
             return None
-        roots = self.roots_of(value)
+        roots = self.typed_roots(value)
         mistake = roots.mistake(path := self.beside(value), text)
         if mistake:
             self.say(value.problem(*mistake))
@@ -141,7 +152,7 @@ class Files:
         if isinstance(value.data, dict):
             return self._inline(value)
         text = str(value.data)
-        if is_bare(text) and (text in self.catalog or text not in shipped_pipelines()):
+        if is_shader(text) or (is_bare(text) and (text in self.catalog or text not in shipped_pipelines())):
             return None
         before = len(self.problems)
         found = self.locate(value, shipped_pipelines(), "pipeline")
@@ -159,6 +170,7 @@ class Files:
         return self._trees[key]
 
     def _inline(self, value: Value) -> Value:
+        self.bring(value)
         if word(value, "extends") is None:
             return value
         return self.chain(checked(Document(value, value.source), keep_going=True))
@@ -175,10 +187,17 @@ class Files:
         sub = self.sub_pipeline(value)
         if sub is not None:
             return TypeNames(frozenset(entries(sub, "parameters")), frozenset(entries(sub, "inputs")), {})
-        text = str(value.data)
+        text = self.type_name(value)
         if text not in self._names:
             self._names[text] = self._node_names(text)
         return self._names[text]
+
+    def type_name(self, value: Value) -> str:
+        """The name in the catalog of what a `type` names, the text itself where there is no such file."""
+        text = str(value.data)
+        if not is_shader(text) or self.missing(value):
+            return text
+        return self.plugins.shader(self.beside(value))
 
     def _node_names(self, text: str) -> TypeNames | None:
         if text not in self.catalog:
@@ -195,7 +214,7 @@ class Files:
         text = str(value.data)
         if is_bare(text):
             return None
-        mistake = self.roots_of(value).mistake(self.beside(value), text)
+        mistake = self.typed_roots(value).mistake(self.beside(value), text)
         return value.problem(*mistake) if mistake else None
 
 

@@ -82,11 +82,12 @@ class Flattener:
             problem = self.files.missing(node_type) if node_type is not None and node_type.data is not None else None
             if problem:
                 self.files.say(problem)
-            self._add(NodeSpec(node_id, "" if problem else word(node, "type") or "", scope, inputs, params, node))
+            name_of = self.files.type_name(node_type) if node_type is not None and node_type.data is not None else ""
+            self._add(NodeSpec(node_id, "" if problem else name_of, scope, inputs, params, node))
             said = ("nodes", name, "type") in self.files.dropped
             if (node_type is None or node_type.data is None) and not said:
                 self._without_type(name, node)
-            return node
+            return _typed(node, node_type, name_of)
         return self._composite(name, node, node_type, sub, scope, params, inputs, sets)
 
     def _composite(
@@ -214,6 +215,13 @@ def parameters(tree: Value) -> dict[str, Parameter]:
             doc = word(declared, "doc") or ""
             found[name] = Parameter(name, value.plain(), declared.key_place, low, high, doc)
     return found
+
+
+def _typed(node: Value, node_type: Value | None, name: str) -> Value:
+    """A node whose type is written as the resolved file has to: a path relative to where that stands."""
+    if node_type is None or not isinstance(node.data, dict) or not name or node_type.data == name:
+        return node
+    return node.with_data({**node.data, "type": node_type.with_data(name)})
 
 
 def _number(declared: Value, key: str) -> float | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rendergraph.catalog import Catalog
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.settings import Roots
@@ -91,6 +92,8 @@ class PipelineSpec:
         notes: warnings: what was dropped, what is unused.
         problems: mistakes found so far. `link` raises them together with its own, so that a user sees all at once.
         dropped: paths of what was left out because of them.
+        catalog: the node types, with the shader files that the pipeline brings along.
+        missing: packages that it needs and that are not installed.
     """
 
     name: str
@@ -107,6 +110,8 @@ class PipelineSpec:
     notes: tuple[Problem, ...] = ()
     problems: tuple[Problem, ...] = ()
     dropped: frozenset[tuple[str, ...]] = frozenset()
+    catalog: Catalog | None = field(default=None, repr=False)
+    missing: tuple[str, ...] = ()
 
     def check(self) -> None:
         """Stop here if anything is wrong so far; for callers that do not go on to `link`.

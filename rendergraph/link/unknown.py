@@ -1,0 +1,71 @@
+"""Node types that nobody has: what to say, and what stands in for them where a graph is only looked at."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import create_model
+
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.declare import Input, Node, Output, structural
+from rendergraph.document import Value, shown
+from rendergraph.errors import nearest
+from rendergraph.resolve import NodeSpec, PipelineSpec
+from rendergraph.textures import Any as AnyTexture
+
+_LINK = re.compile(r"([^.@]+)(?:\.([^.@]+))?(?:@previous)?\Z")
+
+
+def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
+    """That there is no such type, and the way out."""
+    text = f"there is no node type '{shown(name)}'"
+    near = nearest(name, catalog.names())
+    if near is not None:
+        text += f"; did you mean '{near}'?"
+    if spec.missing:
+        return f"{text}; it may come with what is not installed: {', '.join(spec.missing)}"
+    return text if near is not None else f"{text}; install the plugin that brings it, or name its file with --plugin"
+
+
+def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
+    """A type that takes what the file gives it and makes what the file asks of it; it can be drawn, not run."""
+    taken = {name: Input(AnyTexture, optional=True, many=_is_list(value)) for name, value in node.inputs.items()}
+    made = {name: Output(AnyTexture) for name in _asked_of(spec, node.id)}
+    ports = {name: port for name, port in {**taken, **made}.items() if not hasattr(Node, name)}
+    base = type(Node)("Unknown", (Node,), {"__module__": __name__, "__doc__": "A node of unknown type.", **ports})
+    fields: dict[str, Any] = {
+        name: (Any, structural(default=None, doc=""))
+        for name in node.params
+        if name.isidentifier() and not name.startswith("_") and not hasattr(Node, name) and name not in ports
+    }
+    cls: type[Node] = create_model("Unknown", __base__=base, __module__=__name__, **fields)
+    return NodeType(node.type, "", cls, Path(), Path(), "", missing=True)
+
+
+def _is_list(value: Value) -> bool:
+    return isinstance(value.data, list)
+
+
+def _asked_of(spec: PipelineSpec, wanted: str) -> list[str]:
+    """The ports of a node that links and outputs of the file name."""
+    found: dict[str, None] = {}
+    for scope, name, value in _links(spec):
+        for part in value.data if isinstance(value.data, list) else [value]:
+            match = _LINK.match(part.data) if isinstance(part.data, str) else None
+            if match is not None and f"{scope}{match[1]}" == wanted:
+                found[match[2] or name] = None
+    return list(found)
+
+
+def _links(spec: PipelineSpec) -> Iterator[tuple[str, str, Value]]:
+    """Everything that may name a port: the scope it stands in, the port it is for, the value."""
+    tables: list[tuple[str, Mapping[str, Value]]] = [("", spec.outputs)]
+    tables += [(node.scope, node.inputs) for node in spec.nodes.values()]
+    for scope, inner in spec.scopes.items():
+        tables += [(inner.parent, inner.links), (scope, inner.outputs)]
+    for scope, table in tables:
+        for name, value in table.items():
+            yield scope, name, value

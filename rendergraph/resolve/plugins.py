@@ -1,0 +1,117 @@
+"""Node types that pipeline files bring along: shader files by path, folders of them, and packages they need.
+
+A pipeline file is data, so nothing here imports anything: shader files alone come by it, and from inside the roots.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+
+from rendergraph.catalog import SHADERS, Catalog, find
+from rendergraph.document import Value, shown
+from rendergraph.errors import Place, Problem
+from rendergraph.resolve.words import is_bare
+from rendergraph.settings import Roots
+
+
+class Plugins:
+    """The catalog of a pipeline, which grows with the files that are read.
+
+    Attributes:
+        catalog: the node types so far.
+        missing: packages that are needed and not installed.
+        written: what the resolved file has to name, by the text it has to use.
+        notes: warnings.
+    """
+
+    def __init__(self, catalog: Catalog, say: Callable[[Problem], None]) -> None:
+        self.catalog = catalog
+        self.missing: list[str] = []
+        self.written: dict[str, Value] = {}
+        self.notes: list[Problem] = []
+        self._say = say
+        self._home = Path.cwd()
+        self._roots = Roots(())
+        self._seen: set[Path] = set()
+        self._told: set[tuple[str, Place]] = set()
+
+    def start(self, home: Path, roots: Roots) -> None:
+        """Say where the resolved file will stand: paths in it are relative to there."""
+        self._home = home.resolve()
+        self._roots = roots
+
+    def spelled(self, path: Path) -> str:
+        """A path as the resolved file has to write it."""
+        inside = path.is_relative_to(self._home) or any(path.is_relative_to(root) for root in self._roots.folders)
+        text = os.path.relpath(path, self._home) if inside else str(path)
+        return text if text.startswith(("..", "/")) else f"./{text}"
+
+    def shader(self, path: Path) -> str:
+        """The type's name of a shader file that may be read."""
+        file = path.resolve()
+        name = self.spelled(file)
+        if name not in self.catalog:
+            self.catalog = self.catalog.with_shaders([(name, find.shader(file))])
+        return name
+
+    def add(self, value: Value, folder: Path, roots: Roots) -> None:
+        """One entry of `plugins`.
+
+        Args:
+            value: the entry.
+            folder: the path it holds, joined to the folder of its file.
+            roots: where its file may read from.
+        """
+        text = str(value.data)
+        if (text, value.place) in self._told:
+            return
+        self._told.add((text, value.place))
+        if is_bare(text):
+            self._package(value, text)
+            return
+        mistake = roots.mistake(folder, text, folder=True)
+        if mistake:
+            self._say(value.problem(*mistake))
+            return
+        folder = folder.resolve()
+        self.written.setdefault(self.spelled(folder), value)
+        if folder not in self._seen:
+            self._seen.add(folder)
+            self._shaders(value, text, folder, roots)
+
+    def _package(self, value: Value, name: str) -> None:
+        """A package that the pipeline needs; its node types come by its entry point."""
+        self.written.setdefault(name, value)
+        try:
+            metadata.distribution(name)
+        except metadata.PackageNotFoundError:
+            if name not in self.missing:
+                self.missing.append(name)
+                text = f"the pipeline needs the plugin '{name}', which is not installed: pip install {name}"
+                self._say(value.problem("RG130", text))
+
+    def _shaders(self, value: Value, text: str, folder: Path, roots: Roots) -> None:
+        try:
+            found, python = find.shaders(folder)
+        except ValueError as error:
+            self._say(value.problem("RG131", f"'{shown(text)}' is no folder of plugins: {error}"))
+            return
+        outside = [one.file for _, one in found if roots.mistake(one.file)]
+        for file in outside:
+            code, reason = roots.mistake(file, str(file.relative_to(folder))) or ("RG012", "")
+            self._say(value.problem(code, f"of plugin '{shown(text)}' {reason}"))
+        self.catalog = self.catalog.with_shaders((name, one) for name, one in found if one.file not in outside)
+        strange = [file for file in python if file not in self.catalog.files()]
+        if strange:
+            names = ", ".join(sorted(file.name for file in strange)[:3]) + (", …" if len(strange) > 3 else "")
+            words = f"'{shown(text)}' has Python ({names}), which is not run because a pipeline file names it; "
+            problem = value.problem("RG152", words + f"where you trust it, say --plugin {shown(text)}")
+            self.notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
+
+
+def is_shader(text: object) -> bool:
+    """Whether a type's text is the path of a shader file."""
+    return isinstance(text, str) and text.endswith(SHADERS)
