@@ -155,7 +155,7 @@ def _schema_words(entry: dict[str, Any]) -> str:
     types = entry.get("type", "string" if "anyOf" in entry else "any value")
     word = next(word for word in ([types] if isinstance(types, str) else types) if word != "null")
     if word == "array":
-        return f"[{len(entry['items'])} numbers]"
+        return f"[{len(entry['items'])} numbers]" if isinstance(entry["items"], list) else "[text, …]"
     names = {"string": "text", "object": "mapping", "integer": "whole number", "boolean": "true | false"}
     return names.get(word, word)
 
