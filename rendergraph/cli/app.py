@@ -107,7 +107,7 @@ def main(args: Sequence[str] | None = None) -> int:
     except Exception as error:
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
-        return _told([_unexpected(error)], 1, as_json)
+        return _told([unexpected(error)], 1, as_json)
 
 
 def _invoke(words: list[str]) -> int:
@@ -141,7 +141,8 @@ def _usage(error: click.UsageError) -> Problem:
     return Problem("RG500", f"{text[:1].lower()}{text[1:]}; see '{path} --help'")
 
 
-def _unexpected(error: Exception) -> Problem:
+def unexpected(error: Exception) -> Problem:
+    """What is said of an exception that nobody meant to be seen."""
     what = f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
     text = f"a mistake in rendergraph, not yours: {what}; RENDERGRAPH_TRACEBACK=1 shows where, please report that "
     return Problem("RG599", text + "with what `rendergraph doctor` prints")

@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rendergraph.cli.app import unexpected
 from rendergraph.cli.output import Warnings, emit_json, error_document, say
 from rendergraph.cli.run import say_summary
-from rendergraph.errors import InputError, RendergraphError
+from rendergraph.errors import InputError, RenderError, RendergraphError
 from rendergraph.resources import folder
 
 if TYPE_CHECKING:
+    from rendergraph.session import Session
     from rendergraph.session.watch import Turn
 
 Draw = Callable[..., "dict[str, Any]"]
@@ -35,7 +38,7 @@ def keep_drawing(draw: Draw, selection: Mapping[str, Any], device: int | None, *
     warnings = Warnings()
     told: tuple[str, ...] = ()
     with Session(device=device) as session:
-        for number, turn in enumerate(turns(lambda session: draw(warnings, session), session)):
+        for number, turn in enumerate(turns(partial(_attempt, draw, warnings), session)):
             if turn.error is not None:
                 if number == 0 and not _can_be_mended(turn.error, turn):
                     raise turn.error
@@ -53,6 +56,18 @@ def keep_drawing(draw: Draw, selection: Mapping[str, Any], device: int | None, *
                 emit_json(_document(turn), line=True)
             if sys.stdout is not None:
                 sys.stdout.flush()  # whoever reads a pipe waits for this picture, not for a full buffer
+
+
+def _attempt(draw: Draw, warnings: Warnings, session: Session) -> dict[str, Any]:
+    """Draw; a mistake of the program's own is said like any other, and the next edit tried."""
+    try:
+        return draw(warnings, session)
+    except (RendergraphError, OSError):
+        raise
+    except Exception as error:
+        if os.environ.get("RENDERGRAPH_TRACEBACK"):
+            raise
+        raise RenderError(unexpected(error)) from error
 
 
 def _can_be_mended(error: RendergraphError, turn: Turn[Any]) -> bool:
