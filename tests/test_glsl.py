@@ -377,7 +377,7 @@ def test_driver_messages_name_the_authors_line(folder: Path, form: str) -> None:
     text = fragment(folder, step("lamp"))
     (found,) = compile_problems("header\n" + form.format(line=line_of(text, "made = vec4")), text)
     assert found.code == "RG410"
-    assert found.text == "fragment shader: `x' undeclared"
+    assert found.text == "node 'light': fragment shader: `x' undeclared"
     assert found.place is not None
     assert (Path(found.place.file).name, found.place.line) == ("light.frag", 2)
     assert "made = vec4(shadow(3" in found.line_text
@@ -387,7 +387,7 @@ def test_messages_inside_a_function_lose_the_prefix(folder: Path) -> None:
     text = fragment(folder, step("lamp"))
     row = line_of(text, "return lamp_kernel")
     (found,) = compile_problems(f"0:{row}(60): error: no function `lamp_kernel'", text)
-    assert found.text == "fragment shader: no function `kernel'"
+    assert found.text == "node 'light': fragment shader: no function `kernel'"
     assert found.place is not None
     assert (Path(found.place.file).name, found.place.line) == ("shadow.glsl", 10)
     assert "lamp_" not in found.line_text
@@ -405,14 +405,14 @@ def test_warnings_are_left_out_where_there_are_errors(folder: Path) -> None:
     text = fragment(folder, step())
     found = compile_problems("0:1(1): warning: w\n0:1(1): error: e\n0:1(1): error: e", text)
     assert [(p.severity, "e" in p.text) for p in found] == [("error", True)]
-    assert compile_problems("out of memory", text)[0].text == "fragment shader: out of memory"
+    assert compile_problems("out of memory", text)[0].text == "node 'light': fragment shader: out of memory"
 
 
 def test_link_messages_name_the_stages(folder: Path) -> None:
     texts = stage_texts(step(), types(folder), RESOURCES, VIEWS, include_folder=folder.parent / "include")
     (found,) = link_problems("error: fragment shader input `v_x' has no matching output\n", texts)
     assert found.code == "RG411"
-    assert found.text.startswith("the stages vertex, fragment do not link: fragment shader input")
+    assert found.text.startswith("node 'light': the stages vertex, fragment do not link: fragment shader input")
 
 
 def test_includes_of_two_prefixes_are_both_there(shaders: Path) -> None:

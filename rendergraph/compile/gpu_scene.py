@@ -29,6 +29,13 @@ _MIN = {"nearest": 0x2600, "linear": 0x2601, "nearest_mipmap_nearest": 0x2700, "
         "nearest_mipmap_linear": 0x2702, "linear_mipmap_linear": 0x2703}  # fmt: skip
 _MAG = {"nearest": 0x2600, "linear": 0x2601}
 _WRAP = {"repeat": 0x2901, "mirror": 0x8370, "clamp": 0x812F}
+SCENE_ATTRIBUTES = {
+    "in_position": "3f", "in_normal": "3f", "in_tangent": "4f", "in_uv0": "2f", "in_uv1": "2f", "in_color": "4f",
+    "in_object0": "4f", "in_object1": "4f", "in_object2": "4f", "in_ids": "2i",
+}  # fmt: skip
+"""What a vertex shader that draws the scene may read, with moderngl's formats."""
+_ABSENT = {"in_tangent": (0.0, 0.0, 0.0, 0.0), "in_uv0": (0.0, 0.0), "in_uv1": (0.0, 0.0), "in_color": (1.0,) * 4}
+"""What an attribute holds that no mesh of the scene has; `pack` fills the same in for a mesh that lacks it."""
 _INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "4f"), ("in_ids", "2i"))
 _PADDING = {"4f": "16x", "2i": "8x"}
 
@@ -47,6 +54,7 @@ class GpuScene:
     packed: PackedScene
     decode: Decode
     _streams: dict[str, tuple[moderngl.Buffer, str]] = field(default_factory=dict)
+    _constants: dict[str, moderngl.Buffer] = field(default_factory=dict)
     _images: dict[tuple[ImageSource, bool], GpuTexture] = field(default_factory=dict)
     _samplers: dict[tuple[int, ...], int] = field(default_factory=dict)
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = field(default_factory=dict)
@@ -132,11 +140,19 @@ class GpuScene:
         content: list[tuple[Any, ...]] = [
             (buffer, layout, name) for name, (buffer, layout) in self._streams.items() if name in names
         ]
+        content += [(*self._constant(name), name) for name in _ABSENT if name in names and name not in self._streams]
         used = [name for name, _ in _INSTANCE_FORMAT if name in names]
         if used:
             layout = " ".join(f if name in names else _PADDING[f] for name, f in _INSTANCE_FORMAT)
             content.append((self._instances, f"{layout}/i", *used))
         return programs.vertex_array(program, (id(self), "scene"), content, self._indices)
+
+    def _constant(self, name: str) -> tuple[moderngl.Buffer, str]:
+        """One value once an instance: draws begin at the object's own instance, so a single one would not do."""
+        if name not in self._constants:
+            values = np.tile(np.array(_ABSENT[name], np.float32), (max(1, len(self.packed.instances)), 1))
+            self._constants[name] = self.device.ctx.buffer(values.tobytes())
+        return self._constants[name], f"{SCENE_ATTRIBUTES[name]}/i"
 
     # Images ---------------------------------------------------------------------------------------------------------
 
@@ -177,6 +193,8 @@ class GpuScene:
         """Free everything."""
         programs.forget(id(self))
         for buffer, _ in (*self._streams.values(), *self._blocks.values()):
+            buffer.release()
+        for buffer in self._constants.values():
             buffer.release()
         self._indices.release()
         self._instances.release()

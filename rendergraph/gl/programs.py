@@ -77,6 +77,13 @@ class Program:
         """The GL name."""
         return int(self.object.glo)
 
+    @property
+    def local_size(self) -> tuple[int, int, int]:
+        """The work group of a compute shader."""
+        values = (ctypes.c_int * 3)()
+        self.device.raw.glGetProgramiv(self.glo, 0x8267, ctypes.byref(values))
+        return values[0], values[1], values[2]
+
     def writer(self, name: str, value: UniformValue) -> Callable[[], None] | None:
         """A call that writes one uniform, None where the program does not look at it."""
         uniform = self.uniforms.get(name)

@@ -26,6 +26,8 @@ class Origin:
         column: columns by which the line has moved to the right.
         shared: it comes from an include in angle brackets.
         prefix: what stands before the names that the file declares.
+        by: the line that includes the file, None for the file of a stage itself.
+        made: what a generated line is there for, as in "the views of 'depth'".
     """
 
     file: Path | None = None
@@ -33,6 +35,8 @@ class Origin:
     column: int = 0
     shared: bool = False
     prefix: str = ""
+    by: Origin | None = None
+    made: str = ""
 
     def place(self, column: int = 1) -> Place | None:
         """The place as messages print it, relative to the current folder where it lies inside."""
@@ -62,10 +66,10 @@ class SourceText:
         return SourceText(self.lines + other.lines, self.origins + other.origins)
 
 
-def generated(lines: Iterable[str]) -> SourceText:
-    """Lines that stand in no file."""
+def generated(lines: Iterable[str], made: str = "") -> SourceText:
+    """Lines that stand in no file; `made` is what they are there for."""
     rows = tuple(lines)
-    return SourceText(rows, (Origin(),) * len(rows))
+    return SourceText(rows, (Origin(made=made),) * len(rows))
 
 
 _COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?\*/", re.DOTALL)
@@ -171,7 +175,7 @@ class Includes:
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
             if len(stack) > MAX_DEPTH:
                 raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
-            inner = replace(base, shared=shared, prefix="" if shared else base.prefix)
+            inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)
             self._include(target, home, inner, stack, lines, origins, depth)
 
     def _include(

@@ -20,7 +20,7 @@ author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, wh
 
 from __future__ import annotations
 
-from rendergraph.program.messages import compile_problems, link_problems
+from rendergraph.program.messages import compile_problems, declared_at, link_problems
 from rendergraph.program.text import StageText, prefix, stage_texts
 
-__all__ = ["StageText", "compile_problems", "link_problems", "prefix", "stage_texts"]
+__all__ = ["StageText", "compile_problems", "declared_at", "link_problems", "prefix", "stage_texts"]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 
-from rendergraph.errors import Problem
-from rendergraph.glsl import Origin, SourceText
+from rendergraph.errors import Place, Problem
+from rendergraph.glsl.source import Origin, SourceText
 from rendergraph.program.text import StageText
 
 _FORMS = (
@@ -14,8 +15,12 @@ _FORMS = (
         r"\s*\d+:(?P<line>\d+)\((?P<column>\d+)\):\s*(?P<kind>(?:preprocessor )?error|warning)\s*:\s*(?P<text>.*)"
     ),
     re.compile(r"\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<kind>(?:fatal )?error|warning)\s+(?:[A-Z]\d+\s*)?:\s*(?P<text>.*)"),
-    re.compile(r"\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?P<text>.*)"),
+    re.compile(r"\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?:(?:error|warning)\(#\d+\)\s*)?(?P<text>.*)"),
 )
+_SECTION = re.compile(r"\s*(Vertex|Geometry|Fragment|Compute) info\s*\Z")
+_QUOTED = re.compile(r"[`'\"]([A-Za-z_]\w*)['\"`]")
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_DECLARES = re.compile(r"\b(?:in|out|inout|uniform|buffer|flat|centroid|const|layout|struct)\b|\w+\s+\w+\s*[;(=\[]")
 
 
 def compile_problems(message: str, text: StageText) -> list[Problem]:
@@ -24,54 +29,120 @@ def compile_problems(message: str, text: StageText) -> list[Problem]:
     Understands the forms of Mesa (`0:12(5): error: …`), NVIDIA (`0(12) : error C1008: …`) and of AMD, Intel and glslang
     (`ERROR: 0:12: …`). Warnings are left out where there are errors. A message that names no line becomes one problem.
     """
+    found = _located(message.splitlines(), text, "RG410", f"{text.stage} shader")
+    if found:
+        return found
+    where = _first_place(text.source)
+    plain = " ".join(message.split()) or "the driver refused the shader and did not say why"
+    return [Problem("RG410", f"{text.who}: {plain}", where.place() if where else None)]
+
+
+def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]:
+    """What a driver says when stages do not fit together.
+
+    NVIDIA names lines under the heading of a stage. Other drivers name a variable: the line that declares it stands for
+    the place, in the later stage where both do; without one it is the last stage's file.
+    """
+    rows = [row for row in message.splitlines() if row.strip()]
+    heads = [number for number, row in enumerate(rows) if _SECTION.match(row)]
     found: list[Problem] = []
-    for row in message.splitlines():
+    for start, end in pairwise([*heads, len(rows)]):
+        stage = _SECTION.match(rows[start])[1].lower()  # type: ignore[index]  # it has just matched
+        if stage in texts:
+            found += _located(rows[start + 1 : end], texts[stage], "RG411", f"{stage} shader")
+    if found:
+        return found
+    text = re.sub(r"^error:\s*", "", "; ".join(row.strip() for row in rows))
+    text = text or "the driver refused the program and did not say why"
+    last = list(texts.values())[-1]
+    text = f"{last.of_node}the stages {', '.join(texts)} do not link: {text}"
+    for stage_text in reversed(texts.values()):
+        spot = declared_at(stage_text.source, _QUOTED.findall(message))
+        if spot is not None:
+            return [Problem("RG411", text, *spot)]
+    where = _first_place(last.source)
+    return [Problem("RG411", text, where.place() if where else None)]
+
+
+def declared_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] | None:
+    """Where an author's file first declares one of some names, and that line."""
+    for name in names:
+        pattern = re.compile(rf"\b{re.escape(name)}\b")
+        for line, origin in zip(source.lines, source.origins, strict=True):
+            match = pattern.search(line)
+            if match and origin.file is not None and _DECLARES.search(line):
+                place = origin.place(match.start() + 1)
+                assert place is not None
+                return place, line
+    return None
+
+
+def _located(rows: Sequence[str], text: StageText, code: str, what: str) -> list[Problem]:
+    """The messages that name a line; warnings only where there is no error."""
+    found: list[Problem] = []
+    for row in rows:
         match = next((match for form in _FORMS if (match := form.match(row))), None)
         if match is None:
             continue
         severity = "warning" if "warning" in match["kind"].lower() else "error"
         column = int(match.groupdict().get("column") or 1)
-        found.append(_problem(match["text"].strip(), int(match["line"]), column, severity, text))
+        found.append(_problem(code, match["text"].strip(), int(match["line"]), column, severity, text))
     errors = [problem for problem in found if problem.severity == "error"]
-    if errors or found:
-        return list(dict.fromkeys(errors or found))
-    where = _first_place(text.source)
-    plain = " ".join(message.split()) or "the driver refused the shader and did not say why"
-    return [Problem("RG410", f"{text.stage} shader: {plain}", where.place() if where else None)]
+    return list(dict.fromkeys(errors or found))
 
 
-def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]:
-    """What a driver says when stages do not fit together; it names no line, so the last stage's file stands for it."""
-    last = list(texts.values())[-1]
-    where = _first_place(last.source)
-    rows = [row.strip() for row in message.splitlines() if row.strip()]
-    text = re.sub(r"^error:\s*", "", "; ".join(rows)) or "the driver refused the program and did not say why"
-    return [Problem("RG411", f"the stages {', '.join(texts)} do not link: {text}", where.place() if where else None)]
-
-
-def _problem(text: str, line: int, column: int, severity: str, stage: StageText) -> Problem:
+def _problem(code: str, said: str, line: int, column: int, severity: str, stage: StageText) -> Problem:
     rows = stage.source
     if not 1 <= line <= len(rows.lines):
-        return Problem("RG410", f"{stage.stage} shader: {text}", severity=severity)  # type: ignore[arg-type]
-    origin = rows.origins[line - 1]
-    shown_line = rows.lines[line - 1]
+        return Problem(code, f"{stage.who}: {said}", severity=severity)  # type: ignore[arg-type]
+    origin, shown_line = rows.origins[line - 1], rows.lines[line - 1]
     if origin.prefix:
-        text = text.replace(origin.prefix, "")
+        said = said.replace(origin.prefix, "")
         column = len(shown_line[: column - 1].replace(origin.prefix, "")) + 1
         shown_line = shown_line.replace(origin.prefix, "")
     if origin.file is None:
-        text += f" (in generated text: {shown_line.strip()})"
-        near = _nearest_author(rows, line - 1)
+        what = f"what rendergraph writes for {origin.made}" if origin.made else "generated text"
+        said += f" (in {what}: {shown_line.strip()})"
+        near = _nearest_author(rows, shown_line, said)
         place = near.place() if near else None
-        return Problem("RG410", f"{stage.stage} shader: {text}", place, severity=severity)  # type: ignore[arg-type]
-    return Problem("RG410", f"{stage.stage} shader: {text}", origin.place(column), shown_line, severity)  # type: ignore[arg-type]
+        return Problem(code, f"{stage.who}: {said}", place, severity=severity)  # type: ignore[arg-type]
+    said += _included(origin)
+    return Problem(code, f"{stage.who}: {said}", origin.place(column), shown_line, severity)  # type: ignore[arg-type]
+
+
+def _included(origin: Origin) -> str:
+    """Where the author includes a file; of shared files that include each other, the author's own line."""
+    by = origin.by
+    while by is not None and by.shared and by.by is not None:
+        by = by.by
+    place = by.place() if by is not None else None
+    return f" (included at {place.file}:{place.line})" if place is not None else ""
 
 
 def _first_place(source: SourceText) -> Origin | None:
     """The first line of the author's own file, which stands last in the text."""
-    last = next((origin for origin in reversed(source.origins) if origin.file is not None), None)
+    last = next((origin for origin in reversed(source.origins) if origin.file is not None and origin.by is None), None)
     return Origin(last.file, 1) if last else None
 
 
-def _nearest_author(source: SourceText, position: int) -> Origin | None:
-    return next((origin for origin in source.origins[position:] if origin.file is not None), None)
+def _nearest_author(source: SourceText, line: str, said: str) -> Origin | None:
+    """The first line of an author's file that has to do with a generated line: it names what is generated there."""
+    own = [
+        (text, origin)
+        for text, origin in zip(source.lines, source.origins, strict=True)
+        if origin.file is not None and not origin.shared
+    ]
+    for name in _names(line, said):
+        pattern = re.compile(rf"\b{re.escape(name)}\b")
+        for text, origin in own:
+            if pattern.search(text):
+                return origin
+    return _first_place(source)
+
+
+def _names(line: str, said: str) -> Iterator[str]:
+    """Names to look for: those the driver quotes, then the longest of the line."""
+    yield from _QUOTED.findall(said)
+    yield from sorted(set(_WORD.findall(line)) - {"define", "uniform", "layout", "const", "float", "int"}, key=len)[
+        ::-1
+    ]

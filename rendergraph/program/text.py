@@ -13,6 +13,7 @@ from rendergraph.errors import InputError, Problem
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
+from rendergraph.program.images import with_formats
 from rendergraph.resources import folder
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
@@ -28,10 +29,22 @@ class StageText:
     Attributes:
         stage: `vertex`, `geometry`, `fragment` or `compute`.
         source: lines and where they come from.
+        node: id of the node whose step it belongs to.
     """
 
     stage: str
     source: SourceText = field(repr=False)
+    node: str = ""
+
+    @property
+    def of_node(self) -> str:
+        """How messages begin: `node 'blur': `."""
+        return f"node '{self.node}': " if self.node else ""
+
+    @property
+    def who(self) -> str:
+        """How messages about the stage begin."""
+        return f"{self.of_node}{self.stage} shader"
 
     @property
     def text(self) -> str:
@@ -130,14 +143,21 @@ def _stage(
         if calls(called, signature.name):
             functions += _functions(stage, signature, step, types, resources, views, includes)
         if mentions(called, f"{signature.name.upper()}_LIGHT_COUNT"):
-            functions += generated(_light_table(signature, step, types[step.node], resources))
+            table = _light_table(signature, step, types[step.node], resources)
+            functions += generated(table, f"the lights of {signature.name}()")
     source = includes.expand(file, root=root, plugged=dict(step.includes), versions=versions)
+    if stage == "compute":
+        source = with_formats(source, step, resources)
     extensions, source = _hoisted(source)
     body = functions.text + source.text
-    head = [VERSION, *extensions, *(f"#define {key} {value}".rstrip() for key, value in macros.items())]
+    head = generated([VERSION, *extensions]) + _macros(macros)
     declarations = _read_declarations(step.reads, resources, "", body)
-    final = generated(head) + view + generated(declarations) + functions + source
-    return StageText(stage, final)
+    return StageText(stage, head + view + declarations + functions + source, step.node)
+
+
+def _macros(macros: Mapping[str, str]) -> SourceText:
+    lines = tuple(f"#define {key} {value}".rstrip() for key, value in macros.items())
+    return SourceText(lines, tuple(Origin(made=f"the macro {key}") for key in macros))
 
 
 def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
@@ -152,18 +172,22 @@ def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
 
 def _read_declarations(
     reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str
-) -> Iterator[str]:
+) -> SourceText:  # fmt: skip
     """Views and light tables of the textures read, where the text looks at them."""
+    text = SourceText()
     for read in reads:
         resource = resources.get(read.resource)
         if resource is None or not isinstance(resource.desc, TextureDesc):
             continue
         name, macro = before + read.name, before + read.name.upper()
         if resource.view is not None and mentions(body, f"{name}_views"):
-            yield f"layout(std140) uniform {name}_view_block {{ View {name}_views[{macro}_VIEW_COUNT]; }};"
+            block = f"layout(std140) uniform {name}_view_block {{ View {name}_views[{macro}_VIEW_COUNT]; }};"
+            text += generated([block], f"the views of '{read.name}'")
         if resource.lights and mentions(body, f"{name}_lights"):
             table = ", ".join(str(light) for light in resource.lights)
-            yield f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
+            line = f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
+            text += generated([line], f"the lights of '{read.name}'")
+    return text
 
 
 # --- functions -------------------------------------------------------------------------------------------------------
@@ -205,7 +229,7 @@ def _functions(
     kind = signature.declaration.split()[0]
     lines += [f"{signature.declaration} {{", f"    {kind} result = {signature.neutral};"]
     lines += [f"    {factor}" for factor in factors]
-    return text + generated([*lines, "    return result;", "}"])
+    return text + generated([*lines, "    return result;", "}"], f"{signature.name}() of all that provide it")
 
 
 def _light_table(signature: Signature, step: Step, node: NodeType, resources: Mapping[str, Resource]) -> Iterator[str]:
@@ -282,8 +306,8 @@ def provider_text(
         for line, origin in _pairs(source)
     ]
     final = SourceText(*_rows(rows))
-    head = [f"#define {before}{key} {renamed(value, rename)}".rstrip() for key, value in macros.items()]
-    return generated([*head, *_read_declarations(binding.reads, resources, before, final.text)]) + final
+    head = _macros({before + key: renamed(value, rename) for key, value in macros.items()})
+    return head + _read_declarations(binding.reads, resources, before, final.text) + final
 
 
 def _pairs(source: SourceText) -> Iterator[tuple[str, Origin]]:

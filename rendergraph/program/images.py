@@ -1,0 +1,82 @@
+"""Images of compute shaders: their format stands in the declaration of the port, and in the shader if its author likes.
+
+`uniform writeonly image2D board;` gets the `layout(rgba16f)` of its port; a layout that is written is held against it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from rendergraph.errors import InputError, Problem
+from rendergraph.glsl.source import SourceText
+from rendergraph.steps import Read, Resource, Step, Write
+from rendergraph.textures import FORMATS, TextureDesc
+
+_MEMORY = r"(?:(?:coherent|volatile|restrict|readonly|writeonly|highp|mediump|lowp)\s+)*"
+_IMAGE = re.compile(
+    rf"(?P<layout>layout\s*\((?P<inside>[^)]*)\)\s*)?(?P<rest>{_MEMORY}uniform\s+{_MEMORY}"
+    rf"(?P<type>[iu]?image\w+)\s+(?P<name>[A-Za-z_]\w*))"
+)
+_LAYOUT_FORMATS = frozenset(FORMATS) | {
+    "rg16_snorm", "r16_snorm", "rgba8_snorm", "rg8_snorm", "r8_snorm", "rgba32i", "rgba16i", "rgba8i", "rg32i", "rg16i",
+    "rg8i", "r16i", "r8i", "rgba16ui", "rgb10_a2ui", "rgba8ui", "rg16ui", "rg8ui",
+}  # fmt: skip
+
+
+def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resource]) -> SourceText:
+    """A compute shader's text with the format of every image that states none.
+
+    Raises:
+        InputError: an image's format or type is not its port's (RG427).
+    """
+    images = dict(_images(step, resources))
+    if not images:
+        return source
+    lines, origins = list(source.lines), list(source.origins)
+    problems: list[Problem] = []
+    for number, line in enumerate(lines):
+        match = _IMAGE.search(line)
+        if match is None or match["name"] not in images:
+            continue
+        use, desc = images[match["name"]]
+        text = _mismatch(match, use, desc)
+        if text is not None:
+            place = origins[number].place(match.start() + 1)
+            problems.append(Problem("RG427", f"node '{step.node}': {text}", place, line))
+        elif _stated(match) is None:
+            more = f", {match['inside'].strip()}" if (match["inside"] or "").strip() else ""
+            before = f"layout({desc.format}{more}) "
+            lines[number] = line[: match.start()] + before + match["rest"] + line[match.end() :]
+            origins[number] = replace(origins[number], column=len(before) - len(match["layout"] or ""))
+    if problems:
+        raise InputError(problems)
+    return SourceText(tuple(lines), tuple(origins))
+
+
+def _images(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, tuple[Read | Write, TextureDesc]]]:
+    for use in (*step.reads, *step.writes):
+        desc = resources[use.resource].desc if use.resource in resources else None
+        if use.use == "image" and isinstance(desc, TextureDesc):
+            yield use.name, (use, desc)
+
+
+def _stated(match: re.Match[str]) -> str | None:
+    """The format that a declaration states."""
+    words = [word.strip() for word in (match["inside"] or "").split(",")]
+    return next((word for word in words if word in _LAYOUT_FORMATS), None)
+
+
+def _mismatch(match: re.Match[str], use: Read | Write, desc: TextureDesc) -> str | None:
+    """What an image's declaration and its port disagree about."""
+    letter = {"uint": "u", "int": "i"}.get(FORMATS[desc.format].family, "")
+    shape = {"texture2d_array": "2DArray", "texture_cube": "Cube"}.get(desc.kind, "2D")
+    wanted = f"{letter}image{'2D' if use.layer is not None else shape}"
+    name = match["name"]
+    if match["type"] != wanted:
+        return f"image '{name}' is an {match['type']}, but '{use.resource}' is {desc.format}, which takes {wanted}"
+    stated = _stated(match)
+    if stated is not None and stated != desc.format:
+        return f"image '{name}' has layout({stated}), but '{use.resource}' is {desc.format}; leave the layout out"
+    return None
