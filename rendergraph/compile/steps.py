@@ -11,22 +11,21 @@ import moderngl
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
-from rendergraph.compile.checks import Texts, attribute_formats, check_attributes, check_uniforms, layout_for
 from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, SortedDraws, step_uniforms
 from rendergraph.compile.geometry import Batch, GeometryCompiler
-from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
-from rendergraph.compile.limits import check_plan, groups_of
+from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import ClearTarget, Memory
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
+from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
-from rendergraph.program import prefix, stage_texts
+from rendergraph.program import prefix
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -37,6 +36,7 @@ _TOPOLOGY = {
 }  # fmt: skip
 _ALL_BARRIERS = 0xFFFFFFFF
 _TEXTURE_2D = 0x0DE1
+_R8UI, _RED_INTEGER, _UNSIGNED_BYTE = 0x8232, 0x8D94, 0x1401
 
 
 def compile_plan(
@@ -64,7 +64,6 @@ def compile_plan(
         RenderError: no memory.
         InputError: a shader does not compile.
     """
-    check_plan(device, plan, views, len(FIXED_BLOCKS))
     memory = Memory(device, plan)
     buffers = ViewBuffers(device, views)
     compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
@@ -121,9 +120,7 @@ class _Compiler:
         }[step.kind](step, compiled, parity)  # fmt: skip
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
-            partial(_clear_buffer, self.memory.buffer(write.resource))
-            for write in stored
-            if write.use == "buffer" and write.load == "clear"
+            self._clear_buffer(write) for write in stored if write.use == "buffer" and write.load == "clear"
         ]
         if stored and step.kind != "copy":  # what shaders store comes in no order by itself
             compiled.after.append(partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS))
@@ -168,15 +165,12 @@ class _Compiler:
         self._target(step, compiled, parity)
         content: list[tuple[Any, ...]] = []
         names: list[int] = []
-        held: dict[str, str] = {}
         for layout, resource in step.attributes:
-            held |= attribute_formats(layout)
-            formats, wanted = layout_for(layout, program)
+            words = layout.split()
+            half = len(words) // 2
             buffer = self.memory.buffer(resource)
-            if wanted:
-                content.append((buffer, formats, *wanted))
+            content.append((buffer, " ".join(words[:half]), *words[half:]))
             names.append(buffer.glo)
-        check_attributes(step, program, held, self._texts(step, {}))
         key = (id(self.memory), "draw", *names, *(layout for layout, _ in step.attributes))
         vertex_array = self.programs.vertex_array(program, key, content)
         mode = _TOPOLOGY[step.topology]
@@ -192,7 +186,6 @@ class _Compiler:
 
         def make(batch: Batch) -> Draw:
             program, binds, uniforms = self._program(step, {**defines, **batch.defines}, geometry=True)
-            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **batch.defines}))
             for slot, (texture, sampler) in batch.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program)
@@ -231,16 +224,21 @@ class _Compiler:
             if write.load == "clear" and write.use == "image":
                 texture = self.memory.texture(write.resource, parity)
                 compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
-        call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
+        call = partial(program.object.run, *step.groups)
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
 
     def _clear(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         for write in step.writes:
             if write.use == "buffer":
-                compiled.before.append(partial(_clear_buffer, self.memory.buffer(write.resource)))
+                compiled.before.append(self._clear_buffer(write))
                 continue
             texture = self.memory.texture(write.resource, parity)
             compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
+
+    def _clear_buffer(self, write: Write) -> Call:
+        """Zeros by the device itself: moderngl's clear maps the buffer, and so waits for whoever still reads it."""
+        glo = self.memory.buffer(write.resource).glo
+        return partial(self.device.raw.glClearNamedBufferData, glo, _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, None)
 
     def _mipmaps(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         for write in step.writes:
@@ -285,10 +283,10 @@ class _Compiler:
                 storage += 1
             elif view is not None and isinstance(use, Read):
                 blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
-        macros = {**self.scene.light_defines, **defines}
         program = self.programs.get(
-            step, self.types, self.plan.resources, self.view_tables, macros, blocks, outputs
-        )
+            step, self.types, self.plan.resources, self.view_tables, {**self.scene.light_defines, **defines}, blocks,
+            outputs,
+        )  # fmt: skip
         binds: list[Call] = buffers
         uniforms = step_uniforms(step)
         sampled: set[str] = set()
@@ -299,14 +297,26 @@ class _Compiler:
             if before + read.name in program.uniforms:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
-        check_uniforms(
-            step, program, uniforms, sampled, geometry, self._texts(step, macros)
-        )
+        self._check(step, program, uniforms, sampled, geometry)
         return program, binds, uniforms
 
-    def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:
-        """The texts of a step's program, made again for a message."""
-        return partial(stage_texts, step, self.types, self.plan.resources, self.view_tables, defines=macros)
+    def _check(
+        self, step: Step, program: Program, uniforms: Mapping[str, Any], sampled: set[str], geometry: bool
+    ) -> None:
+        """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0."""
+        uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+        images = {use.name for use in uses if use.use == "image"}
+        for name, uniform in program.uniforms.items():
+            known = name in sampled or name in images or name in uniforms or (geometry and name.endswith("_texture"))
+            files = ", ".join(file for _, file in step.shaders)
+            if not uniform.opaque and name not in uniforms:
+                hint = suggestion(name, [known for known, _ in step.uniforms])
+                text = f"node '{step.node}': {files} looks at uniform '{name}', which nothing sets{hint}"
+                raise InputError(Problem("RG434", text))
+            if uniform.opaque and not known:
+                text = (f"node '{step.node}': {files} samples '{name}', but the step reads no texture of that name; "
+                        f"it reads {', '.join(sorted(sampled)) or 'none'}")  # fmt: skip
+                raise InputError(Problem("RG430", text))
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         """Bind the framebuffer, clearing first what the step says."""
@@ -357,7 +367,3 @@ class _Compiler:
                 texture = self.memory.texture(name, parity)
                 calls.append(Clear(self.device, texture, poison_value(resource.desc.format)))
         return calls
-
-
-def _clear_buffer(buffer: moderngl.Buffer) -> None:
-    buffer.clear()

@@ -65,7 +65,7 @@ def free_on_device(device: Device) -> int | None:
 
 
 def free_on_machine() -> int | None:
-    """Bytes that can be had: what the system would give up of its file cache counts, and so does a container's bound."""
+    """Bytes that can be had: what the system would give up of its file cache counts, a container's bound too."""
     found = [bytes for bytes in (_of_system(), _of_group()) if bytes is not None]
     return min(found, default=None)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -78,6 +79,18 @@ outputs: {image: show.color, board: checker.board}"""
     assert frame["board"][-1, 1, 0] == 1
 
 
+def test_buffers_are_cleared_without_waiting_for_who_reads_them(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    """moderngl's clear maps the buffer; a count that starts at other than 0 would be another's."""
+    monkeypatch.setattr(moderngl.Buffer, "clear", lambda *_, **__: pytest.fail("a buffer is mapped"))
+    text = """nodes:
+  checker: {type: checker}
+  count: {type: count, inputs: {source: checker.board}}
+  show: {type: show, inputs: {counts: count.counts}}
+outputs: {image: show.color}"""
+    frame = draw(text, Checker, Count, Show, shaders=SHADERS, frames=range(1, 6), size=(7, 3))
+    np.testing.assert_array_equal(frame["image"][0, 0], [11, 10])
+
+
 class Quads(Node):
     """A square whose corners the CPU computes each frame."""
 
@@ -119,7 +132,9 @@ def test_an_update_that_writes_too_much_is_named(draw: Draw) -> None:
             frame.write(self.corners, np.zeros(9, np.float32))
 
     text = "nodes: {q: {type: too_much}}\noutputs: {image: q.color}"
-    with pytest.raises(RenderError, match=r"RG432 node 'q' .*test_buffers\.py:\d+: it writes 36 bytes into 'corners', which holds 32"):
+    with pytest.raises(
+        RenderError, match=r"RG432 node 'q' .*test_buffers\.py:\d+: it writes 36 bytes into 'corners', which holds 32"
+    ):
         draw(text, TooMuch, shaders=QUADS)
 
 
