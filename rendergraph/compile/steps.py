@@ -11,21 +11,22 @@ import moderngl
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
+from rendergraph.compile.checks import Texts, attribute_formats, check_attributes, check_uniforms, layout_for
 from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, SortedDraws, step_uniforms
 from rendergraph.compile.geometry import Batch, GeometryCompiler
-from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
+from rendergraph.compile.limits import check_plan, groups_of
 from rendergraph.compile.memory import ClearTarget, Memory
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
-from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
-from rendergraph.program import prefix
+from rendergraph.program import prefix, stage_texts
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -64,6 +65,7 @@ def compile_plan(
         RenderError: no memory.
         InputError: a shader does not compile.
     """
+    check_plan(device, plan, views, len(FIXED_BLOCKS))
     memory = Memory(device, plan)
     buffers = ViewBuffers(device, views)
     compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
@@ -165,12 +167,15 @@ class _Compiler:
         self._target(step, compiled, parity)
         content: list[tuple[Any, ...]] = []
         names: list[int] = []
+        held: dict[str, str] = {}
         for layout, resource in step.attributes:
-            words = layout.split()
-            half = len(words) // 2
+            held |= attribute_formats(layout)
+            formats, wanted = layout_for(layout, program)
             buffer = self.memory.buffer(resource)
-            content.append((buffer, " ".join(words[:half]), *words[half:]))
+            if wanted:
+                content.append((buffer, formats, *wanted))
             names.append(buffer.glo)
+        check_attributes(step, program, held, self._texts(step, {}))
         key = (id(self.memory), "draw", *names, *(layout for layout, _ in step.attributes))
         vertex_array = self.programs.vertex_array(program, key, content)
         mode = _TOPOLOGY[step.topology]
@@ -186,6 +191,7 @@ class _Compiler:
 
         def make(batch: Batch) -> Draw:
             program, binds, uniforms = self._program(step, {**defines, **batch.defines}, geometry=True)
+            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **batch.defines}))
             for slot, (texture, sampler) in batch.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program)
@@ -224,7 +230,7 @@ class _Compiler:
             if write.load == "clear" and write.use == "image":
                 texture = self.memory.texture(write.resource, parity)
                 compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
-        call = partial(program.object.run, *step.groups)
+        call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
 
     def _clear(self, step: Step, compiled: CompiledStep, parity: int) -> None:
@@ -283,10 +289,10 @@ class _Compiler:
                 storage += 1
             elif view is not None and isinstance(use, Read):
                 blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
+        macros = {**self.scene.light_defines, **defines}
         program = self.programs.get(
-            step, self.types, self.plan.resources, self.view_tables, {**self.scene.light_defines, **defines}, blocks,
-            outputs,
-        )  # fmt: skip
+            step, self.types, self.plan.resources, self.view_tables, macros, blocks, outputs
+        )
         binds: list[Call] = buffers
         uniforms = step_uniforms(step)
         sampled: set[str] = set()
@@ -297,26 +303,14 @@ class _Compiler:
             if before + read.name in program.uniforms:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
-        self._check(step, program, uniforms, sampled, geometry)
+        check_uniforms(
+            step, program, uniforms, sampled, geometry, self._texts(step, macros)
+        )
         return program, binds, uniforms
 
-    def _check(
-        self, step: Step, program: Program, uniforms: Mapping[str, Any], sampled: set[str], geometry: bool
-    ) -> None:
-        """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0."""
-        uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
-        images = {use.name for use in uses if use.use == "image"}
-        for name, uniform in program.uniforms.items():
-            known = name in sampled or name in images or name in uniforms or (geometry and name.endswith("_texture"))
-            files = ", ".join(file for _, file in step.shaders)
-            if not uniform.opaque and name not in uniforms:
-                hint = suggestion(name, [known for known, _ in step.uniforms])
-                text = f"node '{step.node}': {files} looks at uniform '{name}', which nothing sets{hint}"
-                raise InputError(Problem("RG434", text))
-            if uniform.opaque and not known:
-                text = (f"node '{step.node}': {files} samples '{name}', but the step reads no texture of that name; "
-                        f"it reads {', '.join(sorted(sampled)) or 'none'}")  # fmt: skip
-                raise InputError(Problem("RG430", text))
+    def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:
+        """The texts of a step's program, made again for a message."""
+        return partial(stage_texts, step, self.types, self.plan.resources, self.view_tables, defines=macros)
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         """Bind the framebuffer, clearing first what the step says."""
