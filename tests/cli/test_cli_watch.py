@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -265,6 +266,32 @@ def test_a_sub_pipeline_and_a_texture_are_followed(folder: Path, start: Start) -
     assert shade(folder / "a.png") == pytest.approx(0.4, abs=0.01)
     child.after(lambda: paint(0))
     assert shade(folder / "a.png") == 0
+
+
+def test_the_guide_shows_what_is_printed(folder: Path, start: Start) -> None:
+    page = (Path(__file__).parents[2] / "docs/guide/live.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```(\w+)\n(.*?)```", page, re.DOTALL)
+    for name, (_, text) in zip(("vignette.frag", "my.yaml"), blocks, strict=False):
+        assert name in text.partition("\n")[0]
+        (folder / name).write_text(text.replace("[640, 360]", "[64, 36]"))
+    child = start()
+    shader, pipeline = folder / "vignette.frag", folder / "my.yaml"
+    child.after(lambda: edit(pipeline, "strength: 0.5", "strength: 0.9"))
+    child.after(lambda: edit(shader, "* far);", "* far * far);"))
+    child.after(lambda: edit(shader, "* far);", "* far)"))
+    child.after(lambda: edit(shader, "* far)", "* far);"))
+    child.after(lambda: edit(pipeline, "[64, 36]", "[32, 18]"))
+    child.stop()
+    transcript = next(text for kind, text in blocks if kind == "text").splitlines()[1:]
+    shown = [line for line in transcript if line != "my.png"]
+    assert child.out == ["my.png\n"] * (len(transcript) - len(shown))
+    assert [figures(line) for line in child.err] == [figures(line) for line in shown]
+
+
+def figures(line: str) -> str:
+    """A line without what differs from machine to machine."""
+    line = re.sub(r" on .*", "", line.rstrip("\n"))
+    return re.sub(r"\d+×\d+|\d+\.\d+ ms|\d+ ms|\d+ files|\d+ textures", "N", line)
 
 
 @pytest.mark.parametrize(("words", "code"), [(["nope.yaml"], 3), (["forwrad"], 3), (["my.yaml", "--frames", "0"], 2)])
