@@ -24,7 +24,7 @@ _FILES = ("pipeline", "scene")
 def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
     """Explain a node type, an error code or a file.
 
-    `pipeline` and `scene` list every key of such a file.
+    `pipeline` and `scene` list every key of such a file; the path of a shader file explains the node that it is.
 
     \b
     Examples:
@@ -40,9 +40,11 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
         keys = file_keys(topic)
         emit_json({"file": topic, "keys": keys}) if as_json else emit(_keys_text(topic, keys))
         return
-    from rendergraph.catalog import Catalog
+    from rendergraph.catalog import SHADERS, Catalog
 
     catalog = Catalog.discover(plugins)
+    if topic.endswith(SHADERS):
+        catalog = catalog.with_file(topic, Path(topic))
     if topic not in catalog:
         known = [*catalog.names(), *_FILES]
         text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
@@ -51,6 +53,7 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
     described = describe(found, catalog.extensions) | {"example": in_a_file(found, catalog)}
     if any("added" in parameter for parameter in described["parameters"]):
         warn(catalog.extensions.warnings)
+    warn(found.warnings)
     emit_json(described) if as_json else emit(_node_text(described))
 
 

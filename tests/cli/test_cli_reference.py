@@ -156,6 +156,15 @@ def test_an_example_runs_as_it_is_printed(cli: Any, tmp_path: Path) -> None:
     assert cli("check", "a.yaml").code == 0
 
 
+def test_a_type_is_explained_by_its_file(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "dim.frag").write_text(
+        "uniform sampler2D radiance;\nout vec4 dimmed;\nvoid main() { dimmed = texelFetch(radiance, ivec2(0), 0); }\n"
+    )
+    text = cli("explain", "./dim.frag").out
+    assert text.startswith("dim  (single file)")
+    assert "dim: {type: dim, inputs: {radiance: light.radiance}}" in text
+
+
 def test_types_read_as_in_the_file() -> None:
     assert type_words(int | None) == "whole number | null"
     assert type_words(tuple[float, ...]) == "[number, …]"
