@@ -161,8 +161,8 @@ def test_a_type_is_explained_by_its_file(cli: Any, tmp_path: Path) -> None:
         "uniform sampler2D radiance;\nout vec4 dimmed;\nvoid main() { dimmed = texelFetch(radiance, ivec2(0), 0); }\n"
     )
     text = cli("explain", "./dim.frag").out
-    assert text.startswith("dim  (single file)")
-    assert "dim: {type: dim, inputs: {radiance: light.radiance}}" in text
+    assert text.startswith("./dim.frag")
+    assert "dim: {type: ./dim.frag, inputs: {radiance: light.radiance}}" in text
 
 
 def test_types_read_as_in_the_file() -> None:
