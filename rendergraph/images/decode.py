@@ -22,20 +22,13 @@ from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
 from rendergraph.images.pixels import Limits, Pixels, as_rgba, finite, name_of
 from rendergraph.images.plugin_image import decode_by_plugin
+from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, kind_of
 from rendergraph.scene.model import ImageSource
 
 if TYPE_CHECKING:
     import OpenImageIO as oiio
 
-_KINDS: tuple[tuple[bytes, str], ...] = (
-    (b"\x89PNG\r\n\x1a\n", ".png"),
-    (b"\xff\xd8\xff", ".jpg"),
-    (b"v/1\x01", ".exr"),
-    (b"#?", ".hdr"),
-    (b"BM", ".bmp"),
-)
-_READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"
-_MOST_CHANNELS = 256
+_SUFFIXES = {"png": ".png", "jpeg": ".jpg", "exr": ".exr", "hdr": ".hdr", "bmp": ".bmp", "tga": ".tga"}
 
 
 def decode(
@@ -162,11 +155,11 @@ def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
         stack.callback(handle.close)
         image = _Image(source, kind, path, size, handle, handle.spec(), limits)
         if handle.format_name() != _FORMAT_NAMES[kind]:
-            _refuse(source, "RG351", f"the image is not what it claims to be; {_READ}")
+            _refuse(source, "RG351", f"the image is not what it claims to be; {READ}")
         if image.spec.deep:
             _refuse(source, "RG354", "the image is deep (several samples a pixel); flatten it first")
-        if image.spec.nchannels > _MOST_CHANNELS:
-            _refuse(source, "RG353", f"the image has {image.spec.nchannels} channels; {_MOST_CHANNELS} are the limit")
+        if image.spec.nchannels > MOST_CHANNELS:
+            _refuse(source, "RG353", f"the image has {image.spec.nchannels} channels; {MOST_CHANNELS} are the limit")
         _check_size(image, 1, 1)
         yield image
 
@@ -195,14 +188,12 @@ def _beginning(source: ImageSource) -> tuple[bytes, int]:
 
 
 def _kind_of(source: ImageSource, start: bytes) -> str:
-    for magic, kind in _KINDS:
-        if start.startswith(magic):
-            return kind
     if not start:
         _refuse(source, "RG352", "the image is broken: the file is empty")
-    if source.path.suffix.lower() != ".tga" or source.data is not None:
-        _refuse(source, "RG351", f"this is no image of a known kind; {_READ}")
-    return ".tga"  # has no magic number
+    kind = kind_of(start, "" if source.data is not None else source.path.suffix)
+    if kind is None:
+        _refuse(source, "RG351", f"this is no image of a known kind; {READ}")
+    return _SUFFIXES[kind]
 
 
 def _check_size(image: _Image, channels: int, item: int) -> None:
@@ -290,12 +281,10 @@ def _color_channels(image: _Image) -> range:
     names = [name.upper() for name in image.spec.channelnames]
     if image.kind != ".exr":
         return range(min(len(names), 4))
-    if "RY" in names or "BY" in names:
-        _refuse(image.source, "RG354", "the image holds luminance and chroma; convert it to R, G, B")
-    wanted = [name for name in ("R", "G", "B", "A") if name in names] if "R" in names else ["Y"]
-    if not all(name in names for name in (("R", "G", "B") if "R" in names else ("Y",))):
-        listed = ", ".join(image.spec.channelnames[:8])
-        _refuse(image.source, "RG354", f"the image has the channels {listed}; R, G, B (and A) or Y are needed")
+    try:
+        wanted = list(colour_channels(image.spec.channelnames))
+    except ChannelsError as problem:
+        _refuse(image.source, "RG354", f"the image {problem}")
     first = names.index(wanted[0])
     if names[first : first + len(wanted)] != wanted:
         _refuse(image.source, "RG354", "the image's channels R, G, B, A are not side by side")

@@ -217,15 +217,17 @@ class Reading:
             facts = image_header.read(head, suffix)
         except image_header.NoImageError as problem:
             raise self.error("RG351", f"{what} {problem}", line=line) from None
+        except image_header.ChannelsError as problem:
+            raise self.error("RG354", f"{what} {problem}", line=line) from None
         except ValueError as problem:
             raise self.error("RG352", f"{what} {problem}", line=line) from None
-        if facts.width is None or facts.height is None:
+        decoded = facts.decoded_bytes
+        if facts.width is None or facts.height is None or decoded is None:
             return facts
         if facts.width < 1 or facts.height < 1:
             raise self.error("RG352", f"{what} is {facts.width}×{facts.height} texels", line=line)
         if max(facts.width, facts.height) > self.limits.image_side:
             raise self.over(f"{what} is {facts.width}×{facts.height} texels", "image_side", "RG353")
-        decoded = facts.width * facts.height * facts.channels * facts.channel_bytes
         if decoded > self.limits.image_bytes:
             raise self.over(f"{what} decodes to {decoded:,} bytes", "image_bytes", "RG353")
         if decoded > 64 << 20 and decoded > self.limits.image_ratio * size:

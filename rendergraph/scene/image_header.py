@@ -1,33 +1,76 @@
-"""Size and channels from an image file's first bytes, without decoding it.
+"""What an image file's first bytes say, without decoding it: its kind, size and channels.
 
-Enough to refuse what is no image and what would balloon: PNG, JPEG, Radiance HDR and OpenEXR are looked into, other
-formats that image libraries read are accepted by their first bytes or their extension.
+Enough to refuse what is no image that can be read and what would balloon; `images.decode` goes by the same kinds and
+channels, so that `check` refuses what drawing would.
 """
 
 from __future__ import annotations
 
 import re
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 HEAD_BYTES = 1 << 20
-_MAGIC = {b"BM": "bmp", b"GIF8": "gif", b"II*\0": "tiff", b"MM\0*": "tiff", b"RIFF": "webp", b"DDS ": "dds"}
-_BY_EXTENSION = {".tga", ".pnm", ".ppm", ".pgm", ".pfm", ".pic"}
+READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"
+MOST_CHANNELS = 256
+_MAGIC = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpeg", b"v/1\x01": "exr", b"#?": "hdr", b"BM": "bmp"}
 
 
 class NoImageError(ValueError):
     """The bytes are those of something else."""
 
 
+class ChannelsError(ValueError):
+    """The image holds no colour that can be used."""
+
+
 @dataclass(frozen=True)
 class Header:
-    """What the first bytes say; sizes are None where they do not."""
+    """What the first bytes say; sizes are None where they do not.
+
+    Attributes:
+        format: `png`, `jpeg`, `exr`, `hdr`, `bmp`, `tga`, or a plugin's.
+        width, height: the larger of what is stored and what is shown.
+        channels: in the file.
+        channel_bytes: of a decoded channel.
+    """
 
     format: str
     width: int | None = None
     height: int | None = None
     channels: int = 4
     channel_bytes: int = 1
+
+    @property
+    def decoded_bytes(self) -> int | None:
+        """Bytes of the decoded image, which has four channels; None where the size is not known."""
+        if self.width is None or self.height is None:
+            return None
+        return self.width * self.height * 4 * self.channel_bytes
+
+
+def kind_of(start: bytes, suffix: str = "") -> str | None:
+    """The kind of image that begins like this, None where none does; TGA has no mark and goes by its extension."""
+    for magic, kind in _MAGIC.items():
+        if start.startswith(magic):
+            return kind
+    return "tga" if suffix.lower() == ".tga" else None
+
+
+def colour_channels(names: Sequence[str]) -> tuple[str, ...]:
+    """The channels of an EXR that are its colour: `R`, `G`, `B` and perhaps `A`, or `Y`.
+
+    Raises:
+        ChannelsError: it has none; the text continues "the image …".
+    """
+    upper = [name.upper() for name in names]
+    if "RY" in upper or "BY" in upper:
+        raise ChannelsError("holds luminance and chroma; convert it to R, G, B")
+    needed = ("R", "G", "B") if "R" in upper else ("Y",)
+    if not all(name in upper for name in needed):
+        raise ChannelsError(f"has the channels {', '.join(names[:8])}; R, G, B (and A) or Y are needed")
+    return (*needed, "A") if "R" in upper and "A" in upper else needed
 
 
 def read(head: bytes, suffix: str = "") -> Header:
@@ -43,22 +86,17 @@ def read(head: bytes, suffix: str = "") -> Header:
     """
     if not head:
         raise ValueError("is empty")
-    for magic, reader in ((b"\x89PNG", _png), (b"\xff\xd8", _jpeg), (b"#?", _hdr), (b"\x76\x2f\x31\x01", _exr)):
-        if head.startswith(magic):
-            try:
-                return reader(head)
-            except (struct.error, IndexError):
-                raise ValueError("ends inside its header") from None
-    for magic, name in _MAGIC.items():
-        if head.startswith(magic):
-            return Header(name)
-    if suffix.lower() in _BY_EXTENSION:
-        return Header(suffix.lower()[1:])
-    raise NoImageError("is no image that can be read (PNG, JPEG, HDR, EXR)")
+    kind = kind_of(head, suffix)
+    if kind is None:
+        raise NoImageError(f"is no image of a known kind; {READ}")
+    try:
+        return _READERS[kind](head)
+    except (struct.error, IndexError):
+        raise ValueError("ends inside its header") from None
 
 
 def _png(head: bytes) -> Header:
-    if head[:8] != b"\x89PNG\r\n\x1a\n" or head[12:16] != b"IHDR":
+    if head[12:16] != b"IHDR":
         raise ValueError("has a broken PNG header")
     width, height, depth, color = struct.unpack(">IIBB", head[16:26])
     channels = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}.get(color)
@@ -93,27 +131,59 @@ def _hdr(head: bytes) -> Header:
         raise ValueError("has a broken HDR header")
     first, second = int(found[3]), int(found[6])
     height, width = (first, second) if found[2] == b"Y" else (second, first)
-    return Header("hdr", width, height, 3, 4)
+    return Header("hdr", width, height, 3, 2)
+
+
+def _bmp(head: bytes) -> Header:
+    if struct.unpack("<I", head[14:18])[0] == 12:  # the first version's, of OS/2
+        width, height = struct.unpack("<HH", head[18:22])
+    else:
+        width, height = struct.unpack("<ii", head[18:26])
+    return Header("bmp", width, abs(height), 3)  # a negative height has the top row first
+
+
+def _tga(head: bytes) -> Header:
+    width, height, bits = struct.unpack("<HHB", head[12:17])
+    return Header("tga", width, height, max(1, bits // 8))
 
 
 def _exr(head: bytes) -> Header:
     (flags,) = struct.unpack("<I", head[4:8])
     if flags & 0xFF != 2:
         raise ValueError("has a broken EXR header")
-    at, width, height, channels = 8, None, None, 0
+    if flags & 0x800:
+        raise ChannelsError("is deep (several samples a pixel); flatten it first")
+    at, sides, names = 8, [], list[str]()
     while at < len(head) and head[at]:
         name, at = _zero_ended(head, at)
         kind, at = _zero_ended(head, at)
         (size,) = struct.unpack("<I", head[at : at + 4])
         value, at = head[at + 4 : at + 4 + size], at + 4 + size
-        if name == b"dataWindow" and kind == b"box2i" and width is None:
+        if name in (b"dataWindow", b"displayWindow") and kind == b"box2i":
             x0, y0, x1, y1 = struct.unpack("<iiii", value)
-            width, height = x1 - x0 + 1, y1 - y0 + 1
-        if name == b"channels" and not channels:
-            channels = value.count(b"\x01\0\0\0\x01\0\0\0")  # each full-resolution channel ends with its sampling
-    if width is None or height is None:
+            sides.append((x1 - x0 + 1, y1 - y0 + 1))
+        if name == b"channels" and kind == b"chlist":
+            names = _channel_names(value)
+    if not sides:
         raise ValueError("has an EXR header without a size")
-    return Header("exr", width, height, max(1, channels), 4)
+    if names:
+        colour_channels(names)
+    for width, height in sides:
+        if min(width, height) < 1:
+            raise ValueError(f"is {width}×{height} texels")
+    width, height = (max(side) for side in zip(*sides, strict=True))
+    return Header("exr", width, height, max(1, len(names)), 2)
+
+
+def _channel_names(value: bytes) -> list[str]:
+    names, at = list[str](), 0
+    while at < len(value) and value[at]:
+        name, at = _zero_ended(value, at)
+        names.append(name.decode("ascii", "replace"))
+        at += 16
+        if len(names) > MOST_CHANNELS:
+            raise ChannelsError(f"has more than {MOST_CHANNELS} channels")
+    return names
 
 
 def _zero_ended(head: bytes, at: int) -> tuple[bytes, int]:
@@ -121,3 +191,6 @@ def _zero_ended(head: bytes, at: int) -> tuple[bytes, int]:
     if end < 0:
         raise ValueError("has a broken EXR header")
     return head[at:end], end + 1
+
+
+_READERS = {"png": _png, "jpeg": _jpeg, "exr": _exr, "hdr": _hdr, "bmp": _bmp, "tga": _tga}

@@ -283,7 +283,8 @@ def big_png(width: int, height: int) -> bytes:
     ("data", "message"),
     [
         (b"", "RG352 .*is empty"),
-        (b"hello", "RG351 .*is no image"),
+        (b"hello", "RG351 .*is no image of a known kind; PNG, JPEG"),
+        (b"GIF89a" + bytes(20), "RG351"),
         (big_png(4, 4)[:20], "RG352 .*ends inside its header"),
         (big_png(20_000, 4), "RG353 .*20000×4 texels.*16,384"),
         (big_png(0, 4), "RG352 .*is 0×4 texels"),
