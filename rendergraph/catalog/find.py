@@ -141,8 +141,8 @@ def loose(path: Path, place: Place | None = None, where: str = "") -> Iterator[t
     fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem
     nodes, shaders = folder / "nodes", folder / "shaders"
-    if path.is_dir() and nodes.is_dir() and shaders.is_dir():
-        yield from _modules(nodes, f"{package}.nodes", plugin, shaders)
+    if path.is_dir() and nodes.is_dir():
+        yield from _modules(nodes, f"{package}.nodes", plugin, shaders if shaders.is_dir() else None)
     elif path.is_dir():
         yield from _modules(folder, package, plugin, None)
     else:

@@ -16,6 +16,7 @@ from rendergraph.stamps import Stamp, again, looking
 from rendergraph.textures import SEMANTICS, Semantic
 
 T = TypeVar("T")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Added(Generic[T]):
     plugin: str
     file: Path
 
-    def run(self: Added[Callable[..., T]], code: str, doing: str, *arguments: Any) -> T:
+    def run(self: Added[Callable[..., R]], code: str, doing: str, *arguments: Any) -> R:
         """Call what was added; whatever it raises is an error at the author's line.
 
         Args:

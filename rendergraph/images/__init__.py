@@ -4,8 +4,9 @@
 into something an eye can read, and `save_outputs` says what of a frame goes into which kind of file.
 """
 
-from rendergraph.images.decode import Limits, decode, read, read_metadata
+from rendergraph.images.decode import decode, read, read_metadata
 from rendergraph.images.encode import EXTENSIONS, write
+from rendergraph.images.pixels import Limits
 from rendergraph.images.saving import (
     PictureInfo,
     Saved,

@@ -1,0 +1,1 @@
+"""Drawings instead of photographs: outlines, a cartoon's shading, STL files."""

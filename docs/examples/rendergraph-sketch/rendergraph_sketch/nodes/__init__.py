@@ -1,0 +1,1 @@
+"""The nodes of this plugin; a type's name is its module's."""
