@@ -28,14 +28,15 @@ def layer_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[in
 
     Args:
         wanted: `auto`, a light's name, or several.
-        lights: the scene's lights, with `name` and `type`.
+        lights: the scene's lights, with `name`, `type` and `casts_shadow`, which `auto` asks for.
 
     Raises:
         ValueError: no light has that name.
     """
     kinds = [light.type for light in lights]
     if wanted == "auto":
-        found = [kinds.index(kind) for kind in ("directional", "spot") if kind in kinds][:1]
+        casting = [light.type if light.casts_shadow else None for light in lights]
+        found = [casting.index(kind) for kind in ("directional", "spot") if kind in casting][:1]
     else:
         names = [light.name for light in lights]
         found = sorted({_index(name, names) for name in ([wanted] if isinstance(wanted, str) else wanted)})

@@ -32,7 +32,9 @@ class ShadowMapNode(Node):
     )  # fmt: skip
 
     light: str | tuple[str, ...] = structural(
-        default="auto", doc="Lights that cast: names, or `auto` for the first directional, else the first spot light."
+        default="auto",
+        doc="Lights that cast: names, or `auto` for the first directional, else the first spot light, of those whose "
+        "`casts_shadow` the scene does not switch off.",
     )
     resolution: int = structural(default=2048, unit="texels", min=1, max=16384, doc="Side of each layer.")
     slope_bias: float = structural(

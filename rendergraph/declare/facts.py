@@ -11,10 +11,17 @@ from rendergraph.textures import Semantic, TextureDesc
 
 @dataclass(frozen=True)
 class LightFacts:
-    """What is known of a light before the schedule: values that move are not."""
+    """What is known of a light before the schedule: values that move are not.
+
+    Attributes:
+        name: unique in the scene.
+        type: what kind of light it is.
+        casts_shadow: whether a node that looks for a light to cast shadows may choose it.
+    """
 
     name: str
     type: Literal["directional", "point", "spot"]
+    casts_shadow: bool = True
 
 
 @dataclass(frozen=True)

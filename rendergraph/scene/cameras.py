@@ -93,5 +93,5 @@ def inverse_rigid(transform: Matrix) -> Matrix:
 
 
 def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
-    """Name and type of every light, in the scene's order."""
-    return tuple(LightFacts(light.name, light.type) for light in scene.lights)
+    """What is known of every light before the schedule, in the scene's order."""
+    return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)

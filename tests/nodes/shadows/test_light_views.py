@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -136,6 +136,10 @@ def test_layers_follow_the_scenes_order() -> None:
     assert views.layer_lights("auto", lights) == (2,)
     assert views.layer_lights("auto", lights[:2]) == (0,)
     assert views.layer_lights("auto", lights[1:2]) == ()
+    silent = replace(lights[2], casts_shadow=False)
+    assert views.layer_lights("auto", [*lights[:2], silent]) == (0,)
+    assert views.layer_lights("auto", [silent]) == ()
+    assert views.layer_lights("sun", [silent]) == (0,)  # what is asked for by name is what is meant
     assert views.layer_lights(("sun", "lamp"), lights) == (0, 2)
     assert views.layer_lights("bulb", lights) == (1,) * 6
     with pytest.raises(ValueError, match="the scene has no light 'lmap'; did you mean 'lamp'"):

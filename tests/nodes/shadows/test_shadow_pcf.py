@@ -151,6 +151,25 @@ def test_lights_that_are_not_named_cast_no_shadow(gl: Any, shared: Path) -> None
     assert info.lights == (1,)
 
 
+def test_a_light_that_casts_no_shadow_is_not_chosen(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.yaml"
+    text = """scene: 1
+objects: {floor: {shape: plane, size: [4, 4]}}
+lights:
+  sky: {type: directional, direction: [0, -1, 0.2], casts_shadow: false}
+  lamp: {type: spot, at: [0, 3, 0], direction: [0, -1, 0]}
+"""
+    scene.write_text(text)
+    assert [info.lights for info in _maps(scene)] == [(1,)]
+    scene.write_text(text.replace("casts_shadow: false", "casts_shadow: true"))
+    assert [info.lights for info in _maps(scene)] == [(0,)]
+
+
+def _maps(scene: Path) -> list[Any]:
+    graph = rg.load("forward", scene=scene).graph
+    return [info for end, info in graph.textures.items() if str(end) == "sun.shadow_map"]
+
+
 def test_without_a_light_that_casts_visibility_is_one(gl: Any, shared: Path) -> None:
     """Only a point light: `auto` finds nothing, the pass is culled, and the picture is the unshadowed one."""
     scene = shared / "reference" / "b2_shadows" / "point_room" / "scene.glb"
