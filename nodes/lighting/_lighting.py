@@ -35,7 +35,9 @@ class Lighting(Node):
         default="pbr", doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model.",
         choices="shading", needs=("phong", "grain"),
     )  # fmt: skip
-    smith: Literal["exact", "fast"] = define(default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots; `anisotropic` always has Smith's.")
+    smith: Literal["exact", "fast"] = define(
+        default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots. `anisotropic` always has Smith's."
+    )
     terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
         default="all", doc="One term alone, to look at; the four sum to the whole."
     )
