@@ -7,7 +7,7 @@ import traceback
 from pathlib import Path
 
 from rendergraph.catalog.types import Listed, NodeType
-from rendergraph.declare import Node, declaration_mistakes
+from rendergraph.declare import Node, declaration_mistakes, mistake_place
 from rendergraph.errors import InputError, Place, Problem
 
 
@@ -20,7 +20,7 @@ def load(name: str, listed: Listed) -> NodeType:
     place = Place(str(listed.file))
     try:
         module = importlib.import_module(listed.module)
-    except Exception as error:  # whatever a stranger's module raises is a mistake in that module
+    except (Exception, SystemExit) as error:  # whatever a stranger's module raises is a mistake in that module
         raise InputError(_failed(name, listed.file, error)) from error
     classes = [
         value
@@ -34,11 +34,12 @@ def load(name: str, listed: Listed) -> NodeType:
         raise InputError(Problem("RG492", text, place))
     mistakes = declaration_mistakes(classes[0])
     if mistakes:
-        raise InputError([Problem("RG490", f"node type '{name}': {mistake}", place) for mistake in mistakes])
+        placed = [(f"node type '{name}': {mistake}", mistake_place(listed.file, mistake)) for mistake in mistakes]
+        raise InputError([Problem("RG490", text, where) for text, where in placed])
     return NodeType(name, listed.family, classes[0], listed.file, listed.shaders, listed.plugin)
 
 
-def _failed(name: str, file: Path, error: Exception) -> Problem:
+def _failed(name: str, file: Path, error: BaseException) -> Problem:
     """The author's own line of what a module raised."""
     line = 0
     if isinstance(error, SyntaxError) and error.filename == str(file):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rendergraph.declare.extension import READ_IMAGES, Choice, Extension, MeshData, extension_mistakes
 from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source, raised_at
 from rendergraph.declare.facts import Facts, LightFacts, TextureInfo
-from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
+from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes, mistake_place
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import closed, define, open_name, own_choices, param, structural
 from rendergraph.declare.ports import (
@@ -28,5 +28,5 @@ __all__ = [
     "NO_EXTENSIONS", "PORT_TYPES", "READ_IMAGES", "RESERVED_NAMES", "Added", "Choice", "Extension", "Extensions",
     "Facts", "Function", "History", "InOut", "Input", "Internal", "LightFacts", "Made", "MeshData", "Node", "Output",
     "Part", "Port", "Ruled", "SizeRule", "Source", "TextureInfo", "Views", "closed", "declaration_mistakes", "define",
-    "extension_mistakes", "open_name", "own_choices", "param", "raised_at", "structural",
+    "extension_mistakes", "mistake_place", "open_name", "own_choices", "param", "raised_at", "structural",
 ]  # fmt: skip

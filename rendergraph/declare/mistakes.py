@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import ast
+import json
+import math
 import re
-from typing import get_args
+import types
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
 from rendergraph.declare.node import Node
-from rendergraph.declare.parameters import open_name
-from rendergraph.declare.ports import History, Internal, Made
-from rendergraph.textures import FORMATS
+from rendergraph.declare.parameters import open_name, own_choices
+from rendergraph.declare.port_mistakes import port_mistakes
+from rendergraph.declare.ports import History, Internal
+from rendergraph.errors import Place
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
@@ -31,60 +42,203 @@ RESERVED_NAMES: frozenset[str] = (
     sizeof cast namespace using texture sampler2D sampler3D samplerCube image2D abs acos all any asin atan ceil clamp
     cos cross degrees determinant distance dot equal exp exp2 floor fma fract inverse inversesqrt length log log2 main
     max min mix mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose
-    trunc
+    trunc camera world_position linear_depth to_viewer
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
     )
     | _OF_THE_BASE
 )
 
 
+_OF_THE_FRAMEWORK = frozenset(
+    """
+    ALPHA_BLEND ALPHA_MASK ANISOTROPIC DEFAULT_SPECULAR DOUBLE_SIDED HAS_TANGENT HAS_UV0 HAS_UV1 HAS_UV_TRANSFORM
+    HAS_VERTEX_COLOR LIGHT_COUNT LIGHT_DIRECTIONALS LIGHT_POINTS LIGHT_SPOTS LIGHT_STORAGE MATERIAL_COUNT
+    MATERIAL_STORAGE MATERIAL_UV_STORAGE NO_EMISSIVE PASS_VIEW PASS_VIEW_COUNT SHADOW_LIGHT_COUNT UNIFORM_SCALE UNLIT
+    """.split()  # noqa: SIM905 - as above
+)
+"""Macros that shaders are given whatever the node declares."""
+_ROLES = "param(…), define(…) or structural(…)"
+
+
 def declaration_mistakes(cls: type[Node]) -> list[str]:
     """What is wrong with a node's declaration, one sentence each; empty where it is fine.
 
-    Checked: names are GLSL identifiers and distinct, docs exist, defaults lie inside their range, formats exist,
-    `like`, `view`, `lights`, `needs` and `reads` name ports of this node.
+    Checked: names are GLSL identifiers and distinct, also as macros; docs exist; types and defaults are what a shader
+    can be given and lie inside their range; formats, kinds and words exist; rules name ports of this node.
     """
-    mistakes: list[str] = []
-    ports = cls.ports()
-    names = [*ports, *cls.parameters()]
-    plan = {name for name in cls.parameters() if cls.role_of(name) == "structural"}  # these never reach a shader
-    for name in names:
-        if not _IDENTIFIER.match(name) or name.startswith("gl_") or "__" in name:
-            mistakes.append(f"'{name}' is not a lower-case GLSL identifier")
-        elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES) or name.startswith("model_"):
-            mistakes.append(f"'{name}' is reserved by GLSL or by the node's base class; choose another name")
-    for name in set(ports) & set(cls.parameters()):
-        mistakes.append(f"'{name}' is both a port and a parameter")
-    if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
-        mistakes.append("the class has no docstring")
-    for name, port in ports.items():
-        doc = getattr(port, "doc", "")
-        if not doc and not isinstance(port, Internal | History):
-            mistakes.append(f"port '{name}' has no doc")
-        if isinstance(port, Made):
-            if isinstance(port.format, str) and port.format not in FORMATS:
-                mistakes.append(f"port '{name}' has an unknown format '{port.format}'")
-            if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
-                mistakes.append(f"port '{name}' has neither a semantic nor `like`")
-            if isinstance(port, History) and port.kind == "buffer":
-                mistakes.append(f"'{name}' is a History of a buffer; only textures keep last frame's values")
-            for rule in ("like", "view", "lights"):
-                target = getattr(port, rule)
-                if isinstance(target, str) and target not in ports:
-                    mistakes.append(f"port '{name}' is {rule} '{target}', which is no port")
-        for rule in ("needs", "reads"):
-            mistakes += [
-                f"port '{name}' {rule} '{target}', which is no port"
-                for target in getattr(port, "read_names" if rule == "reads" else rule, ())
-                if target not in ports
-            ]
-    for name, info in cls.parameters().items():
-        if not info.description:
-            mistakes.append(f"parameter '{name}' has no doc")
-        if open_name(info) and str not in get_args(info.annotation):
-            mistakes.append(f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
+    return [*_names(cls), *_docs(cls), *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
+
+
+def mistake_place(file: Path, mistake: str) -> Place:
+    """Where in a module the first name is declared that a mistake quotes, else its class."""
     try:
-        cls.model_validate(cls().model_dump(), strict=False)
-    except ValueError as error:
-        mistakes.append(f"a default lies outside its range: {error}")
-    return mistakes
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, ValueError):
+        return Place(str(file))
+    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    declared: dict[str, ast.stmt] = {}
+    for statement in (statement for cls in classes for statement in cls.body):
+        targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
+        declared |= {target.id: statement for target in targets if isinstance(target, ast.Name)}
+    named = [declared[name] for name in re.findall(r"'(\w+)'", mistake) if name in declared]
+    for node in [*named, *classes]:
+        return Place(str(file), node.lineno, node.col_offset + 1)
+    return Place(str(file))
+
+
+def _names(cls: type[Node]) -> Iterator[str]:
+    ports, parameters = cls.ports(), cls.parameters()
+    plan = {name for name in parameters if cls.role_of(name) == "structural"}  # these never reach a shader
+    for name in [*ports, *parameters]:
+        if not _IDENTIFIER.match(name) or name.startswith("gl_") or "__" in name:
+            yield f"'{name}' is not a lower-case GLSL identifier"
+        elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES) or name.startswith("model_"):
+            yield f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
+    for name in sorted(set(ports) & set(parameters)):
+        yield f"'{name}' is both a port and a parameter"
+    given = {f"{name}_{word}": (name, word) for name in ports for word in ("views", "lights")}
+    for name in [*ports, *(name for name in parameters if name not in plan)]:
+        if name in given:
+            yield f"'{name}' is what shaders are given for the {given[name][1]} of port '{given[name][0]}'; rename one"
+    for group in cls.groups():
+        if group in ports or group in parameters:
+            yield f"group '{group}' has the name of a port or parameter"
+    shader = cls.shader
+    if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
+        yield f"`shader` is {shader!r}; it is a file that ends in .frag or .comp"
+
+
+def _docs(cls: type[Node]) -> Iterator[str]:
+    if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
+        yield "the class has no docstring"
+    for name, port in cls.ports().items():
+        doc = getattr(port, "doc", "")
+        if not isinstance(doc, str):
+            yield f"port '{name}' has a doc that is no text"
+        elif not doc and not isinstance(port, Internal | History):
+            yield f"port '{name}' has no doc"
+    for name, info in cls.parameters().items():
+        if _extra(info).get("role") is None:
+            yield f"parameter '{name}' is a plain value; declare it with {_ROLES}"
+        elif not info.description:
+            yield f"parameter '{name}' has no doc"
+
+
+def _macros(cls: type[Node]) -> Iterator[str]:
+    """Two declarations that would define one macro."""
+    made: list[tuple[str, str]] = []
+    for name in cls.inputs():
+        made += [(f"{word}", f"input '{name}'") for word in (f"HAS_{name}".upper(), f"{name}_LAYERS".upper())]
+    for name, info in cls.parameters().items():
+        if cls.role_of(name) == "define":
+            made.append((name.upper(), f"define '{name}'"))
+            made += [
+                (f"{name}_{choice}".upper().replace("-", "_"), f"choice '{choice}' of '{name}'")
+                for choice in own_choices(info.annotation)
+            ]
+    counted = Counter(macro for macro, _ in made)
+    for macro, source in made:
+        if macro in _OF_THE_FRAMEWORK:
+            yield f"{source} would define the macro {macro}, which is rendergraph's own; choose another name"
+    for macro in [macro for macro, count in counted.items() if count > 1]:
+        sources = " and ".join(source for other, source in made if other == macro)
+        yield f"{sources} would define one macro, {macro}; rename one"
+
+
+def _parameters(cls: type[Node]) -> Iterator[str]:
+    for name, info in cls.parameters().items():
+        role, extra = cls.role_of(name), _extra(info)
+        if open_name(info) and str not in get_args(info.annotation):
+            yield f"plugins add choices to '{name}', so its type is a Literal of its own `| str`"
+        wrong = _not_for_a_shader(info, role) if role != "structural" else None
+        if wrong:
+            yield f"parameter '{name}' is {wrong}"
+        low, high = extra.get("minimum"), extra.get("maximum")
+        for word, limit in (("min", low), ("max", high)):
+            if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int | float)):
+                yield f"parameter '{name}' has {word}={limit!r}, which is no number"
+        if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
+            yield f"parameter '{name}' goes from {low} to {high}, which is nothing"
+        if extra.get("glsl") and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(extra["glsl"])):
+            yield f"parameter '{name}' has glsl={extra['glsl']!r}, which is no GLSL type"
+    yield from _defaults(cls)
+
+
+def _defaults(cls: type[Node]) -> Iterator[str]:
+    """Defaults go the way of values in a file."""
+    try:
+        node = cls()
+        values = {name: getattr(node, name) for name in cls.parameters()}
+        written = json.dumps(values)
+    except TypeError as error:
+        yield f"a default is no value that a file can hold: {error}"
+        return
+    except Exception as error:  # what the author's own validators raise
+        yield f"it cannot be made with its defaults: {type(error).__name__}: {' '.join(str(error).split())}"
+        return
+    if not all(_finite(value) for value in values.values()):
+        yield "a default is not finite"
+        return
+    try:
+        cls.model_validate_json(written)
+    except ValidationError as error:
+        for detail in error.errors(include_url=False):
+            name = str(detail["loc"][0]) if detail["loc"] else ""
+            said = str(detail["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
+            of = f"the default of '{name}', {values[name]!r}, is" if name in values else "its defaults are"
+            yield f"{of} wrong: {said}"
+    except Exception as error:  # as above
+        yield f"its own checks fail on the defaults: {type(error).__name__}: {error}"
+
+
+def _not_for_a_shader(info: FieldInfo, role: str) -> str | None:
+    """Why a parameter's type cannot become a uniform, or program text."""
+    kinds = set(_leaves(info.annotation))
+    if role == "define":
+        words = own_choices(info.annotation)
+        odd = [word for word in words if not re.fullmatch(r"[A-Za-z0-9_-]+", word)]
+        if odd:
+            return f"a define with the choice '{odd[0]}', which cannot stand in a macro's name"
+        if tuple in kinds or list in kinds:
+            return "a define of several numbers; macros hold one, make it a param"
+        if str in kinds and not open_name(info):
+            return "a define of free text; list its choices as Literal[…]"
+    elif str in kinds or any(isinstance(kind, str) for kind in kinds):
+        return "a param of text, which no uniform holds; make it a define with Literal[…]"
+    if type(None) in kinds:
+        return f"a {role} that may be None; give it a default"
+    if list in kinds:
+        return f"a {role} of a list; a tuple says how many numbers there are"
+    other = [kind for kind in kinds if isinstance(kind, type) and kind not in (bool, int, float, tuple, str)]
+    if other:
+        return f"a {role} of {getattr(other[0], '__name__', other[0])}; shaders take numbers and switches"
+    return None
+
+
+def _leaves(annotation: Any) -> Iterator[Any]:
+    """The plain types of an annotation; `tuple` and `list` for what holds several; words of a Literal as they are."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in (Union, types.UnionType):
+        for part in arguments:
+            yield from _leaves(part)
+    elif origin is Literal:
+        for value in arguments:
+            yield value if isinstance(value, str) else type(value)
+    elif origin in (tuple, list):
+        yield origin
+        for part in arguments:
+            if part is not Ellipsis:
+                yield from _leaves(part)
+    elif isinstance(origin, type):
+        yield origin
+    else:
+        yield annotation
+
+
+def _extra(info: FieldInfo) -> Mapping[str, Any]:
+    return info.json_schema_extra if isinstance(info.json_schema_extra, Mapping) else {}
+
+
+def _finite(value: object) -> bool:
+    numbers = value if isinstance(value, tuple | list) else (value,)
+    return all(math.isfinite(number) for number in numbers if isinstance(number, float))

@@ -1,0 +1,154 @@
+"""What can be wrong with the ports that a node declares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, get_args
+
+from rendergraph.declare.node import Node
+from rendergraph.declare.ports import Function, History, InOut, Input, Internal, Made, Part, Port, Views
+from rendergraph.errors import suggestion
+from rendergraph.textures import FORMATS, TEXTURE_KINDS, Filter, Kind, Semantic, Signature, Wrap
+
+
+def port_mistakes(cls: type[Node]) -> list[str]:
+    """What is wrong with a node's ports, one sentence each."""
+    found: list[str] = []
+    for name, port in cls.ports().items():
+        if isinstance(port, Input):
+            found += _input(name, port)
+        elif isinstance(port, Made):
+            found += _made(name, port, cls.ports())
+        elif isinstance(port, Views):
+            found += _views(name, port)
+        elif isinstance(port, Function):
+            found += _function(name, port)
+        found += _named(name, port, cls.ports())
+    return found
+
+
+def _word(name: str, what: str, value: object, known: tuple[Any, ...]) -> Iterator[str]:
+    if not callable(value) and value not in known:
+        words = [word for word in known if isinstance(word, str)]
+        near = suggestion(value if isinstance(value, str) else "", words, most=len(words))
+        yield f"port '{name}' has {what} {value!r}{near}"
+
+
+def _whole(name: str, what: str, value: object, least: int) -> Iterator[str]:
+    if value is None or callable(value):
+        return
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        yield f"port '{name}' has {what}={value!r}; it is a whole number from {least}, or a function of node and facts"
+
+
+def _input(name: str, port: Input) -> Iterator[str]:
+    wanted = Signature if port.kind == "function" else Semantic
+    if not isinstance(port.semantic, wanted):
+        yield f"port '{name}' has the semantic {port.semantic!r}; it is a {wanted.__name__}, such as " + (
+            "ShadowLookup" if wanted is Signature else "Radiance"
+        )
+    yield from _word(name, "kind", port.kind, get_args(Kind))
+    yield from _word(name, "size", port.size, ("same", "any"))
+    yield from _word(name, "filter", port.filter, get_args(Filter))
+    yield from _word(name, "wrap", port.wrap, get_args(Wrap))
+    yield from _word(name, "samples", port.samples, ("single", "multi", "any"))
+    yield from _word(name, "use", port.use, ("sample", "depth_test", "image"))
+    yield from _whole(name, "anisotropy", port.anisotropy, 1)
+    for flag in ("compare", "optional", "many"):
+        if not isinstance(getattr(port, flag), bool):
+            yield f"port '{name}' has {flag}={getattr(port, flag)!r}; it is True or False"
+
+
+def _made(name: str, port: Made, ports: dict[str, Port]) -> Iterator[str]:
+    if port.semantic is not None and not isinstance(port.semantic, Semantic):
+        yield f"port '{name}' has the semantic {port.semantic!r}; it is a Semantic, such as Radiance"
+    elif port.semantic is None and port.like is None and not isinstance(port, Internal | History):
+        yield f"port '{name}' has neither a semantic nor `like`"
+    yield from _word(name, "kind", port.kind, (*sorted(TEXTURE_KINDS), "buffer"))
+    if isinstance(port.format, str) and port.format not in FORMATS:
+        yield f"port '{name}' has an unknown format '{port.format}'{suggestion(port.format, FORMATS)}"
+    elif port.format is not None and not isinstance(port.format, str) and not callable(port.format):
+        yield f"port '{name}' has format={port.format!r}; it is the name of one, such as 'rgba16f'"
+    yield from _whole(name, "mips", port.mips, 0)
+    yield from _whole(name, "layers", port.layers, 0)
+    yield from _whole(name, "samples", port.samples, 1)
+    yield from _size(name, port.size, ports)
+    if port.kind == "buffer":
+        yield from _whole(name, "bytes", port.bytes, 1)
+        if isinstance(port, History):
+            yield f"'{name}' is a History of a buffer; only textures keep last frame's values"
+        if not callable(port.clear) and port.clear not in (None, 0):
+            yield f"port '{name}' is a buffer, which is cleared to 0 alone, not to {port.clear!r}"
+    elif not callable(port.clear) and port.clear is not None and not _is_texel(port.clear):
+        yield f"port '{name}' has clear={port.clear!r}; it is a number, up to four of them, or None"
+    if port.first is not None and (isinstance(port.first, bool) or not isinstance(port.first, int | float)):
+        yield f"port '{name}' has first={port.first!r}; it is a number, for every channel"
+
+
+def _is_texel(value: object) -> bool:
+    numbers = value if isinstance(value, tuple) else (value,)
+    return 1 <= len(numbers) <= 4 and all(isinstance(number, int | float) for number in numbers)
+
+
+def _size(name: str, rule: Any, ports: dict[str, Port]) -> Iterator[str]:
+    """A size is a factor, width and height, an input's name, that with a factor, or a function."""
+    if rule is None or callable(rule):
+        return
+    source = rule if isinstance(rule, str) else rule[0] if isinstance(rule, tuple) and len(rule) == 2 else None
+    if isinstance(source, str):
+        if not isinstance(ports.get(source), Input | InOut):
+            yield f"port '{name}' has the size of '{source}', which is no input{_near(source, ports)}"
+        factor = rule[1] if isinstance(rule, tuple) else 1.0
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or factor <= 0:
+            yield f"port '{name}' has the size of '{source}' times {factor!r}; a factor is a number above 0"
+    elif isinstance(rule, tuple):
+        if len(rule) != 2 or not all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in rule):
+            yield f"port '{name}' has size={rule!r}; width and height are whole numbers from 1"
+    elif isinstance(rule, bool) or not isinstance(rule, int | float) or rule <= 0:
+        yield f"port '{name}' has size={rule!r}; a factor of the viewport is a number above 0"
+
+
+def _views(name: str, port: Views) -> Iterator[str]:
+    yield from _whole(name, "count", port.count, 0)
+    if port.lights is not None and not callable(port.lights):
+        yield f"port '{name}' has lights={port.lights!r}; it is a function of node and facts"
+
+
+def _function(name: str, port: Function) -> Iterator[str]:
+    if not isinstance(port.signature, Signature):
+        yield f"port '{name}' has the signature {port.signature!r}; it is a Signature, such as ShadowLookup"
+    if not isinstance(port.shader, str) or not port.shader:
+        yield f"port '{name}' has shader={port.shader!r}; it is the name of the file with its text"
+    for read in port.reads:
+        if not isinstance(read, str | Part):
+            yield f"port '{name}' reads {read!r}; `reads` holds names of ports, or ports with `.sampled(…)`"
+
+
+def _named(name: str, port: Port, ports: dict[str, Port]) -> Iterator[str]:
+    """Rules that name other ports of the node."""
+    takes: tuple[tuple[str, tuple[type, ...], str], ...] = (
+        ("like", (Input, InOut), "no input"),
+        ("view", (Input, InOut, Views), "no input and no table of views"),
+        ("lights", (Input, InOut, Views), "no input and no table of views"),
+    )
+    for rule, kinds, otherwise in takes:
+        target = getattr(port, rule, None)
+        if not isinstance(target, str):
+            continue
+        if target not in ports:
+            yield f"port '{name}' is {rule} '{target}', which is no port{_near(target, ports)}"
+        elif not isinstance(ports[target], kinds):
+            yield f"port '{name}' is {rule} '{target}', which is {otherwise}"
+    for target in getattr(port, "needs", ()):
+        if target not in ports:
+            yield f"port '{name}' needs '{target}', which is no port{_near(target, ports)}"
+        elif not isinstance(ports[target], Input | InOut):
+            yield f"port '{name}' needs '{target}', which is no input"
+    for read in getattr(port, "reads", ()):
+        target = read.port.name if isinstance(read, Part) else read
+        if isinstance(target, str) and not isinstance(ports.get(target), Input | Made):
+            yield f"port '{name}' reads '{target}', which is no port{_near(target, ports)}"
+
+
+def _near(name: str, ports: dict[str, Port]) -> str:
+    return suggestion(name, ports, most=0)
