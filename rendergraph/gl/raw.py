@@ -64,7 +64,6 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glProgramUniformMatrix4fv": (None, _U, _I, _I, ctypes.c_ubyte, _P),
     "glProgramUniform1i": (None, _U, _I, _I),
     "glGetProgramiv": (None, _U, _U, _P),
-    "glGetProgramiv": (None, _U, _U, _P),
     "glGetProgramInterfaceiv": (None, _U, _U, _U, _P),
     "glGetProgramResourceName": (None, _U, _U, _U, _I, _P, _P),
     "glShaderStorageBlockBinding": (None, _U, _U, _U),
@@ -167,12 +166,6 @@ class RawGL:
         """`glGetIntegerv` of one value."""
         value = _I()
         self.glGetIntegerv(parameter, ctypes.byref(value))
-        return value.value
-
-    def integer_at(self, parameter: int, index: int) -> int:
-        """`glGetIntegeri_v` of one value."""
-        value = _I()
-        self.glGetIntegeri_v(parameter, index, ctypes.byref(value))
         return value.value
 
     def integer_at(self, parameter: int, index: int) -> int:
