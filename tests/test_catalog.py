@@ -96,7 +96,7 @@ def test_two_of_one_name(plugin: Path, tmp_path: Path) -> None:
         (GOOD.replace("._shared import SIZE", "math import pi as SIZE") + "\nclass Other(Good):\n    '''More.'''\n",
          r"odd.py: RG492 .* it has Good, Other"),
         (GOOD.replace("._shared import SIZE", "math import pi as SIZE").replace("radiance =", "filter ="),
-         r"odd.py: RG490 node type 'odd': 'filter' is reserved"),
+         r"odd.py:\d+:5: RG490 node type 'odd': 'filter' is reserved"),
     ],
 )  # fmt: skip
 def test_a_wrong_module_is_told_with_its_file(tmp_path: Path, text: str, message: str) -> None:
@@ -149,3 +149,11 @@ def test_classes_at_hand(toy_catalog: Catalog) -> None:
     assert toy_catalog.get("shadow_map").cls.__name__ == "LightDepth"
     assert toy_catalog.get("tonemap").file.name == "toys.py"
     assert rendergraph.catalog.GROUP == "rendergraph.nodes"
+
+
+def test_text_with_a_comma_within_braces_is_told_from_a_key(tmp_path: Path) -> None:
+    file = tmp_path / "dim.frag"
+    outputs = "outputs: {dimmed: {doc: The same, but darker.}}"
+    file.write_text(f"/*---\n{outputs}\n---*/\nout vec4 dimmed;\nvoid main() {{ dimmed = vec4(0.0); }}\n")
+    with pytest.raises(InputError, match="dim.frag:2:35: RG440 'but darker.' reads as a key: text with a comma stands"):
+        Catalog.discover([file], installed=False).get("dim")

@@ -1,7 +1,7 @@
 """The documentation says what is true: every block of code in it is checked or run, every generated page is there.
 
 The blocks of a page run in order in one empty folder. A block whose first line is a comment with a file's name
-(`# a.yaml`, `// a.frag`) is written there. YAML that is a pipeline or a scene must pass `check`; of `console` blocks
+(`# a.yaml`, `// effects/a.frag`) is written there. YAML that is a pipeline or a scene must pass `check`; of `console` blocks
 every `rendergraph` line is run, small, and the lines under it are compared with what it prints, where `…` stands for
 anything.
 """
@@ -40,7 +40,7 @@ class Block:
     @property
     def file(self) -> str | None:
         """The name in the first line's comment."""
-        found = re.match(r"(?:#|//) ([\w.-]+\.\w+)\n", self.text)
+        found = re.match(r"(?:#|//) ((?:[\w-]+/)*[\w.-]+\.\w+)\n", self.text)
         return found[1] if found else None
 
 
@@ -59,6 +59,7 @@ def test_blocks_of_a_page(
     for block in blocks(page):
         where = f"{page.name}:{block.line}"
         if block.file:
+            (tmp_path / block.file).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
         if block.language == "console":
             _run_console(block.text, where, capsys)

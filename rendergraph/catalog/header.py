@@ -268,7 +268,10 @@ class _Reader:
     def entry(self, what: str, keys: Mapping[str, Check], entry: Value) -> dict[str, Value]:
         found: dict[str, Value] = {}
         for key, value in entry.items():
-            if key not in keys:
+            if key not in keys and value.data is None and " " in str(key):
+                text = f"'{shown(key)}' reads as a key: text with a comma stands in quotes within {{…}}"
+                self.problems.append(value.problem("RG440", text, key=True))
+            elif key not in keys:
                 text = f"{what} has no key '{shown(key)}'{suggestion(str(key), keys)}"
                 self.problems.append(value.problem("RG440", text, key=True))
             elif value.data is not None and value.data is not BROKEN and self.right(key, value, keys[key]):
