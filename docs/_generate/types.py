@@ -1,32 +1,58 @@
-"""What ports carry: semantics, functions, formats."""
+"""What ports carry: semantics, functions, formats; parts of a page that is written by hand."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from rendergraph.catalog import Catalog, NodeType
 from rendergraph.textures import FORMATS, SEMANTICS, SIGNATURES
 
-from .markdown import code, page, prose, table
+from .markdown import code, prose, table
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """One page."""
-    semantics = [(code(s.name), prose(s.doc), s.space, s.encoding) for s in SEMANTICS]
-    functions = [(f"`{s.declaration}`", prose(s.doc), code(s.neutral), code(s.combine)) for s in SIGNATURES]
+    """A part of a page for each table."""
+    catalog = Catalog.discover()
+    types = [found for found in map(catalog.get, catalog.names()) if found.plugin == "builtin"]
+    semantics = [
+        (
+            code(s.name),
+            prose(s.doc),
+            s.space,
+            s.encoding,
+            _linked(types, s.name, "outputs"),
+            _linked(types, s.name, "inputs"),
+        )
+        for s in SEMANTICS
+    ]
+    functions = [
+        (
+            f"`{s.declaration}`", prose(s.doc), code(s.neutral), code(s.combine), _linked(types, s.name, "outputs"),
+            _linked(types, s.name, "inputs"),
+        )
+        for s in SIGNATURES
+    ]  # fmt: skip
     formats = [
         (code(f.name), f.family.replace("_", " and "), f.components, f.bytes, f.view_class if not f.is_depth else "")
         for f in FORMATS.values()
     ]
+    ends = ("made by", "taken by")
+    yield "semantics-table.md", table(("semantic", "texels", "space", "encoding", *ends), semantics)
     yield (
-        "types.md",
-        page(
-            "Port types",
-            "A link is checked for what its texels mean, not only for how they are stored. Plugins add semantics of "
-            "their own; `any` connects to all of them, both ways.",
-            "## Semantics\n\n" + table(("semantic", "texels", "space", "encoding"), semantics),
-            "## Functions\n\nA port of kind `function` carries GLSL that its reader calls in place; several providers "
-            "are joined.\n\n" + table(("declaration", "returns", "without a provider", "joined by"), functions),
-            "## Formats\n\nTextures of one class can share memory through views; depth shares with its own format "
-            "only.\n\n" + table(("format", "family", "channels", "bytes a texel", "class"), formats),
-        ),
+        "functions-table.md",
+        table(("declaration", "returns", "without a provider", "joined by", *ends), functions),
     )
+    yield "formats-table.md", table(("format", "family", "channels", "bytes a texel", "class"), formats)
+
+
+def _linked(types: list[NodeType], meaning: str, side: str) -> str:
+    """The standard nodes with such a port; of `any`, `view` and `scene`, which most have, none."""
+    if meaning in ("any", "view", "scene"):
+        return ""
+    found = [one.name for one in types if any(_means(port) == meaning for port in getattr(one.cls, side)().values())]
+    return ", ".join(f"[`{name}`](generated/nodes/{name}.md)" for name in found)
+
+
+def _means(port: object) -> str:
+    carried = getattr(port, "signature", None) or getattr(port, "semantic", None)
+    return carried.name if carried else ""
