@@ -340,7 +340,8 @@ def test_a_plugins_mesh_is_a_scene(gl: rg.Session, loaders: Path, tmp_path: Path
     np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 3)
     assert mesh.colors is not None
     np.testing.assert_allclose(mesh.colors[0], [0.2, 0, 0, 1])
-    assert (mesh.name, mesh.indices.dtype) == ("Piece", np.uint32)
+    assert mesh.name == "Piece"
+    assert mesh.indices.dtype == np.uint32
     drawn = gl.render(pipeline)["image"].reshape(-1, 4)
     assert (drawn[:, 0] > 2 * drawn[:, 1].astype(int)).mean() > 0.1
 

@@ -81,6 +81,11 @@ class Catalog:
         """The names of all types, sorted; nothing is imported."""
         return sorted(self._types.keys() | self._listed.keys())
 
+    def has_plugin(self, name: str) -> bool:
+        """Whether something comes from a plugin of this name, spelled as packages or as modules are."""
+        plugins = {one.plugin for found in self._listed.values() for one in found}
+        return any(_plain(plugin) == _plain(name) for plugin in plugins)
+
     def files(self) -> set[Path]:
         """The files of everything that has been listed."""
         return {one.file for found in self._listed.values() for one in found}
@@ -119,6 +124,11 @@ class Catalog:
         from rendergraph.catalog import shader  # what reads shaders is imported where there are any
 
         return shader.load(name, listed, self.extensions)
+
+
+def _plain(name: str) -> str:
+    """A package's name as indexes compare them (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def _add(listed: dict[str, list[Listed]], found: Iterable[tuple[str, Listed]]) -> None:

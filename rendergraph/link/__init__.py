@@ -168,6 +168,7 @@ class _Linker:
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
         node, problems = instance(spec, node_type)
         choices, wrong = plugged(spec, node, self.catalog.extensions)
+        self.missing += wrong if self.spec.missing else ()
         for problem in (*problems, *wrong):
             self._say(problem)
         ports = node_type.cls.ports()

@@ -88,7 +88,8 @@ class Plugins:
         try:
             metadata.distribution(name)
         except metadata.PackageNotFoundError:
-            if name not in self.missing:
+            # While it is being written, its folder is named and it is not installed.
+            if name not in self.missing and not self.catalog.has_plugin(name):
                 self.missing.append(name)
                 text = f"the pipeline needs the plugin '{name}', which is not installed: pip install {name}"
                 self._say(value.problem("RG130", text))

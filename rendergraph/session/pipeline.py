@@ -202,7 +202,11 @@ class Pipeline:
         from rendergraph.scene.cameras import light_facts
         from rendergraph.scene.selection import unfilled_selections
 
-        return link(self.spec, self.catalog, light_facts(self.scene), unfilled_selections(self.scene))
+        try:
+            scene = self.scene
+        except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
+            raise InputError([*self.spec.problems, *error.problems]) from None
+        return link(self.spec, self.catalog, light_facts(scene), unfilled_selections(scene))
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
