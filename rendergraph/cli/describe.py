@@ -127,7 +127,7 @@ def _parameter(cls: Any, name: str, extensions: Extensions) -> dict[str, Any]:
     extra = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
     found: dict[str, Any] = {
         "name": name,
-        "type": type_words(annotation),
+        "type": type_words(annotation) + (" | …" if open_name(info) else ""),  # plugins may add to it
         "default": list(info.default) if isinstance(info.default, tuple) else info.default,
         "role": cls.role_of(name),
         "unit": extra.get("unit", ""),
