@@ -237,7 +237,6 @@ def test_reasons_say_why() -> None:
 
 def test_dependencies_are_a_networkx_graph_with_reasons() -> None:
     dag = schedule(fan_out(1)).dependencies
-    assert dag is not None
     assert dag.edges[("draw0", 0), ("light0", 0)] == {"resource": "draw0.x", "why": "reads"}
 
 

@@ -7,7 +7,6 @@ import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-import networkx as nx
 import pytest
 
 from rendergraph.allocate import ResourcePlan, allocate
@@ -74,14 +73,10 @@ def graph(sky: str = "sky") -> Graph:
         "light": (Light(), {"lookup": (Endpoint("shadows", "lookup"),)}),
         sky: (Sky(), {"radiance": (Endpoint("light", "radiance"),), "depth": (Endpoint("light", "depth"),)}),
     }
-    dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
+    members = {}
     for id, (node, inputs) in wiring.items():
         kind = NodeType(type(node).__name__.lower(), "", type(node), Path("x.py"), Path())
-        dag.add_node(id, node=GraphNode(id, kind, node, inputs))
-    for id, (_, inputs) in wiring.items():
-        for port, ends in inputs.items():
-            for end in ends:
-                dag.add_edge(end.node, id, source_port=end.port, target_port=port, previous=end.previous)
+        members[id] = GraphNode(id, kind, node, inputs)
     textures = {
         Endpoint("sun", "shadow_map"): TextureInfo(
             TextureDesc("texture2d_array", "depth32f", 1024, 1024, 2), ShadowMap, "sun.views", (0, 1)
@@ -91,7 +86,7 @@ def graph(sky: str = "sky") -> Graph:
         Endpoint("display", "color"): TextureInfo(TextureDesc("texture2d", "rgba8", *FULL), DisplayColor),
     }
     lights = (LightFacts("sun", "directional"),)
-    return Graph("demo", dag, {"image": Endpoint("display", "color")}, FULL, lights, textures)
+    return Graph("demo", members, {"image": Endpoint("display", "color")}, FULL, lights, textures)
 
 
 def plan() -> ResourcePlan:
@@ -268,7 +263,7 @@ def test_an_empty_plan_has_views(view: object) -> None:
 
 
 def test_an_empty_graph_has_views() -> None:
-    empty = Graph("empty", nx.MultiDiGraph(), {}, FULL)
+    empty = Graph("empty", {}, {}, FULL)
     assert text(empty) == "empty  320×180\n"
     ET.fromstring(svg(empty))
     assert mermaid(empty) == "flowchart LR\n"

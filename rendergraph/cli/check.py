@@ -35,7 +35,7 @@ def command(as_json: bool, **selection: Any) -> None:
     later += [stale] if stale else []
     warn(later)
     width, height = graph.size
-    links = graph.dag.number_of_edges()
+    links = sum(len(ends) for node in graph.nodes for ends in node.inputs.values())
     say(f"{graph.name}: {len(graph.nodes)} nodes, {links} links, {width}×{height}, outputs {', '.join(graph.outputs)}")
     if as_json:
         emit_json(

@@ -14,14 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from rendergraph.declare import InOut, TextureInfo
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.session import Pipeline
-
-if TYPE_CHECKING:
-    import networkx as nx
 
 Key: TypeAlias = "tuple[int, str]"
 """Number of a graph and id of one of its nodes."""
@@ -78,7 +75,7 @@ def merge(graphs: Sequence[Graph]) -> Merged:
         for name, end in graph.outputs.items()
     }
     first = graphs[0]
-    merged = Graph(first.name, _dag(nodes), outputs, first.size, first.lights, textures, unfilled=first.unfilled)
+    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures, unfilled=first.unfilled)
     return Merged(merged, names)
 
 
@@ -147,17 +144,3 @@ def _ids(graphs: Sequence[Graph], classes: Mapping[Key, int]) -> dict[int, str]:
         used.add(unique)
         ids[number] = unique
     return ids
-
-
-def _dag(nodes: Mapping[str, GraphNode]) -> nx.MultiDiGraph[str]:
-    import networkx as nx
-
-    dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
-    for name, node in nodes.items():
-        dag.add_node(name, node=node)
-    for name, node in nodes.items():
-        for port, ends in node.inputs.items():
-            for end in ends:
-                dag.add_edge(end.node, name, source_port=end.port, target_port=port, previous=end.previous)
-    nx.freeze(dag)
-    return dag

@@ -129,10 +129,10 @@ def diff(a: Graph, b: Graph) -> GraphDiff:
 
 def _matched(a: Graph, b: Graph) -> dict[str, str]:
     """First graph's node to the second's: by id and type, then equal ones under another id, then by id alone."""
-    nodes = {node.id: node.id for node in a.nodes if node.id in b.dag and _same_type(node, b[node.id])}
+    nodes = {node.id: node.id for node in a.nodes if node.id in b and _same_type(node, b[node.id])}
     _match_renamed(a, b, nodes)
     taken = set(nodes.values())
-    nodes |= {n.id: n.id for n in a.nodes if n.id not in nodes and n.id in b.dag and n.id not in taken}
+    nodes |= {n.id: n.id for n in a.nodes if n.id not in nodes and n.id in b and n.id not in taken}
     _match_renamed(a, b, nodes)  # what reads a retyped node can be recognised now
     return {node.id: nodes[node.id] for node in a.nodes if node.id in nodes}
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.numbering import Numbering
 from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import record_all, topological
+from rendergraph.expand.recording import record_all
 from rendergraph.link import Endpoint, Graph
 
 __all__ = [
@@ -30,6 +30,6 @@ def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expans
         InputError: a node recorded something that its declaration does not allow.
     """
     outputs = dict(graph.outputs if wanted is None else wanted)
-    order = topological(graph)
+    order = graph.reading_order()
     recorders, idle = record_all(graph, order, outputs)
     return Numbering(graph, recorders, idle, outputs).expansion()

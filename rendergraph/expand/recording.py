@@ -119,7 +119,7 @@ def record_all(
 
     Args:
         graph: a checked graph.
-        order: node ids in topological order.
+        order: node ids in reading order.
         wanted: what must exist at the end of the frame.
 
     Returns:
@@ -227,14 +227,3 @@ def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", d
     if not author_line(error, type(node.node)) and node.type.file.name:
         happened = f"{shown_file(node.type.file)}: {happened}"
     return Problem(error.code, f"{who}: {happened}", node.place)
-
-
-def topological(graph: Graph) -> list[str]:
-    """Node ids so that each stands behind what it reads in this frame; the file's order where that leaves a choice."""
-    import networkx as nx
-
-    dag: nx.DiGraph[str] = nx.DiGraph()
-    dag.add_nodes_from(graph.dag.nodes)
-    dag.add_edges_from((a, b) for a, b, data in graph.dag.edges(data=True) if not data["previous"])
-    place = {name: number for number, name in enumerate(dag)}
-    return list(nx.lexicographical_topological_sort(dag, key=place.__getitem__))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import InOut, Input, LightFacts, TextureInfo
@@ -20,9 +19,6 @@ from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Signature
-
-if TYPE_CHECKING:
-    import networkx as nx
 
 
 def link(
@@ -129,7 +125,7 @@ class _Linker:
             raise InputError(_in_order(problems))
         return Graph(
             name=self.spec.name,
-            dag=_dag(nodes),
+            members={name: _member(bound) for name, bound in nodes.items()},
             outputs={name: found.source for name, found in outputs.items()},
             size=self.spec.size,
             lights=self.lights,
@@ -367,22 +363,9 @@ def _upstream_first(nodes: Mapping[str, Bound]) -> list[str]:
     return list(done)
 
 
-def _dag(nodes: Mapping[str, Bound]) -> nx.MultiDiGraph[str]:
-    import networkx as nx
-
-    dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
-    for name, bound in nodes.items():
-        links = {key: tuple(found.source for found in ends) for key, ends in bound.links.items() if ends}
-        dag.add_node(name, node=GraphNode(name, bound.type, bound.node, links, bound.spec.place, bound.choices))
-    for name, bound in nodes.items():
-        for key, ends in bound.links.items():
-            for found in ends:
-                dag.add_edge(
-                    found.source.node, name, source_port=found.source.port, target_port=key,
-                    previous=found.source.previous,
-                )  # fmt: skip
-    nx.freeze(dag)
-    return dag
+def _member(bound: Bound) -> GraphNode:
+    links = {key: tuple(found.source for found in ends) for key, ends in bound.links.items() if ends}
+    return GraphNode(bound.spec.id, bound.type, bound.node, links, bound.spec.place, bound.choices)
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:

@@ -1,9 +1,11 @@
-"""What linking makes: a networkx DAG of typed nodes and edges."""
+"""What linking makes: a DAG of typed nodes and edges."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from heapq import heappop, heappush
 from typing import TYPE_CHECKING
 
 from rendergraph.catalog import NodeType
@@ -53,9 +55,7 @@ class Graph:
 
     Attributes:
         name: the file's stem.
-        dag: networkx.MultiDiGraph, frozen: node ids with attribute `node` (a GraphNode), in the file's order; one edge
-            a link with `source_port`, `target_port`, `previous`. Links to `@previous` are edges with `previous=True`
-            and left out of cycle checks.
+        members: the nodes by id, in the file's order.
         outputs: output name to the port it shows.
         size: width and height of the picture.
         lights: the scene's lights.
@@ -67,7 +67,7 @@ class Graph:
     """
 
     name: str
-    dag: nx.MultiDiGraph[str]
+    members: Mapping[str, GraphNode]
     outputs: Mapping[str, Endpoint]
     size: tuple[int, int]
     lights: tuple[LightFacts, ...] = ()
@@ -77,10 +77,57 @@ class Graph:
     unfilled: frozenset[str] = frozenset()
 
     def __getitem__(self, node: str) -> GraphNode:
-        found: GraphNode = self.dag.nodes[node]["node"]
-        return found
+        return self.members[node]
+
+    def __contains__(self, node: object) -> bool:
+        return node in self.members
 
     @property
     def nodes(self) -> list[GraphNode]:
         """All nodes in the file's order."""
-        return [data["node"] for _, data in self.dag.nodes(data=True)]
+        return list(self.members.values())
+
+    @cached_property
+    def dag(self) -> nx.MultiDiGraph[str]:
+        """The same as a networkx graph, frozen: node ids with attribute `node` (a GraphNode), in the file's order.
+
+        Each link is an edge with `source_port`, `target_port` and `previous`, which says that it reads last frame's
+        value. Made when asked for: importing networkx takes longer than checking a pipeline.
+        """
+        import networkx as nx
+
+        dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
+        for name, node in self.members.items():
+            dag.add_node(name, node=node)
+        for name, node in self.members.items():
+            for port, ends in node.inputs.items():
+                for end in ends:
+                    dag.add_edge(end.node, name, source_port=end.port, target_port=port, previous=end.previous)
+        nx.freeze(dag)
+        return dag
+
+    def reading_order(self) -> list[str]:
+        """Node ids so that each stands behind what it reads in this frame, else in the file's order.
+
+        Nodes of a cycle, which only a sketch can have, come last.
+        """
+        place = {name: number for number, name in enumerate(self.members)}
+        sources = {
+            name: {end.node for ends in node.inputs.values() for end in ends if not end.previous}
+            for name, node in self.members.items()
+        }
+        readers: dict[str, list[str]] = {name: [] for name in self.members}
+        for name, found in sources.items():
+            for source in found:
+                readers[source].append(name)
+        waiting = {name: len(found) for name, found in sources.items()}
+        ready = [(place[name], name) for name, count in waiting.items() if not count]
+        order: dict[str, None] = {}
+        while ready:
+            _, name = heappop(ready)
+            order[name] = None
+            for reader in readers[name]:
+                waiting[reader] -= 1
+                if not waiting[reader]:
+                    heappush(ready, (place[reader], reader))
+        return [*order, *(name for name in self.members if name not in order)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 
 from rendergraph.declare import InOut
 from rendergraph.errors import Problem
@@ -13,8 +14,6 @@ from rendergraph.link.names import Bound, Link, line_of
 
 def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
     """One problem for each knot of nodes that need each other in the same frame."""
-    import networkx as nx
-
     links = {
         (link.source.node, bound.spec.id): (name, link)
         for bound in nodes.values()
@@ -22,11 +21,14 @@ def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
         for link in ends
         if not link.source.previous
     }
+    try:
+        TopologicalSorter(sources(nodes)).prepare()
+        return []
+    except CycleError:
+        import networkx as nx
     graph: nx.DiGraph[str] = nx.DiGraph()
     graph.add_nodes_from(nodes)
     graph.add_edges_from(links)
-    if nx.is_directed_acyclic_graph(graph):
-        return []
     rank = {name: number for number, name in enumerate(nodes)}
     found = []
     for knot in nx.strongly_connected_components(graph):
@@ -44,6 +46,14 @@ def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
         )
         found.append(value.problem("RG117", text))
     return found
+
+
+def sources(nodes: Mapping[str, Bound]) -> dict[str, set[str]]:
+    """The nodes that each one reads in the same frame."""
+    return {
+        name: {link.source.node for links in bound.links.values() for link in links if not link.source.previous}
+        for name, bound in nodes.items()
+    }
 
 
 def needs(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Problem]:
@@ -119,18 +129,16 @@ class _Ancestors(dict[str, set[str]]):
     """Every node that a node needs in the same frame, found out when asked."""
 
     def __init__(self, nodes: Mapping[str, Bound]) -> None:
-        import networkx as nx
-
         super().__init__()
-        self._graph: nx.DiGraph[str] = nx.DiGraph()
-        self._graph.add_nodes_from(nodes)
-        for bound in nodes.values():
-            for links in bound.links.values():
-                now = (link.source.node for link in links if not link.source.previous)
-                self._graph.add_edges_from((source, bound.spec.id) for source in now)
+        self._sources = sources(nodes)
 
     def __missing__(self, name: str) -> set[str]:
-        import networkx as nx
-
-        self[name] = set(nx.ancestors(self._graph, name))
-        return self[name]
+        found: set[str] = set()
+        stack = [*self._sources[name]]
+        while stack:
+            node = stack.pop()
+            if node not in found:
+                found.add(node)
+                stack += self._sources[node]
+        self[name] = found
+        return found

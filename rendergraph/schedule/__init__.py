@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
-from rendergraph.schedule.dependencies import StepKey, Versions, contributing, dependencies, touched_ids
+from rendergraph.schedule.dependencies import StepKey, Versions, Waits, contributing, dependencies, touched_ids
 from rendergraph.schedule.improve import improve
 from rendergraph.schedule.model import Model, alive_all_frame
 from rendergraph.schedule.reasons import culled_reasons, order_reasons, step_names
@@ -48,8 +49,8 @@ class Schedule:
         reasons: step key to why it stands where it stands.
         whole_frame: ids of the resources that keep their memory for the whole frame: outputs, history, and buffers that
             the CPU fills before the first step.
-        dependencies: networkx.DiGraph of step keys, an edge from what must run earlier, with `resource` and `why`
-            (`reads`, `continues`, `overwrites`); None where the schedule was made by hand.
+        waits: step key to the steps it waits for, with the resource that is the reason and `reads`, `continues` or
+            `overwrites`; empty where the schedule was made by hand.
     """
 
     steps: tuple[Step, ...]
@@ -62,7 +63,18 @@ class Schedule:
     proven: bool
     reasons: Mapping[tuple[str, int], str] = field(default_factory=dict)
     whole_frame: frozenset[str] = frozenset()
-    dependencies: nx.DiGraph[StepKey] | None = field(default=None, compare=False, repr=False)
+    waits: Waits = field(default_factory=dict, compare=False, repr=False)
+
+    @cached_property
+    def dependencies(self) -> nx.DiGraph[StepKey]:
+        """The same as a networkx graph: an edge from what must run earlier, with `resource` and `why`."""
+        import networkx as nx
+
+        dag: nx.DiGraph[StepKey] = nx.DiGraph()
+        dag.add_nodes_from(self.waits)
+        for step, found in self.waits.items():
+            dag.add_edges_from((earlier, step, {"resource": r, "why": why}) for earlier, (r, why) in found.items())
+        return dag
 
 
 def schedule(
@@ -90,9 +102,9 @@ def schedule(
     shown = set(expansion.wanted.values())
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}
     kept_versions = Versions.of(kept)
-    dag = dependencies(kept, kept_versions)
+    waits = dependencies(kept, kept_versions)
     whole_frame = alive_all_frame(resources, expansion.wanted, kept_versions)
-    model = Model.of(dag, kept, resources, whole_frame, _sinks(expansion, kept, versions))
+    model = Model.of(waits, kept, resources, whole_frame, _sinks(expansion, kept, versions))
 
     best, least_peak, proven = _optimise(model, budget_s)
     chosen = None
@@ -113,7 +125,7 @@ def schedule(
         proven=proven,
         reasons=order_reasons(model, best, chosen),
         whole_frame=frozenset(whole_frame),
-        dependencies=dag,
+        waits=waits,
     )
 
 

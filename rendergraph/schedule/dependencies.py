@@ -1,4 +1,4 @@
-"""Which steps run, and which must run before which: versions turned into a networkx graph."""
+"""Which steps run, and which must run before which: versions turned into a graph."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.steps import Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
-if TYPE_CHECKING:
-    import networkx as nx
-
-
 StepKey: TypeAlias = tuple[str, int]
 """A step's `key`: node id and number."""
+
+Waits: TypeAlias = Mapping[StepKey, Mapping[StepKey, tuple[str, str]]]
+"""Step to the steps it waits for: the resource that is the reason, and `reads`, `continues` or `overwrites`."""
 
 
 def touched_ids(step: Step) -> dict[str, None]:
@@ -146,23 +146,19 @@ def contributing(
     return [step for step in steps if step.key in kept]
 
 
-def dependencies(kept: Sequence[Step], versions: Versions) -> nx.DiGraph[StepKey]:
-    """The order among kept steps: a networkx.DiGraph of step keys, an edge from what runs earlier.
+def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
+    """The order among kept steps: what each waits for.
 
     A reader follows the writer of its version; a writer follows the writer before it and everybody who reads what it
-    is about to overwrite. Edges carry `resource` and `why` (`reads`, `continues`, `overwrites`); a step's incoming
-    edges are in the order of its reads, then its writes, so that the graph does not depend on the order of nodes.
+    is about to overwrite. What a step waits for is in the order of its reads, then its writes, so that nothing depends
+    on the order of nodes.
 
     Raises:
         InputError: steps wait for each other (RG602); the message names both nodes.
     """
-    import networkx as nx
-
-    keys = {step.key for step in kept}
-    dag: nx.DiGraph[StepKey] = nx.DiGraph()
-    dag.add_nodes_from(step.key for step in kept)
+    waits: dict[StepKey, dict[StepKey, tuple[str, str]]] = {step.key: {} for step in kept}
     writers = {
-        id: [(version, step.key) for version, step in found.items() if step.key in keys]
+        id: [(version, step.key) for version, step in found.items() if step.key in waits]
         for id, found in versions.writers.items()
     }
     # Readers by the kept version they see: the writers between may have been culled.
@@ -170,13 +166,13 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> nx.DiGraph[StepKey
     for id, found in versions.readers.items():
         known = [0, *(version for version, _ in writers.get(id, ()))]
         for version, step in found:
-            if step.key in keys:
+            if step.key in waits:
                 readers[id, known[bisect_right(known, version) - 1]].append(step.key)
     before = {id: {v: earlier for earlier, (v, _) in pairwise(found)} for id, found in writers.items()}
 
     def add(source: StepKey, target: StepKey, resource: str, why: str) -> None:
-        if source != target and not dag.has_edge(source, target):
-            dag.add_edge(source, target, resource=resource, why=why)
+        if source != target:
+            waits[target].setdefault(source, (resource, why))
 
     for step in kept:
         for read in step.all_reads:
@@ -189,9 +185,11 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> nx.DiGraph[StepKey
                 add(earlier, step.key, write.resource, "continues")
             for reader in sorted(readers.get((write.resource, version), ())):
                 add(reader, step.key, write.resource, "overwrites")
-    if not nx.is_directed_acyclic_graph(dag):
-        raise InputError(_cycle(dag))
-    return dag
+    try:
+        TopologicalSorter(waits).prepare()
+    except CycleError as error:
+        raise InputError(_cycle(waits, list(pairwise(error.args[1])))) from None
+    return waits
 
 
 def _two_writers(resource: str, one: Step, other: Step) -> Problem:
@@ -222,16 +220,13 @@ def _loads_nothing(step: Step, resource: str) -> Problem:
     return step.problem("RG603", text)
 
 
-def _cycle(dag: nx.DiGraph[StepKey]) -> Problem:
-    import networkx as nx
-
-    edges = list(nx.find_cycle(dag))
+def _cycle(waits: Waits, edges: Sequence[tuple[StepKey, StepKey]]) -> Problem:
     # An edge that only keeps a reader ahead of an overwriter is what the user can change: start the cycle there.
-    start = next((i for i, (a, b, *_) in enumerate(edges) if dag.edges[a, b]["why"] == "overwrites"), 0)
-    (reader, _), (writer, _) = edges[start][0], edges[start][1]
-    resource = dag.edges[edges[start][0], edges[start][1]]["resource"]
+    start = next((i for i, (a, b) in enumerate(edges) if waits[b][a][1] == "overwrites"), 0)
+    (reader, _), (writer, _) = edges[start]
+    resource, _ = waits[edges[start][1]][edges[start][0]]
     back = edges[(start + 1) % len(edges)]
-    needed = dag.edges[back[0], back[1]]["resource"]
+    needed, _ = waits[back[1]][back[0]]
     return Problem(
         "RG602",
         f"'{reader}' must run before '{writer}', which overwrites '{resource}', but also after it, "

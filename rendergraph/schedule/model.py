@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from rendergraph.schedule.dependencies import StepKey, Versions, is_filled_by_update, touched_ids
+from rendergraph.schedule.dependencies import StepKey, Versions, Waits, is_filled_by_update, touched_ids
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
-
-if TYPE_CHECKING:
-    import networkx as nx
 
 # Counting where a texture must live costs a visit a step and texture; long graphs count only where it is touched.
 MUST_LIVE_VISITS = 20_000
@@ -69,24 +65,27 @@ class Model:
 
     @classmethod
     def of(
-        cls, dag: nx.DiGraph[StepKey], kept: Sequence[Step], resources: Mapping[str, Resource], whole_frame: set[str],
+        cls, waits: Waits, kept: Sequence[Step], resources: Mapping[str, Resource], whole_frame: set[str],
         sinks: Sequence[Step],
     ) -> Model:  # fmt: skip
         """Number the steps of a dependency graph.
 
         Args:
-            dag: step keys with edges from earlier to later.
+            waits: step to the steps it waits for.
             kept: the steps.
             resources: what the steps touch.
             whole_frame: ids of the resources that are alive during the whole frame.
             sinks: the steps the frame is rendered for, in a fixed order.
         """
         by_key = {step.key: step for step in kept}
-        order = _reading_order(dag, [step.key for step in sinks])
+        order = _reading_order(waits, [step.key for step in sinks])
         number = {key: place for place, key in enumerate(order)}
         steps = tuple(by_key[key] for key in order)
-        before = tuple(tuple(sorted(number[key] for key in dag.predecessors(key_))) for key_ in order)
-        after = tuple(tuple(sorted(number[key] for key in dag.successors(key_))) for key_ in order)
+        before = tuple(tuple(sorted(number[key] for key in waits[step])) for step in order)
+        after: list[list[int]] = [[] for _ in order]
+        for place, earlier in enumerate(before):
+            for step_before in earlier:
+                after[step_before].append(place)
         names: dict[str, int] = {}
         touched: list[tuple[int, ...]] = []
         born = [0] * len(steps)
@@ -106,8 +105,9 @@ class Model:
         kinds: dict[object, int] = {}
         classes = tuple(kinds.setdefault(storage_class(resources[id]), len(kinds)) for id in names)
         return cls(
-            steps, before, after, tuple(touched), tuple(born), tuple(resources[id].bytes for id in names), classes,
-            tuple(toucher_count), tuple(names), sum(resources[id].bytes for id in whole_frame),
+            steps, before, tuple(map(tuple, after)), tuple(touched), tuple(born),
+            tuple(resources[id].bytes for id in names), classes, tuple(toucher_count), tuple(names),
+            sum(resources[id].bytes for id in whole_frame),
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -220,19 +220,19 @@ def alive_all_frame(resources: Mapping[str, Resource], wanted: Mapping[str, str]
     }
 
 
-def _reading_order(dag: nx.DiGraph[StepKey], sinks: Sequence[StepKey]) -> list[StepKey]:
-    """Depth-first post-order from the sinks along incoming edges in the order they were added."""
+def _reading_order(waits: Waits, sinks: Sequence[StepKey]) -> list[StepKey]:
+    """Depth-first post-order from the sinks along what each step waits for, in the order of its ports."""
     order: list[StepKey] = []
     seen: set[StepKey] = set()
     for sink in sinks:
-        stack = [(sink, iter(list(dag.predecessors(sink))))] if sink not in seen else []
+        stack = [(sink, iter(waits[sink]))] if sink not in seen else []
         seen.add(sink)
         while stack:
             key, waiting = stack[-1]
             for earlier in waiting:
                 if earlier not in seen:
                     seen.add(earlier)
-                    stack.append((earlier, iter(list(dag.predecessors(earlier)))))
+                    stack.append((earlier, iter(waits[earlier])))
                     break
             else:
                 order.append(key)

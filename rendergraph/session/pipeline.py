@@ -231,8 +231,8 @@ class Pipeline:
                 problems.append(Problem("RG205", f"pipeline '{graph.name}' has no output '{name}'{hint}"))
         for tap in taps:
             node, _, port = tap.rpartition(".")
-            if node not in graph.dag:
-                hint = suggestion(node or tap, list(graph.dag))
+            if node not in graph:
+                hint = suggestion(node or tap, list(graph.members))
                 problems.append(Problem("RG206", f"--tap {tap}: there is no node '{node or tap}'{hint}"))
             elif Endpoint(node, port) not in graph.textures or graph.textures[Endpoint(node, port)].desc is None:
                 ports = [end.port for end, info in graph.textures.items() if end.node == node and info.desc is not None]

@@ -128,17 +128,6 @@ def generations(graph: Graph) -> list[list[str]]:
     return [sorted(layer, key=place.__getitem__) for layer in nx.topological_generations(dag)]
 
 
-def reading_order(graph: Graph) -> list[str]:
-    """Node ids so that each comes after what it reads, else in the file's order."""
-    import networkx as nx
-
-    dag: nx.DiGraph[str] = nx.DiGraph()
-    dag.add_nodes_from(node.id for node in graph.nodes)
-    dag.add_edges_from((link.source, link.target) for link in links(graph) if not link.previous)
-    place = {node.id: number for number, node in enumerate(graph.nodes)}
-    return list(nx.lexicographical_topological_sort(dag, key=place.__getitem__))
-
-
 def link_counts(found: list[Link]) -> dict[tuple[str, str, bool], list[Link]]:
     """Links between the same two nodes together: source, target and whether they carry last frame's value."""
 

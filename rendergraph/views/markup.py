@@ -6,7 +6,7 @@ from html import escape
 from typing import Any
 
 from rendergraph.link import Graph
-from rendergraph.views.cards import Card, cards, info_of, link_counts, links, reading_order
+from rendergraph.views.cards import Card, cards, info_of, link_counts, links
 
 
 def text(graph: Graph) -> str:
@@ -14,7 +14,7 @@ def text(graph: Graph) -> str:
     width, height = graph.size
     table = {card.id: card for card in cards(graph)}
     rows: list[tuple[str, str, str]] = [(graph.name, f"{width}×{height}", "")]
-    for id in reading_order(graph):
+    for id in graph.reading_order():
         card = table[id]
         rows += [("", "", ""), (f"  {id}", card.type, "")]
         for name, ends in graph[id].inputs.items():
