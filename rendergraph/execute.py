@@ -136,6 +136,7 @@ class Runner:
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
         active |= {f.node for step in self.executable.plan.schedule.steps for f in step.functions}
+        active |= {str(step.view).rpartition(".")[0] for step in self.executable.plan.schedule.steps}  # makers of views
         self._active = active
         self._updating = [
             node for node in self.graph.nodes if node.id in active and type(node.node).update is not Node.update

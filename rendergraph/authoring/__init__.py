@@ -3,5 +3,7 @@
 from __future__ import annotations
 
 from rendergraph.authoring.new import KINDS, NewNode, new_node
+from rendergraph.authoring.report import Report
+from rendergraph.authoring.supervise import Limits, check_node
 
-__all__ = ["KINDS", "NewNode", "new_node"]
+__all__ = ["KINDS", "Limits", "NewNode", "Report", "check_node", "new_node"]

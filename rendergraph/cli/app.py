@@ -19,7 +19,7 @@ from rendergraph.errors import Problem, RendergraphError, suggestion
 
 VERBS = (
     "run", "check", "plan", "graph", "config", "diff", "compare", "sweep", "bench", "nodes", "explain", "schema",
-    "new-node", "doctor",
+    "new-node", "check-node", "doctor",
 )  # fmt: skip
 """In the order of `--help`; verb `x-y` is the function `command` in `rendergraph.cli.x_y`."""
 

@@ -21,7 +21,7 @@ from rendergraph.gl.device import Device
 if TYPE_CHECKING:
     from rendergraph.steps import UniformValue
 
-_UNIFORM, _UNIFORM_BLOCK, _STORAGE_BLOCK = 0x92E1, 0x92E2, 0x92E6
+_UNIFORM, _UNIFORM_BLOCK, _OUTPUT, _STORAGE_BLOCK = 0x92E1, 0x92E2, 0x92E4, 0x92E6
 _NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92FB, 0x92FD, 0x930E
 _ACTIVE = 0x92F5
 
@@ -143,6 +143,12 @@ def driver_message(error: Exception) -> tuple[str | None, str]:
     if match:
         return match[1], match[2].strip()
     return None, re.sub(r"^.*?\n=+\n", "", text, count=1, flags=re.DOTALL).strip()
+
+
+def outputs_of(program: Program) -> set[str]:
+    """The names of a program's active outputs: what its last stage writes somewhere."""
+    raw, glo = program.device.raw, program.glo
+    return {_name(raw, glo, _OUTPUT, index).removesuffix("[0]") for index in range(_count(raw, glo, _OUTPUT))}
 
 
 def _inspect(program: Program) -> None:

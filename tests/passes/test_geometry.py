@@ -19,6 +19,7 @@ from rendergraph.api import (
     Radiance,
     State,
     Steps,
+    View,
     Views,
     structural,
 )  # fmt: skip
@@ -126,6 +127,32 @@ class Behind(Node):
             "ids.frag", out=self.color, objects="all", materials="none", depth=self.depth.tested(), view=self.depth,
             state=State(depth_write=False, depth_func="less"),
         )  # fmt: skip
+
+
+class Back(Node):
+    """A view and no step of its own."""
+
+    views = Views(doc="The camera, turned round.")
+
+    def update(self, frame: FrameOfNode) -> None:
+        turn = np.diag([-1.0, 1.0, -1.0, 1.0]) @ frame.camera.view
+        frame.set_views(self.views, [replace(frame.camera, view=turn)])
+
+
+class Through(Node):
+    """The scene's depth through a view."""
+
+    view = Input(View, kind="view", doc="Which.")
+    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(None, vertex="<depth.vert>", out=self.depth, materials="none")
+
+
+def test_a_node_that_makes_nothing_but_views_is_updated(draw: Draw) -> None:
+    scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
+    text = "nodes: {b: {type: back}, t: {type: through, inputs: {view: b.views}}}\noutputs: {depth: t.depth}"
+    assert draw(text, Back, Through, scene=scene)["depth"].min() < 1.0
 
 
 class Turned(Node):

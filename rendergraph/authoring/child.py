@@ -1,0 +1,83 @@
+"""The process a node is checked in: limits are set, everything is examined, the report goes back through a pipe.
+
+`supervise` starts it with one JSON argument. Before each stage it says so, so that the parent knows what was under way
+when nothing more is heard; where that was, the fault handler has written to a file of the parent's.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import resource
+import signal
+import sys
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from rendergraph.authoring.places import causes, line_through
+from rendergraph.errors import Problem, RendergraphError, shown_file
+
+ENDED, OUT_OF_MEMORY = "RG450", "RG453"
+
+
+def main() -> None:
+    """Examine what the argument names and report."""
+    asked = json.loads(sys.argv[1])
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # Private writable memory, and not the address space: drivers reserve much of that and use little.
+    resource.setrlimit(resource.RLIMIT_DATA, (asked["memory"], asked["memory"]))
+    trace = os.fdopen(asked["trace"], "wb", buffering=0)
+    faulthandler.enable(trace, all_threads=False)
+    faulthandler.register(signal.SIGUSR1, trace, all_threads=False)
+    leave = os._exit
+
+    def told_exit(status: int) -> None:
+        faulthandler.dump_traceback(trace, all_threads=False)
+        leave(status)
+
+    os._exit = told_exit  # type: ignore[assignment]  # so that whoever calls it can be named
+    pipe = os.fdopen(asked["pipe"], "w", buffering=1, encoding="utf-8")
+
+    def send(**event: Any) -> None:
+        pipe.write(json.dumps(event) + "\n")
+        pipe.flush()
+
+    file = Path(asked["file"])
+    try:
+        from rendergraph.authoring.examine import examine_file
+
+        plugins = [Path(plugin) for plugin in asked["plugins"]]
+        scene = Path(asked["scene"]) if asked["scene"] else None
+        report = examine_file(file, plugins, scene, lambda stage, what: send(stage=stage, what=what))
+        problems = [asdict(_shown(problem)) for problem in report.problems]
+        send(report={"node": report.node, "variants": report.variants, "problems": problems})
+    except RendergraphError as error:
+        found = [_memory(file, asked["memory"], error) or problem for problem in error.problems]
+        send(failed=[asdict(_shown(problem)) for problem in dict.fromkeys(found)], exit_code=error.exit_code)
+    except BaseException as error:  # whatever a stranger's code can raise, and our own mistakes
+        send(failed=[asdict(_memory(file, asked["memory"], error) or _other(file, error))], exit_code=3)
+    leave(0)  # no handlers and threads of a stranger's at the end
+
+
+def _shown(problem: Problem) -> Problem:
+    """The same with its file as messages print it."""
+    place = problem.place
+    return replace(problem, place=replace(place, file=shown_file(place.file))) if place is not None else problem
+
+
+def _memory(file: Path, limit: int, error: BaseException) -> Problem | None:
+    """What to say where memory ran out, however it is wrapped."""
+    if not any(isinstance(cause, MemoryError) for cause in causes(error)):
+        return None
+    text = f"it takes more than the {limit / 2**20:.0f} MiB of memory that it may; --limit memory=MiB allows more"
+    return Problem(OUT_OF_MEMORY, text, line_through(error, file))
+
+
+def _other(file: Path, error: BaseException) -> Problem:
+    if isinstance(error, SystemExit):
+        text = f"it ends the process: sys.exit({error.code!r}); a node raises an exception instead"
+    else:
+        text = f"it raises {type(error).__name__}: {' '.join(str(error).split())[:300]}"
+    return Problem(ENDED, text, line_through(error, file))

@@ -1,0 +1,87 @@
+"""What can be said of a node without drawing it: its docs, its ranges, and whether anything looks at its parameters."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator
+from pathlib import Path
+
+from rendergraph.catalog import NodeType
+from rendergraph.declare import Function, Input, Made, Node, Views
+from rendergraph.glsl import expand
+from rendergraph.resources import folder
+
+LONGEST_DOC = 120
+
+
+def docs(cls: type[Node]) -> Iterator[tuple[str, str]]:
+    """Port or parameter (empty for the class) and what is wrong with its doc: each is one line that ends in a stop."""
+    first = (cls.__doc__ or "").strip().partition("\n")[0]
+    if not first:
+        yield "", "has no docs"
+    elif not first.endswith("."):
+        yield "", "the first line of its docs is no sentence that ends in '.'"
+    found = {
+        name: port.doc
+        for name, port in cls.ports().items()
+        if isinstance(port, Input | Made | Function | Views) and (port.doc or name in {*cls.inputs(), *cls.outputs()})
+    }
+    found |= {name: info.description or "" for name, info in cls.parameters().items()}
+    for name, doc in found.items():
+        if not doc:
+            yield name, f"'{name}' has no doc"
+        elif not doc.endswith("."):
+            yield name, f"the doc of '{name}' is no sentence that ends in '.'"
+        elif len(doc) >= LONGEST_DOC:
+            yield name, f"the doc of '{name}' has {len(doc)} letters; one line takes less than {LONGEST_DOC}"
+
+
+def ranges(cls: type[Node]) -> Iterator[str]:
+    """Number parameters that reach a shader and do not say between which limits they lie."""
+    for name, info in cls.parameters().items():
+        extra = info.json_schema_extra
+        limits = extra if isinstance(extra, dict) else {}
+        if info.annotation in (int, float) and not ("minimum" in limits and "maximum" in limits):
+            yield name
+
+
+def unused(node: NodeType, seen: Collection[str], files: Iterable[Path]) -> Iterator[str]:
+    """Inputs and parameters that nothing looks at.
+
+    Args:
+        node: the type.
+        seen: uniforms, samplers and blocks that some program looks at.
+        files: the shaders that its steps use.
+    """
+    text = _python_text(node)
+    shaders = "".join(shader_text(file) for file in files)
+    cls = node.cls
+    for name in cls.parameters():
+        role = cls.role_of(name)
+        word = name.upper() if role == "define" else name
+        in_shader = name in seen if role == "param" else bool(re.search(rf"\b{word}(_\w+)?\b", shaders))
+        if not in_shader and not re.search(rf"\.{name}\b", text):
+            yield name
+    for name, port in cls.inputs().items():
+        if isinstance(port, Input) and port.kind in ("view", "scene", "function"):
+            continue
+        looks = name in seen or any(re.fullmatch(rf"{name}_\d+", other) for other in seen)
+        uses = getattr(port, "use", "sample") != "sample" or not isinstance(port, Input)
+        if not looks and not uses and not re.search(rf"\.{name}\b", text):
+            yield name
+
+
+def shader_text(file: Path) -> str:
+    """A shader with its includes, comments left out."""
+    return expand(file, folder("rendergraph.shaders") / "include", root=file.parent).text if file.is_file() else ""
+
+
+def _python_text(node: NodeType) -> str:
+    """The module and the helpers beside it."""
+    if node.is_shader:
+        return ""
+    text = node.file.read_text(encoding="utf-8", errors="replace")
+    for helper in re.findall(r"from \.+(_\w+) import", text):
+        beside = node.file.parent / f"{helper}.py"
+        text += beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
+    return text

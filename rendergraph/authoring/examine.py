@@ -1,0 +1,101 @@
+"""Everything `check-node` looks at, one after the other; runs in the child, and in this project's own tests."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Literal
+
+from rendergraph.authoring import declarations
+from rendergraph.authoring.places import port_place
+from rendergraph.authoring.report import Report
+from rendergraph.authoring.trial import SCENE, Trial
+from rendergraph.authoring.variants import variants
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.errors import InputError, Place, Problem, shown_file
+
+Tell = Callable[[str, str], None]
+"""Called with the stage, `import` or `pass`, and what is about to be done."""
+
+
+def examine_file(file: Path, plugins: Sequence[Path], scene: Path | None, tell: Tell) -> Report:
+    """Find the node of a file and examine it.
+
+    Raises:
+        InputError: there is none, or it cannot be loaded.
+    """
+    tell("import", shown_file(file))
+    return examine(find_node(file, plugins), scene or SCENE, tell)
+
+
+def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
+    """The type that a file makes: one of an installed package, of a plugin's folders, or one by itself.
+
+    Raises:
+        InputError: there is none, or it cannot be loaded.
+    """
+    file = file.resolve()
+    if not file.is_file():
+        raise InputError(Problem("RG011", f"there is no file '{file}'", Place(shown_file(file))))
+    catalog = Catalog.discover(plugins)
+    if file.stem in catalog:
+        found = catalog.get(file.stem)
+        if found.file.resolve() == file:
+            return found
+    return Catalog.discover([*plugins, _plugin_of(file)]).get(file.stem)
+
+
+def examine(node: NodeType, scene: Path = SCENE, tell: Tell = lambda stage, what: None) -> Report:
+    """Examine a type in every variant.
+
+    Raises:
+        DeviceError: there is no usable GL device.
+    """
+    problems = _declared(node)
+    with tempfile.TemporaryDirectory() as folder:
+        tell("pass", "default")
+        trial = Trial(node, Path(folder), scene)
+        for name in trial.around.unfed:
+            text = f"nothing can be made up for input '{name}'; what needs it is not tried"
+            problems.append(Problem("RG459", text, port_place(node, name), severity="warning"))
+        for variant in variants(node.cls):
+            tell("pass", variant.name or "default")
+            trial.run(variant)
+        problems += _drawn(node, trial.close())
+    if not any(problem.severity == "error" for problem in problems):  # what is not drawn looks at nothing
+        for name in declarations.unused(node, trial.seen, trial.files):
+            text = f"'{name}' is declared, but no program looks at it: none uses it, or it changes nothing"
+            problems.append(Problem("RG455", text, port_place(node, name), severity=_mild(node)))
+    return Report(node.name, tuple(trial.tried), tuple(dict.fromkeys(problems)))
+
+
+def _declared(node: NodeType) -> list[Problem]:
+    """What is wrong with docs and ranges; of a shader file, what it lacks is a warning that its type has already."""
+    found = list(node.warnings)
+    for name, text in declarations.docs(node.cls) if not node.is_shader else ():
+        place = port_place(node, name) if name else Place(shown_file(node.file))
+        found.append(Problem("RG490", f"node type '{node.name}': {text}", place))
+    for name in declarations.ranges(node.cls) if not node.is_shader else ():
+        text = f"parameter '{name}' does not say between which values it lies (min, max)"
+        found.append(Problem("RG460", text, port_place(node, name), severity="warning"))
+    return found
+
+
+def _drawn(node: NodeType, found: list[Problem]) -> list[Problem]:
+    """What drawing has shown, without what a warning about discarded fragments says already."""
+    if not any(problem.code == "RG446" for problem in node.warnings):
+        return found
+    return [problem for problem in found if problem.code != "RG454"]
+
+
+def _mild(node: NodeType) -> Literal["error", "warning"]:
+    return "warning" if node.is_shader else "error"
+
+
+def _plugin_of(file: Path) -> Path:
+    """What `--plugin` would name: the folder above `nodes/` and `shaders/` where a file lies in them, else the file."""
+    for folder in file.parents:
+        if folder.name == "nodes" and (folder.parent / "shaders").is_dir():
+            return folder.parent
+    return file

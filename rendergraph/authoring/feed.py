@@ -1,0 +1,244 @@
+"""What stands around a node that is checked: sources for its inputs, and readers for what no file can show.
+
+Each source is a node of its own whose class and shader are made from the port it feeds. Its texture holds a smooth
+pattern of values that the port's semantic allows, and carries the camera's view and the scene's first light, so that
+whatever a reader may be given is there.
+"""
+
+from __future__ import annotations
+
+import json
+import types
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import (
+    Depth,
+    Frame,
+    Function,
+    InOut,
+    Input,
+    Node,
+    Output,
+    Port,
+    Radiance,
+    Semantic,
+    Signature,
+    State,
+    Steps,
+    View,
+    Views,
+)
+from rendergraph.authoring.variants import Variant
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.textures import FORMATS, TEXTURE_KINDS
+
+SIZE = (37, 23)
+"""Of the picture: small, and no multiple of what work groups have."""
+
+_VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 1
+    "radiance": "vec4(4.0 * wave * at, 2.0 * wave, 1.0)",
+    "emissive": "vec4(wave * at, 0.0, 1.0)",
+    "normal": "vec4(normalize(vec3(2.0 * at - 1.0, 0.5 + wave)), 1.0)",
+    "linear_depth": "vec4(1.0 + 9.0 * wave)",
+}
+_ANY_VALUE = "vec4(at, wave, 1.0)"
+_DEPTHS = ("depth", "shadow_map")
+_BUFFER_BYTES = 65_536
+_ALWAYS = State(depth_test=True, depth_func="always")  # depth is written where it is tested
+
+
+@dataclass
+class Surrounded:
+    """A node type among sources and readers.
+
+    Attributes:
+        checked: what is checked.
+        folder: where shaders and pipelines of the surroundings are written.
+        sources: input to the type that feeds it.
+        readers: output to the type that reads it.
+        unfed: inputs that nothing can be made for.
+    """
+
+    checked: NodeType
+    folder: Path
+    sources: dict[str, NodeType] = field(default_factory=dict)
+    readers: dict[str, NodeType] = field(default_factory=dict)
+    unfed: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for name, port in self.checked.cls.inputs().items():
+            cls = _source(name, port, self.folder)
+            if cls is not None:
+                self.sources[name] = self._added("feed", name, cls)
+            elif not _needs_none(port):
+                self.unfed.append(name)
+        for name, output in self.checked.cls.outputs().items():
+            reader = _reader(name, output, self.folder)
+            if reader is not None:
+                self.readers[name] = self._added("use", name, reader)
+
+    def _added(self, word: str, name: str, cls: type[Node]) -> NodeType:
+        return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
+
+    def catalog(self, extensions: Any = None) -> Catalog:
+        """The node's type and those around it."""
+        found = {entry.name: entry for entry in (self.checked, *self.sources.values(), *self.readers.values())}
+        return Catalog({}, found) if extensions is None else Catalog({}, found, extensions)
+
+    def pipeline(self, variant: Variant, scene: Path) -> dict[str, Any]:
+        """A pipeline file of one variant, as plain values; outputs are the node's, then what feeds it."""
+        cls, node = self.checked.cls, self.checked.name
+        nodes: dict[str, Any] = {}
+        inputs: dict[str, Any] = {}
+        outputs: dict[str, str] = {}
+        for name, source in self.sources.items():
+            if name in variant.left_out:
+                continue
+            port = cls.inputs()[name]
+            nodes[source.name] = {"type": source.name}
+            link = f"{source.name}.made"
+            inputs[name] = [link] if isinstance(port, Input) and port.many else link
+            if isinstance(port, InOut) or (isinstance(port, Input) and port.kind in TEXTURE_KINDS):
+                outputs[f"from_{name}"] = link
+        nodes[node] = {"type": node, "inputs": inputs, "params": dict(variant.params)}
+        for name in variant.outputs:
+            reader = self.readers.get(name)
+            if reader is None:
+                outputs[f"to_{name}"] = f"{node}.{name}"
+            else:
+                nodes[reader.name] = {"type": reader.name, "inputs": {"read": f"{node}.{name}"}}
+                outputs[f"to_{name}"] = f"{reader.name}.made"
+        return {"rendergraph": 1, "size": list(SIZE), "scene": str(scene), "nodes": nodes, "outputs": outputs}
+
+    def write(self, variant: Variant, scene: Path) -> Path:
+        """The pipeline of a variant as a file; JSON is YAML."""
+        file = self.folder / "check.yaml"
+        file.write_text(json.dumps(self.pipeline(variant, scene)), encoding="utf-8")
+        return file
+
+
+# --- sources ---------------------------------------------------------------------------------------------------------
+
+
+def _needs_none(port: Port) -> bool:
+    return bool(getattr(port, "optional", False))
+
+
+def _source(name: str, port: Input | InOut, folder: Path) -> type[Node] | None:
+    """The class of a node that feeds a port, None where none can."""
+    semantic = port.semantic
+    if port.kind == "function":
+        return _function_source(semantic, folder) if isinstance(semantic, Signature) else None
+    if port.kind == "view":
+        return _node("Seen", made=Views(doc="The camera's view."), update=_camera("made"))
+    if port.kind == "buffer":
+        made = Output(AnyTexel, kind="buffer", bytes=_BUFFER_BYTES, doc="Zeros.")
+        return _node("Zeros", made=made, record=lambda self, steps: steps.clear(self.made))
+    if port.kind not in TEXTURE_KINDS:
+        return None
+    meaning = semantic if isinstance(semantic, Semantic) and semantic.name != "any" else Radiance
+    given = port.format if isinstance(port, InOut) and isinstance(port.format, str) else None
+    image = isinstance(port, Input) and port.use == "image"
+    depth = meaning.name in _DEPTHS or (given is not None and FORMATS[given].is_depth)
+    format = given or ("depth32f" if depth else "rgba16f" if image else "rgba32f")
+    layers = {"texture2d": 1, "texture_cube": 6}.get(port.kind, 1 if _has_lights(meaning) else 2)
+    samples = 4 if getattr(port, "samples", "single") == "multi" else 1
+    shader = f"feed_{name}.frag"
+    (folder / shader).write_text(_pattern(meaning, format), encoding="utf-8")
+
+    def record(self: Any, steps: Steps) -> None:
+        targets = [self.made] if port.kind == "texture2d" else [self.made.layer(layer) for layer in range(layers)]
+        for target in targets:
+            steps.fullscreen(shader, out={"made": target}, state=_ALWAYS)
+
+    made = Output(
+        meaning, kind=port.kind, format=format, layers=None if port.kind != "texture2d_array" else layers,
+        samples=samples, view="views", lights=_first_light if _has_lights(meaning) else None, doc="A pattern.",
+    )  # fmt: skip
+    views = Views(count=layers, public=False, doc="The camera's view for each layer.")
+    return _node("Pattern", made=made, views=views, record=record, update=_camera("views", layers))
+
+
+def _has_lights(semantic: Semantic) -> bool:
+    return semantic.name in ("shadow_map", "visibility")
+
+
+def _first_light(node: Any, facts: Any) -> tuple[int, ...]:
+    return (0,)
+
+
+def _pattern(semantic: Semantic, format: str) -> str:
+    value = _VALUES.get(semantic.name, _ANY_VALUE)
+    head = "in vec2 v_uv;\n"
+    body = "vec2 at = v_uv; float wave = 0.5 + 0.5 * sin(11.0 * at.x + 7.0 * at.y);"
+    family = FORMATS[format].family
+    if FORMATS[format].is_depth:
+        return f"{head}void main() {{ {body} gl_FragDepth = wave > 0.9 ? 1.0 : 0.6 + 0.35 * wave; }}\n"
+    kind = {"uint": "uvec4", "int": "ivec4"}.get(family, "vec4")
+    scaled = f"{kind}(100.0 * {value})" if kind != "vec4" else value
+    return f"{head}out {kind} made;\nvoid main() {{ {body} made = {scaled}; }}\n"
+
+
+def _camera(port: str, count: int = 1) -> Any:
+    """An `update` that sets a table to the camera's view."""
+
+    def update(self: Any, frame: Frame) -> None:
+        frame.set_views(getattr(self, port), [frame.camera] * count)
+
+    return update
+
+
+def _function_source(signature: Signature, folder: Path) -> type[Node]:
+    shader = f"{signature.name}_neutral.glsl"
+    text = f"{signature.declaration} {{ return {signature.neutral}; }}\n"
+    (folder / shader).write_text(text, encoding="utf-8")
+    return _node("Neutral", made=Function(signature, shader=shader, doc="Neutral everywhere."))
+
+
+# --- readers ---------------------------------------------------------------------------------------------------------
+
+
+def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
+    """The class of a node that makes a texture of what is none itself; None where a file can show the port."""
+    value = Output(AnyTexel, format="rgba32f", doc="What was read.")
+    if isinstance(port, Function):
+        shader = f"use_{name}.frag"
+        (folder / shader).write_text(_call(port.signature), encoding="utf-8")
+        read = Input(port.signature, kind="function", many=True, doc="What is called.")
+        return _node("Caller", read=read, made=value, shader=shader)
+    if isinstance(port, Views):
+        seen = Input(View, kind="view", doc="What is drawn with.")
+        depth = Output(Depth, format="depth32f", clear=1.0, doc="The scene's depth.")
+        return _node("Drawer", read=seen, made=depth, record=_draw)
+    if getattr(port, "kind", "") == "buffer":
+        (folder / "use_buffer.frag").write_text(
+            "layout(std430) readonly buffer read { uint words[]; };\nout vec4 made;\n"
+            "void main() { made = vec4(words[uint(gl_FragCoord.x) % uint(words.length())]); }\n", encoding="utf-8",
+        )  # fmt: skip
+        semantic = getattr(port, "semantic", None) or AnyTexel
+        read = Input(semantic, kind="buffer", doc="What is read.")
+        return _node("Words", read=read, made=value, shader="use_buffer.frag")
+    return None
+
+
+def _draw(self: Any, steps: Steps) -> None:
+    steps.geometry(None, vertex="<depth.vert>", out=self.made, view=self.read, materials="none")
+
+
+def _call(signature: Signature) -> str:
+    """A shader that calls a function with zeros."""
+    arguments = signature.declaration.partition("(")[2].rpartition(")")[0]
+    kinds = [argument.split()[-2] for argument in arguments.split(",") if argument.strip()]
+    zeros = ", ".join(f"{kind}(0)" for kind in kinds)
+    result = signature.declaration.split()[0]
+    value = "vec4(result)" if result in ("float", "int", "uint", "bool", "vec4") else "vec4(result.xxxx)"
+    return f"out vec4 made;\nvoid main() {{ {result} result = {signature.name}({zeros}); made = {value}; }}\n"
+
+
+def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[Node]:
+    """A node class made of ports and functions."""
+    body = {"__module__": __name__, "__doc__": "Made for a check.", "shader": shader, **attributes}
+    return types.new_class(name, (Node,), exec_body=lambda space: space.update(body))

@@ -1,0 +1,260 @@
+"""Drawing a node in one variant and looking at everything it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import rendergraph as rg
+from rendergraph.authoring.feed import Surrounded
+from rendergraph.authoring.gl_watch import let_go, living, watched
+from rendergraph.authoring.places import causes, declared_at, line_through, port_place
+from rendergraph.authoring.variants import Variant
+from rendergraph.catalog import NodeType
+from rendergraph.compile.executable import Draw
+from rendergraph.compile.views import FIXED_BLOCKS
+from rendergraph.declare import Node
+from rendergraph.errors import Place, Problem, RendergraphError, shown_file
+from rendergraph.execute import Runner
+from rendergraph.gl.device import Device, open_device
+from rendergraph.gl.programs import outputs_of
+from rendergraph.gl.textures import Clear
+from rendergraph.program import prefix
+from rendergraph.resources import folder
+from rendergraph.scene.cameras import view_matrices
+from rendergraph.steps import Step
+from rendergraph.textures import FORMATS, BufferDesc
+
+SCENE = Path(__file__).parent / "scene.yaml"
+FRAMES = 2
+_POISON = {  # by family, two values that a texel may hold before a pass; what differs afterwards was never written
+    "float": (float("nan"), 0.7319), "unorm": (0.25, 0.75), "snorm": (-0.25, 0.75), "depth": (0.25, 0.75),
+    "depth_stencil": (0.25, 0.75), "uint": (7.0, 2_000_000_011.0), "int": (-7.0, 2_000_000_011.0),
+}  # fmt: skip
+_MOST_NAMES = 8192
+
+
+@dataclass
+class Trial:
+    """One node type on one GL context.
+
+    Attributes:
+        type: what is checked.
+        folder: for the files of the surroundings.
+        scene: what geometry nodes draw.
+        seen: names of uniforms that some program looked at.
+        files: shader files that some step used.
+        written: outputs that could be had in some variant.
+    """
+
+    type: NodeType
+    folder: Path
+    scene: Path = SCENE
+    seen: set[str] = field(default_factory=set)
+    files: set[Path] = field(default_factory=set)
+    written: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.problems: dict[Problem, list[str]] = {}
+        self.tried: list[str] = []
+        self.device: Device = open_device()
+        let_go(self.device)
+        self._before = living(self.device, _MOST_NAMES)
+        self.session = rg.Session(ctx=self.device.ctx)
+        cls = watched(self.type.cls, self.session.device, self._state)
+        self.around = Surrounded(replace(self.type, cls=cls), self.folder)
+        self._fed: dict[str, npt.NDArray[Any]] = {}
+        self._fills_buffers = self.type.cls.update is not Node.update  # perhaps once and for all
+
+    def run(self, variant: Variant) -> None:
+        """Link, compile and draw a variant twice, and keep what is wrong with it."""
+        self._variant = variant
+        self.tried.append(variant.name or "default")
+        try:
+            self._run(variant)
+        except RendergraphError as error:
+            if any(isinstance(cause, MemoryError) for cause in causes(error)):
+                raise  # that is the process's, and ends the check
+            rest = tuple(name for name in variant.outputs if not self._is_missing(name, error))
+            if len(rest) < len(variant.outputs):  # an output may depend on what is connected
+                self.tried.pop()
+                if rest:
+                    self.run(replace(variant, outputs=rest))
+                return
+            for problem in error.problems:
+                self.say(replace(problem, place=self._own(problem.place, error), severity="error"))
+        else:
+            self.written |= set(variant.outputs)
+
+    def _is_missing(self, output: str, error: RendergraphError) -> bool:
+        """Whether an error says that the node did not write an output in this variant."""
+        shows = f"'{self.type.name}.{output}'"
+        return any(problem.code == "RG604" and shows in problem.text for problem in error.problems)
+
+    def close(self) -> list[Problem]:
+        """Free everything; what is left then is the node's.
+
+        Returns:
+            All problems, each once, with the variants it was met in where it was not met in all.
+        """
+        self.session.close()
+        let_go(self.device)
+        left = {
+            kind: count - self._before[kind]
+            for kind, count in living(self.device, _MOST_NAMES).items()
+            if count > self._before[kind]
+        }
+        self.device.release()
+        self._variant = Variant("")
+        if left and not any(problem.severity == "error" for problem in self.problems):
+            every = ", ".join(f"{count} {kind.lower()}{'s' if count > 1 else ''}" for kind, count in left.items())
+            self.say(Problem("RG456", f"the node leaves GL objects behind: {every}", Place(self.shown)), always=True)
+        if not any(problem.severity == "error" for problem in self.problems):
+            for name in self.type.cls.outputs().keys() - self.written:
+                text = f"output '{name}' is written in no variant; write it in `record`, or take it away"
+                self.say(Problem("RG454", text, self.port_place(name)), always=True)
+        return [self._with_variants(problem, names) for problem, names in self.problems.items()]
+
+    def say(self, problem: Problem, *, always: bool = False) -> None:
+        """Keep a problem of the variant that runs."""
+        names = self.problems.setdefault(problem, [])
+        names += self.tried if always else [self._variant.name or "default"]
+
+    @property
+    def shown(self) -> str:
+        """The node's file as messages print it."""
+        return shown_file(self.type.file)
+
+    def port_place(self, name: str) -> Place:
+        """Where a port or parameter is declared."""
+        return port_place(self.type, name)
+
+    # Running ----------------------------------------------------------------------------------------------------------
+
+    def _run(self, variant: Variant) -> None:
+        file = self.around.write(variant, self.scene)
+        pipeline = replace(rg.load(file, asset_roots=[self.scene.parent]), known_catalog=self.around.catalog())
+        with self.session.device.current():
+            runner = self.session.prepare(pipeline, alias=False)
+            steps = [c for c in runner.executable.steps[0] if self._is_own(c.step)]
+            for compiled in steps:
+                for draw in compiled.all_draws:
+                    self._interface(compiled.step, draw)
+                self._note_files(compiled.step)
+            drawn = [self._draw(pipeline, runner, number) for number in (0, 1)]
+        self._compare(variant, *drawn)
+
+    def _note_files(self, step: Step) -> None:
+        names = [name for _, name in step.shaders] if step.node == self.type.name else []
+        names += [function.shader for function in step.functions if function.node == self.type.name]
+        include = folder("rendergraph.shaders") / "include"
+        self.files |= {include / name[1:-1] if name[:1] == "<" else self.type.shaders / name for name in names}
+
+    def _is_own(self, step: Step) -> bool:
+        return step.node == self.type.name or any(f.node == self.type.name for f in step.functions)
+
+    def _draw(self, pipeline: rg.Pipeline, runner: Runner, number: int) -> dict[str, npt.NDArray[Any]]:
+        """All outputs, after every texture was filled with a poison."""
+        executable = runner.executable
+        plan, memory, device = executable.plan, executable.memory, self.session.device
+        for name, resource in plan.resources.items():
+            if name not in plan.placement:
+                continue
+            if isinstance(resource.desc, BufferDesc):
+                if not self._fills_buffers:
+                    buffer = memory.buffer(name)
+                    buffer.write(bytes([(0x5A, 0xA5)[number]]) * buffer.size)
+            else:
+                value = _POISON[FORMATS[resource.desc.format].family][number]
+                for parity in range(memory.parities):
+                    Clear(device, memory.texture(name, parity), value)()
+        runner.reset()
+        scene = pipeline.scene
+        camera = view_matrices(next(iter(scene.cameras.values())), pipeline.graph.size)
+        for frame in range(1, FRAMES + 1):
+            runner.run(frame, (frame - 1) / 30, 1 / 30, scene, camera)
+        runner.check()
+        return {name: runner.read(resource) for name, resource in plan.schedule.wanted.items()}
+
+    # Looking ----------------------------------------------------------------------------------------------------------
+
+    def _interface(self, step: Step, draw: Draw) -> None:
+        """What a program looks at and writes, against what its step binds."""
+        program = draw.program
+        before = prefix(self.type.name)
+        self.seen |= {name.removeprefix(before) for name in program.uniforms}
+        if step.node != self.type.name:
+            return
+        bound = {read.name for read in step.reads} | {write.name for write in step.writes} | set(FIXED_BLOCKS)
+        views = {f"{name}_view_block" for name in bound} | {"pass_view_block"}
+        self.seen |= {name for name in bound if name in program.storage or f"{name}_view_block" in program.blocks}
+        for name in (program.blocks.keys() | program.storage.keys()) - bound - views:
+            if not any(name.startswith(prefix(function.node)) for function in step.functions):
+                text = f"block '{name}' of the shader is none of what its step reads and writes: it meets another's"
+                self.say(Problem("RG457", text, self._shader_place(step, name)))
+        colors = [write.name for write in step.writes if write.use == "color"]
+        written = outputs_of(program)
+        if step.kind != "compute" and colors and not (len(colors) == len(written) == 1):
+            for name in colors:
+                if name not in written:
+                    text = f"the shader never writes '{name}', which its step draws to"
+                    self.say(Problem("RG454", text, self._shader_place(step, name)))
+
+    def _shader_place(self, step: Step, name: str) -> Place:
+        """The line of the last stage's file that mentions a name, else the file."""
+        file = dict(step.shaders).get("fragment") or dict(step.shaders).get("compute") or ""
+        path = self.type.shaders / file
+        return declared_at(path, name) if path.is_file() else Place(self.shown)
+
+    def _compare(
+        self, variant: Variant, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]
+    ) -> None:
+        told = {problem.place for problem in self.problems if problem.code == "RG454"}
+        for name in one:
+            port = name.partition("_")[2]
+            if name.startswith("from_"):
+                known = self._fed.setdefault(name, one[name])
+                if not np.array_equal(known, one[name], equal_nan=True):
+                    text = f"the node changes its input '{port}'; an InOut port may be continued, inputs are only read"
+                    self.say(Problem("RG457", text, self.port_place(port)))
+                continue
+            differ = one[name] != other[name]
+            if one[name].dtype.kind == "f":
+                differ &= ~(np.isnan(one[name]) & np.isnan(other[name]))
+            count = int(_texels(differ, one[name]).sum())
+            total = _texels(differ, one[name]).size
+            if count and not told:
+                text = f"{count} of {total} texels of '{port}' are not written; write them all, or declare `clear=`"
+                self.say(Problem("RG454", text, self.port_place(port)))
+            elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():
+                bad = int(_texels(~np.isfinite(one[name]), one[name]).sum())
+                text = f"{bad} of {total} texels of '{port}' are not finite (NaN or infinite)"
+                self.say(Problem("RG458", text, self.port_place(port), severity="warning"))
+
+    def _state(self, sentence: str) -> None:
+        self.say(Problem("RG456", sentence, self.port_place(sentence.split("'")[1])))
+
+    def _own(self, place: Place | None, error: RendergraphError) -> Place:
+        """A place in the author's files instead of one in the surroundings'."""
+        if place is not None and not Path(place.file).resolve().is_relative_to(self.folder.resolve()):
+            return place
+        return line_through(error, self.type.file)
+
+    def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:
+        met = list(dict.fromkeys(names))
+        if len(met) >= len(self.tried) or met[:1] == ["default"]:
+            return problem
+        more = f" and {len(met) - 3} more" if len(met) > 3 else ""
+        return replace(problem, text=f"{problem.text} (with {', '.join(met[:3])}{more})")
+
+
+def _texels(flags: npt.NDArray[np.bool_], array: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+    """Flags of bytes or channels to one flag a texel."""
+    channels = array.shape[-1] if array.ndim > 1 else 1
+    found: npt.NDArray[np.bool_] = np.any(flags.reshape(array.size // channels, -1), axis=1)
+    return found

@@ -1,0 +1,85 @@
+"""The variants of a node that are tried: the default, then one thing changed at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args, get_origin
+
+from rendergraph.declare import InOut, Input, Node
+
+MOST = 200
+"""Variants of one node; what has more is tried in the first of them."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to use a node.
+
+    Attributes:
+        name: what differs from the default, for messages; empty for the default.
+        params: parameters that differ.
+        left_out: optional inputs that are not connected.
+        outputs: the outputs that somebody reads.
+    """
+
+    name: str
+    params: Mapping[str, Any] = field(default_factory=dict)
+    left_out: frozenset[str] = frozenset()
+    outputs: tuple[str, ...] = ()
+
+
+def variants(cls: type[Node]) -> list[Variant]:
+    """All variants of a type: choices, switches and limits of what becomes program text, inputs, outputs."""
+    seen: list[Variant] = []
+    for variant in _all(cls):
+        if variant.outputs and variant not in seen and len(seen) < MOST:
+            seen.append(variant)
+    return seen
+
+
+def _all(cls: type[Node]) -> Iterator[Variant]:
+    everything = _usable(cls, frozenset())
+    yield Variant("", outputs=everything)
+    for name, value in _values(cls):
+        yield Variant(f"{name}={value}".lower() if isinstance(value, bool) else f"{name}={value}", {name: value},
+                      outputs=everything)  # fmt: skip
+    optional = [name for name, port in cls.inputs().items() if isinstance(port, Input | InOut) and port.optional]
+    for name in optional:
+        yield Variant(f"without {name}", left_out=frozenset({name}), outputs=_usable(cls, frozenset({name})))
+    if len(optional) > 1:
+        yield Variant(
+            "without optional inputs", left_out=frozenset(optional), outputs=_usable(cls, frozenset(optional))
+        )
+    if len(everything) > 1:
+        for name in everything:
+            yield Variant(f"{name} alone", outputs=(name,))
+
+
+def _usable(cls: type[Node], left_out: frozenset[str]) -> tuple[str, ...]:
+    """The outputs that can be asked for without some inputs."""
+    return tuple(name for name, port in cls.outputs().items() if not left_out & set(getattr(port, "needs", ())))
+
+
+def _values(cls: type[Node]) -> Iterator[tuple[str, Any]]:
+    """Parameters that change the program or the plan, with each value to try."""
+    for name, info in cls.parameters().items():
+        role = cls.role_of(name)
+        extra = info.json_schema_extra
+        limits = extra if isinstance(extra, Mapping) else {}
+        if info.annotation is bool and role != "param":
+            yield name, not info.default
+        for choice in _choices(info.annotation):
+            if choice != info.default and role != "param":
+                yield name, choice
+        if info.annotation in (int, float) and role == "define":
+            for limit in (limits.get("minimum"), limits.get("maximum")):
+                if isinstance(limit, int | float) and limit != info.default:
+                    yield name, info.annotation(limit)
+
+
+def _choices(annotation: Any) -> list[Any]:
+    """The words of a `Literal`, also of one beside other types."""
+    if get_origin(annotation) is Literal:
+        return list(get_args(annotation))
+    return [choice for part in get_args(annotation) for choice in _choices(part)]

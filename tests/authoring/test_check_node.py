@@ -1,0 +1,268 @@
+"""`check-node`: what is right passes, and whatever a node does wrong ends in one message that names its file."""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from rendergraph.authoring import KINDS, Limits, check_node, new_node
+from rendergraph.cli.app import main
+from rendergraph.errors import InputError, RendergraphError
+
+HEAD = "from rendergraph.api import Any, Frame, Input, Internal, Node, Output, Radiance, Steps, Views, define, param\n"
+GOOD = (
+    HEAD
+    + '''
+
+class Glow(Node):
+    """Everything a little brighter."""
+
+    radiance = Input(Radiance, doc="What is there.")
+    brighter = Output(like="radiance", doc="More of it.")
+
+    gain: float = param(default=2.0, min=0, max=8, doc="Factor.")
+'''
+)
+SHADER = """uniform sampler2D radiance;
+uniform float gain;
+out vec4 brighter;
+void main() { brighter = gain * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0); }
+"""
+QUICK = Limits(import_seconds=2, pass_seconds=3, memory=500 << 20)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How a check ended."""
+
+    code: int
+    messages: list[str]
+    seconds: float
+
+
+Check = Callable[..., Answer]
+
+
+@pytest.fixture
+def check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Check:
+    """`check(python, shader)`: `glow.py` and `glow.frag` of these texts, checked under tight limits."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(python: str | None = GOOD, shader: str = SHADER, limits: Limits = QUICK) -> Answer:
+        if python is not None:
+            (tmp_path / "glow.py").write_text(python)
+        (tmp_path / "glow.frag").write_text(shader)
+        file = Path("glow.frag" if python is None else "glow.py")
+        start = time.monotonic()
+        try:
+            report = check_node(file, limits=limits)
+        except RendergraphError as error:
+            return Answer(error.exit_code, [str(p).splitlines()[0] for p in error.problems], time.monotonic() - start)
+        messages = [str(problem).splitlines()[0] for problem in report.problems]
+        return Answer(3 if report.mistakes else 0, messages, time.monotonic() - start)
+
+    return run
+
+
+def body(*lines: str) -> str:
+    """The good node with more in its class."""
+    return GOOD + "\n" + textwrap.indent("\n".join(lines), "    ") + "\n"
+
+
+def test_a_good_node_passes_without_a_word(check: Check) -> None:
+    assert check().messages == []
+    assert check().code == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_template_passes_without_a_word(kind: str, tmp_path: Path) -> None:
+    made = new_node("lens_falloff", kind, where=tmp_path)  # type: ignore[arg-type]  # a word of KINDS
+    report = check_node(tmp_path / made.commands[1].split()[-1])
+    assert report.problems == ()
+    assert report.variants[0] == "default"
+
+
+# --- hostile ---------------------------------------------------------------------------------------------------------
+
+HOSTILE = {
+    "raises": ("x = 1\nraise RuntimeError('not today')\n", r"glow.py:2:1: RG491 .* RuntimeError: not today"),
+    "leaves": ("import sys\nsys.exit(7)\n", r"glow.py:2:1: RG4\d\d .*(sys.exit\(7\)|SystemExit: 7)"),
+    "exits": ("import os\n\nos._exit(0)\n", r"glow.py:3:1: RG450 it ends the process with status 0 while it is imported"),
+    "crashes": ("import ctypes\nctypes.string_at(0)\n", r"glow.py:2:1: RG451 it crashes the process \(SIGSEGV\) while"),
+    "aborts": ("import os\nos.abort()\n", r"glow.py:2:1: RG451 it crashes the process \(SIGABRT\) while it is imported"),
+    "sleeps": ("import time\ntime.sleep(60)\n", r"glow.py:2:1: RG452 it takes longer than 2 s while it is imported"),
+    "spins": ("while True:\n    pass\n", r"glow.py:[12]:1: RG452 it takes longer than 2 s while it is imported; --limit"),
+    "ignores": ("import signal\nfor n in (1, 2, 10, 15): signal.signal(n, signal.SIG_IGN)\nwhile True:\n    pass\n",
+                r"glow.py.* RG452 it takes longer than 2 s"),
+    "prints": ("while True:\n    print('x' * 1000)\n", r"glow.py:2:1: RG452 it takes longer than 2 s"),
+    "eats": ("x = []\nwhile True:\n    x.append(bytearray(1 << 24))\n", r"glow.py:3:1: RG453 .* 500 MiB of memory"),
+    "gulps": ("x = bytearray(1 << 40)\n", r"glow.py:1:1: RG453 it takes more than the 500 MiB of memory that it may"),
+    "nothing": ("x = 1\n", r"glow.py: RG492 the module of node type 'glow' must define one Node class, it has none"),
+    "children": ("import os, time\nif os.fork() == 0:\n    time.sleep(30)\nos._exit(4)\n", r"glow.py:4:1: RG450 .* status 4"),
+    "closes": ("import os\nos.closerange(3, 100)\nos._exit(0)\n", r"glow.py.* RG450 it ends the process"),
+    "interrupts": ("raise KeyboardInterrupt\n", r"glow.py:1:1: RG4\d\d .*KeyboardInterrupt"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_import_is_one_message(check: Check, name: str) -> None:
+    python, message = HOSTILE[name]
+    answer = check(python)
+    assert answer.code == 3
+    assert len(answer.messages) == 1, answer.messages
+    assert re.match(message, answer.messages[0]), answer.messages
+    assert answer.seconds < 6  # the import's 2 s, and starting Python on a busy machine
+
+
+RUNNING = {
+    "raises in record": (body("def record(self, steps: Steps) -> None:", "    raise KeyError('gone')"),
+                         r"glow.py:13:1: RG420 .*KeyError: 'gone'"),
+    "raises in update": (body("def update(self, frame: Frame) -> None:", "    frame.nothing"),
+                         r"glow.py:13:1: RG433 .*AttributeError"),
+    "exits in record": (body("def record(self, steps: Steps) -> None:", "    import os; os._exit(1)"),
+                        r"glow.py:13:1: RG450 it ends the process with status 1 in variant 'default'"),
+    "spins in update": (body("def update(self, frame: Frame) -> None:", "    while True: pass"),
+                        r"glow.py:13:1: RG452 it takes longer than 3 s in variant 'default'; --limit pass-seconds=N"),
+    "crashes in update": (body("def update(self, frame: Frame) -> None:", "    import ctypes; ctypes.string_at(0)"),
+                          r"glow.py:13:1: RG451 it crashes the process \(SIGSEGV\) in variant 'default'"),
+    "eats in record": (body("def record(self, steps: Steps) -> None:", "    bytearray(1 << 40)"),
+                       r"glow.py:13:1: RG453 it takes more than the 500 MiB"),
+    "writes its input": (body("def record(self, steps: Steps) -> None:",
+                              "    steps.fullscreen('glow.frag', out=self.radiance, radiance=self.radiance)"),
+                         r"glow.py:13:1: RG421 "),
+    "writes what it made up": (body("def record(self, steps: Steps) -> None:",
+                                    "    steps.fullscreen('glow.frag', out=Output(Radiance, doc='Not mine.'))"),
+                               r"glow.py:13:1: RG42\d "),
+    "fills too much": (body("words = Internal(kind='buffer', bytes=16)",
+                            "def record(self, steps: Steps) -> None:",
+                            "    steps.fullscreen('glow.frag', radiance=self.radiance, words=self.words)",
+                            "def update(self, frame: Frame) -> None:",
+                            "    import numpy; frame.write(self.words, numpy.zeros(100))"),
+                       r"glow.py:16:1: RG432 .*writes 800 bytes into 'words', which holds 16"),
+    "fills another's": (body("def update(self, frame: Frame) -> None:",
+                             "    import numpy",
+                             "    frame.write(Internal(kind='buffer', bytes=16), numpy.zeros(1))"),
+                        r"glow.py:14:1: RG433 "),
+    "changes state": (body("def update(self, frame: Frame) -> None:",
+                           "    import ctypes; ctypes.CDLL('libGL.so.1').glEnable(0x0B90)"),
+                      r"glow.py:12:5: RG456 'update' changes OpenGL's state: what is enabled"),
+    "leaks": (body("def update(self, frame: Frame) -> None:",
+                   "    import ctypes; ctypes.CDLL('libGL.so.1').glCreateBuffers(3, (ctypes.c_uint * 3)())"),
+              r"glow.py: RG456 the node leaves GL objects behind: \d+ buffers"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RUNNING)
+def test_a_hostile_pass_is_one_message(check: Check, name: str) -> None:
+    python, message = RUNNING[name]
+    answer = check(python)
+    assert answer.code == 3
+    assert len(answer.messages) == 1, answer.messages
+    assert re.match(message, answer.messages[0]), answer.messages
+    assert answer.seconds < 10
+
+
+BOMB = "\n".join(["#define B0 1.0", *(f"#define B{n + 1} B{n}+B{n}" for n in range(30))])
+SHADERS = {
+    "does not compile": (SHADER.replace("gain *", "gain * *"), r"glow.frag:4:\d+: RG410 "),
+    "leaves an output unwritten": (SHADER.replace("brighter =", "vec4 lost ="),
+                                   r"glow.frag:3:1: RG454 the shader never writes 'brighter'"),
+    "writes half": (SHADER.replace("{ ", "{ if (gl_FragCoord.x < 10.0) discard; "),
+                    r"glow.py:8:5: RG454 230 of 851 texels of 'brighter' are not written; write them all, or declare"),
+    "never looks at a parameter": (SHADER.replace("= gain *", "="), r"glow.py:10:5: RG455 'gain' is declared, but no"),
+    "never looks at an input": (SHADER.replace("gain * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0)", "vec4(gain)"),
+                                r"glow.py:7:5: RG455 'radiance' is declared"),
+    "looks at what nobody sets": (SHADER.replace("gain *", "gain * other *").replace("out", "uniform float other;\nout"),
+                                  r"glow.frag:3:15: RG434 .*'other', which nothing sets"),
+    "looks at another's buffer": (SHADER.replace("out", "layout(std430) buffer loot { vec4 all_of_it[]; };\nout")
+                                  .replace("gain *", "all_of_it[3] + gain *"), r"glow.frag.*RG4\d\d .*loot"),
+    "takes the compiler's memory": (BOMB + SHADER.replace("gain *", "(B30) * gain *"), r"glow.(py|frag).* RG45[123] "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHADERS)
+def test_a_wrong_shader_is_one_message(check: Check, name: str) -> None:
+    shader, message = SHADERS[name]
+    answer = check(GOOD, shader)
+    assert answer.code == 3
+    assert len(answer.messages) == 1, answer.messages
+    assert re.match(message, answer.messages[0]), answer.messages
+
+
+def test_docs_and_ranges(check: Check) -> None:
+    answer = check(GOOD.replace('doc="Factor."', 'doc=""').replace("More of it.", "more"))
+    assert answer.code == 3
+    assert any("RG490" in message and "gain" in message for message in answer.messages)
+    answer = check(GOOD.replace("More of it.", "more"))
+    assert answer.messages == [
+        "glow.py:8:5: RG490 node type 'glow': the doc of 'brighter' is no sentence that ends in '.'"
+    ]
+    answer = check(GOOD.replace("min=0, max=8, ", ""))
+    assert (answer.code, len(answer.messages)) == (0, 1)
+    assert re.match(r"glow.py:10:5: warning: RG460 parameter 'gain' does not say between which", answer.messages[0])
+    answer = check(GOOD.replace("default=2.0", "default=20.0"))
+    assert answer.code == 3
+    assert re.match(r"glow.py:10:5: RG490 .*the default of 'gain', 20.0, is wrong", answer.messages[0])
+
+
+def test_a_mistake_in_one_choice_is_found_and_named(check: Check) -> None:
+    python = GOOD.replace("from rendergraph", "from typing import Literal\nfrom rendergraph") + (
+        '    mode: Literal["plain", "odd", "even"] = define(default="plain", doc="Kind.")\n'
+    )
+    shader = SHADER.replace("void main() {", "void main() {\n#if MODE == MODE_ODD\n    wrong;\n#endif\n")
+    answer = check(python, shader)
+    assert answer.code == 3
+    assert re.match(r"glow.frag:6:\d+: RG410 .*wrong.* \(with mode=odd\)", answer.messages[0]), answer.messages
+
+
+def test_an_input_that_is_left_out_is_tried(check: Check) -> None:
+    answer = check(GOOD.replace("Input(Radiance, doc", "Input(Radiance, optional=True, doc"))
+    assert answer.code == 3
+    assert any("without radiance" in message for message in answer.messages), answer.messages
+
+
+def test_values_that_are_not_finite_are_a_warning(check: Check) -> None:
+    answer = check(shader=SHADER.replace("gain *", "log(-gain) *"))
+    assert answer.code == 0
+    assert re.match(r"glow.py:8:5: warning: RG458 851 of 851 texels of 'brighter' are not finite", answer.messages[0])
+
+
+def test_what_a_shader_file_lacks_is_a_warning(check: Check) -> None:
+    text = SHADER.replace("out vec4", "uniform float spare;\nout vec4").replace(
+        "{ ", "{ if (gl_FragCoord.x < 10.0) discard; "
+    )
+    answer = check(None, text)
+    assert answer.code == 0
+    assert {re.search("RG4..", message)[0] for message in answer.messages} == {"RG445", "RG446", "RG455"}  # type: ignore[index]
+    assert all("warning" in message for message in answer.messages)
+    assert check(None, text.replace("brighter = gain", "brighter = gian")).code == 3
+
+
+def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    new_node("lens_falloff")
+    assert main(["check-node", "lens_falloff.py"]) == 0
+    out, err = capsys.readouterr()
+    assert (out, err) == ("", "lens_falloff: all is well in 1 variant\n")
+    assert main(["check-node", "lens_falloff.py", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "node": "lens_falloff", "file": "lens_falloff.py", "variants": ["default"], "warnings": []
+    }  # fmt: skip
+    Path("slow.py").write_text("import time\ntime.sleep(60)\n")
+    assert main(["check-node", "slow.py", "--limit", "import-seconds=1", "--json"]) == 3
+    problem = json.loads(capsys.readouterr().out)["error"]["problems"][0]
+    assert (problem["code"], problem["file"], problem["line"]) == ("RG452", "slow.py", 2)
+    assert main(["check-node", "missing.py"]) == 3
+    assert main(["check-node", "slow.py", "--limit", "patience=3"]) == 2
+
+
+def test_a_plugin_that_is_needed_can_be_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="RG011 there is no"):
+        check_node(tmp_path / "nowhere.py")
