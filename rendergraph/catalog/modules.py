@@ -6,6 +6,8 @@ import importlib
 import traceback
 from pathlib import Path
 
+from pydantic import PydanticUserError
+
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes, mistake_place
 from rendergraph.errors import InputError, Place, Problem
@@ -47,5 +49,6 @@ def _failed(name: str, file: Path, error: BaseException) -> Problem:
     for frame in traceback.extract_tb(error.__traceback__):
         if frame.filename == str(file):
             line = frame.lineno or line
-    text = f"node type '{name}' cannot be imported: {type(error).__name__}: {error}"
+    said = getattr(error, "message", error) if isinstance(error, PydanticUserError) else error  # without its link
+    text = f"node type '{name}' cannot be imported: {type(error).__name__}: {said}"
     return Problem("RG491", " ".join(text.split()), Place(str(file), line, 1 if line else 0))

@@ -13,7 +13,7 @@ from rendergraph.cli import options
 from rendergraph.cli.options import Target
 from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say
 from rendergraph.cli.words import click
-from rendergraph.errors import Problem, UsageError
+from rendergraph.errors import InputError, Problem, UsageError
 
 if TYPE_CHECKING:
     import rendergraph as rg
@@ -96,7 +96,10 @@ def _draw(
     _check(targets, numbers, selection)
     wanted = list(dict.fromkeys(target.name for target in outputs if target.name))
     tapped = list(dict.fromkeys(target.name for target in taps if target.name))
-    pipeline.wanted(wanted, tapped)
+    for name, end in pipeline.wanted(wanted, tapped).items():
+        if pipeline.graph.textures[end].desc is None:
+            text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
+            raise InputError(Problem("RG508", text))
 
     written: list[str] = []
     progress = Progress(len(numbers))

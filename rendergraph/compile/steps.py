@@ -28,7 +28,7 @@ from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
 from rendergraph.program import prefix, stage_texts
 from rendergraph.steps import Read, Step, Write
-from rendergraph.textures import FORMATS, TextureDesc
+from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
 
 _TOPOLOGY = {
     "points": moderngl.POINTS, "lines": moderngl.LINES, "line_strip": moderngl.LINE_STRIP,
@@ -252,6 +252,10 @@ class _Compiler:
             compiled.before.append(partial(self.device.raw.glGenerateTextureMipmap, texture.glo))
 
     def _copy(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        if isinstance(self.plan.resources[step.reads[0].resource].desc, BufferDesc):
+            buffers = (self.memory.buffer(step.writes[0].resource), self.memory.buffer(step.reads[0].resource))
+            compiled.before.append(partial(self.device.ctx.copy_buffer, *buffers))
+            return
         source = self.memory.texture(step.reads[0].resource, parity)
         target = self.memory.texture(step.writes[0].resource, parity)
         for mip in range(source.desc.mips):

@@ -45,6 +45,11 @@ class Node(BaseModel):
         frozen=True, strict=True, extra="forbid", ignored_types=PORT_TYPES, protected_namespaces=(),
     )  # fmt: skip
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for name in [name for name in cls.__annotations__ if isinstance(vars(cls).get(name), Port)]:
+            del cls.__annotations__[name]  # `color: Output = Output(…)` is a port too, and no parameter
+
     @field_validator("*", mode="after")
     @classmethod
     def _within_limits(cls, value: Any, info: ValidationInfo) -> Any:

@@ -151,4 +151,4 @@ def _named(name: str, port: Port, ports: dict[str, Port]) -> Iterator[str]:
 
 
 def _near(name: str, ports: dict[str, Port]) -> str:
-    return suggestion(name, ports, most=0)
+    return suggestion(name, ports, most=0) if name not in ports else ""

@@ -120,7 +120,8 @@ class Made(Port):
         samples: samples per texel.
         bytes: size of a `buffer`.
         clear: what it first holds; None discards, which is right where every texel is written.
-        first: value of every channel in the first frame, where somebody reads `@previous`.
+        first: value of every channel in the first frame, where somebody reads `@previous`; 0 by default, and for a
+            texture that is continued the value of whoever made it.
         view: name of a `Views` port, a `view` input or a texture input: the view it is drawn with. By default
             textures that a geometry step draws carry the view the step was drawn with.
         lights: name of an input whose layer-to-light table it carries, or the table itself.
@@ -137,7 +138,7 @@ class Made(Port):
     samples: Ruled[int] = 1
     bytes: Ruled[int] = 0
     clear: float | tuple[float, ...] | Callable[[Any], float | tuple[float, ...]] | None = None
-    first: float = 0.0
+    first: float | None = None
     view: str | None = None
     lights: str | Callable[[Any, Facts], tuple[int, ...]] | None = None
     doc: str = ""

@@ -13,7 +13,7 @@ from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recorder, now
 from rendergraph.expand.rules import cleared_to, filter_of, view_table
-from rendergraph.expand.targets import feedback, misfit, overlap, parts_written, target_size
+from rendergraph.expand.targets import feedback, misfit, no_image, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -25,6 +25,7 @@ class Numbering:
     Attributes:
         version: resource id to its newest version so far.
         at_end: port to its resource and the version it has when its node is done.
+        firsts: resource id to what whoever continues it says of the first frame.
         written: resource id to the parts (mip, layer or None for all) written so far.
     """
 
@@ -42,6 +43,7 @@ class Numbering:
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
         self.passed = dict(_passed(graph, recorders))
+        self.firsts: dict[str, float] = {}
 
     def expansion(self) -> Expansion:
         """Number everything that was recorded."""
@@ -82,7 +84,7 @@ class Numbering:
             role: Role = "transient"
             if isinstance(port, Internal | History):
                 role = "internal" if isinstance(port, Internal) else "history"
-            resource = Resource(str(end), desc, role, port.first, info.view, info.lights)
+            resource = Resource(str(end), desc, role, port.first or 0.0, info.view, info.lights)
             self.resources[resource.id] = resource
             self.version[resource.id] = 0
             self.written[resource.id] = set()
@@ -186,6 +188,9 @@ class Numbering:
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: str, version: int | None = None
     ) -> Read:
         resource, at_end = self.at_end.get(self._behind(end)) or (str(self._maker(end)), 0)
+        port = self.graph[end.node].node.ports()[end.port]
+        if end.previous and isinstance(port, InOut) and port.first is not None:
+            self.firsts[resource] = port.first  # said where the texture is continued, and read from there
         desc = self._desc_of(end, resource)
         if isinstance(desc, BufferDesc):
             use = "buffer"
@@ -253,14 +258,10 @@ class Numbering:
         text = misfit(self.resources, writes, reads)
         if text is not None:
             raise self._refused(recorder, request, "RG425", text)
-        for write in writes:
-            desc = self.resources[write.resource].desc
-            if write.use == "image" and isinstance(desc, TextureDesc):
-                format_of = FORMATS[desc.format]
-                if format_of.is_depth or format_of.srgb or desc.samples > 1:
-                    what = f"{desc.samples} samples a texel" if desc.samples > 1 else f"the format {desc.format}"
-                    text = f"a compute step cannot write '{write.resource}', which has {what}"
-                    raise self._refused(recorder, request, "RG426", text)
+        for touched in (*writes, *reads):
+            text = no_image(request.kind, touched, self.resources.get(touched.resource))
+            if text is not None:
+                raise self._refused(recorder, request, "RG426", text)
 
     def _refused(self, recorder: Recorder, request: Request, code: str, text: str) -> InputError:
         """A request that cannot be carried out, at the line where the author made it."""
@@ -370,11 +371,12 @@ class Numbering:
                 port, info = self.graph[end.node].node.ports()[end.port], self.graph.textures[end]
                 assert isinstance(port, Made)
                 assert info.desc is not None
-                self.resources[str(end)] = Resource(str(end), info.desc, "history", port.first, info.view, info.lights)
+                first = port.first or 0.0
+                self.resources[str(end)] = Resource(str(end), info.desc, "history", first, info.view, info.lights)
         for name in set(wanted.values()) | previous:
             resource = self.resources[name]
             role: Role = "history" if name in previous or resource.role == "history" else "output"
-            self.resources[name] = replace(resource, role=role)
+            self.resources[name] = replace(resource, role=role, first=self.firsts.get(name, resource.first))
 
 
 def _includes(plugged: Mapping[str, Choice]) -> tuple[tuple[str, Path], ...]:

@@ -75,6 +75,21 @@ def misfit(resources: Mapping[str, Resource], writes: Sequence[Write], reads: It
     return None
 
 
+def no_image(kind: str, touched: Read | Write, resource: Resource | None) -> str | None:
+    """Why a texture cannot be stored into or loaded as an image."""
+    desc = resource.desc if resource is not None else None
+    if touched.use != "image" or not isinstance(desc, TextureDesc):
+        return None
+    word = "write" if isinstance(touched, Write) else "load"
+    if kind != "compute":
+        return f"it would {word} '{touched.resource}' as an image, which only compute steps do; sample it instead"
+    fmt = FORMATS[desc.format]
+    if not (fmt.is_depth or fmt.srgb or desc.samples > 1):
+        return None
+    what = f"{desc.samples} samples a texel" if desc.samples > 1 else f"the format {desc.format}"
+    return f"a compute step cannot {word} '{touched.resource}', which has {what}"
+
+
 Facts = tuple[int, int, int, int]
 
 

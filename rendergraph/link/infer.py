@@ -105,7 +105,7 @@ class Infer:
     ) -> None:
         self.nodes = nodes
         self.viewport = viewport
-        self.used = used
+        self.used = {replace(end, previous=False) for end in used}
         self.lights = tuple(lights)
         self.problems: list[Problem] = []
         self.infos: dict[Endpoint, TextureInfo | None] = {}

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Added, Choice, Extensions, Node, closed, open_name, own_choices
+from rendergraph.declare.blame import what_happened
 from rendergraph.document import Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.read import MOST_PROBLEMS
@@ -33,14 +34,17 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
             problems.append(_unknown(spec.params[name], name, node_type))
     try:
         return cls.model_validate_json(json.dumps(values)), problems
-    except ValidationError as error:
+    except (Exception, SystemExit) as error:  # validators are the author's code
+        if not isinstance(error, ValidationError):
+            text = f"node '{spec.id}' ({node_type.name}): its own checks fail: {what_happened(error, cls)}"
+            return cls.model_construct(), [*problems, spec.value.problem("RG209", text, key=True)]
         for name, details in _by_parameter(error).items():
             values.pop(name, None)
             problems.append(_wrong(spec, node_type, name, details))
     try:
         return cls.model_validate_json(json.dumps(values)), problems
-    except ValidationError:  # a rule between parameters fails, and has been said
-        return cls(), problems
+    except (Exception, SystemExit):  # a rule between parameters fails, and has been said
+        return cls.model_construct(), problems
 
 
 def plugged(spec: NodeSpec, node: Node, extensions: Extensions) -> tuple[dict[str, Choice], list[Problem]]:

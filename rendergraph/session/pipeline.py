@@ -16,6 +16,7 @@ from rendergraph.link import Endpoint, Graph
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.catalog import Catalog
+    from rendergraph.declare import TextureInfo
     from rendergraph.expand import Expansion
     from rendergraph.resolve import PipelineSpec
     from rendergraph.scene.model import Scene
@@ -73,6 +74,11 @@ def load(
         limits=tuple((limits or {}).items()),
         plugins=tuple(Path(plugin) for plugin in plugins),
     )
+
+
+def _holds_values(info: TextureInfo | None) -> bool:
+    """Whether a port is a texture or a buffer, which can be read back; views and functions cannot."""
+    return info is not None and (info.desc is not None or info.bytes > 0)
 
 
 def _limit_names() -> dict[str, dict[str, str]]:
@@ -234,8 +240,8 @@ class Pipeline:
             if node not in graph:
                 hint = suggestion(node or tap, list(graph.members))
                 problems.append(Problem("RG206", f"--tap {tap}: there is no node '{node or tap}'{hint}"))
-            elif Endpoint(node, port) not in graph.textures or graph.textures[Endpoint(node, port)].desc is None:
-                ports = [end.port for end, info in graph.textures.items() if end.node == node and info.desc is not None]
+            elif not _holds_values(graph.textures.get(Endpoint(node, port))):
+                ports = [end.port for end, info in graph.textures.items() if end.node == node and _holds_values(info)]
                 text = f"--tap {tap}: '{node}' has no texture '{port}'{suggestion(port, ports)}"
                 problems.append(Problem("RG206", text))
             else:

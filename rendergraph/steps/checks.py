@@ -41,10 +41,10 @@ def own_port(node: Node, value: object, what: str) -> Port:
         raise Misuse(f"{what} is {shown(value)}, not a port")
     if ports.get(value.name) is not value:
         if not value.name:
-            text = f"{what} is an {type(value).__name__} made in place; declare it as an attribute of the class"
-        else:
-            text = f"{what} is port '{value.name}' of {value.owner}, which this node does not have"
-        raise Misuse(text + suggestion(value.name, ports), "RG424")
+            made = f"{what} is an {type(value).__name__} made in place; declare it as an attribute of the class"
+            raise Misuse(made, "RG424")
+        hint = suggestion(value.name, ports)
+        raise Misuse(f"{what} is port '{value.name}' of {value.owner}, which this node does not have{hint}", "RG424")
     return value
 
 
@@ -198,7 +198,8 @@ def attributes(node: Node, value: object) -> dict[str, Port]:
         formats = [word for word in words if _ATTRIBUTE.match(word) or _PADDING.match(word)]
         names = words[len(formats) :]
         wanted = sum(not _PADDING.match(word) for word in formats)
-        if not names or words[: len(formats)] != formats or not all(name.isidentifier() for name in names):
+        ordered = words[: len(formats)] == formats and all(name.isidentifier() for name in names)
+        if not names or not formats or not ordered:
             raise Misuse(f"attributes has the layout {shown(layout)}; {example}")
         if wanted != len(names):
             raise Misuse(f"attributes has the layout {shown(layout)}: {wanted} formats, {len(names)} names; {example}")
