@@ -7,14 +7,15 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
-
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph.textures import Semantic
 
-Metric: TypeAlias = Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]
-ImageLoader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+Metric: TypeAlias = "Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]"
+ImageLoader: TypeAlias = "Callable[[bytes], npt.NDArray[Any]]"
 MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
 
 
