@@ -155,6 +155,18 @@ def test_every_verb_and_shipped_file_is_listed(generated: Path) -> None:
         assert all(f"## {file.stem}\n" in text for file in folder.glob("*.yaml"))
 
 
+def test_every_shipped_pipeline_is_in_the_gallery() -> None:
+    pages = "".join(page.read_text(encoding="utf-8") for page in (DOCS / "gallery").glob("*.md"))
+    shown = set(re.findall(r"\{literalinclude\} \.\./\.\./pipelines/([\w-]+)\.yaml", pages))
+    assert shown == {file.stem for file in (ROOT / "pipelines").glob("*.yaml")}
+
+
+def test_every_page_of_the_gallery_has_a_picture() -> None:
+    pages = [page for page in (DOCS / "gallery").glob("*.md") if page.stem != "index"]
+    without = [page.stem for page in pages if "{image} ../images/" not in page.read_text(encoding="utf-8")]
+    assert not without
+
+
 def test_names_for_node_authors_are_all_documented(generated: Path) -> None:
     import rendergraph.api
 
