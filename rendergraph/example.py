@@ -156,7 +156,7 @@ def _has_effect(base: Graph, node: GraphNode, name: str) -> bool:
 
 
 def _text(found: NodeType, base: Graph, links: Links, reader: tuple[str, str, str] | None) -> str:
-    id_ = found.name if all(node.id != found.name for node in base.nodes) else "example"
+    id_ = found.word if all(node.id != found.word for node in base.nodes) else "example"
     inputs = f", inputs: {_flow(links)}" if links else ""
     lines = [f"extends: {base.name}", "nodes:", f"  {id_}: {{type: {found.name}{inputs}}}"]
     if reader is not None:

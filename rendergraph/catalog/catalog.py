@@ -59,6 +59,10 @@ class Catalog:
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         return cls(listed, extensions=extensions(folders, installed=installed))
 
+    def with_file(self, name: str, file: Path) -> Catalog:
+        """The same with one shader file under the name, which is most likely its path."""
+        return self.with_shaders([(name, find.shader(file.resolve()))])
+
     def with_shaders(self, found: Iterable[tuple[str, Listed]]) -> Catalog:
         """The same with shader files that a pipeline file names; what has been loaded is shared."""
         listed = {name: list(those) for name, those in self._listed.items()}

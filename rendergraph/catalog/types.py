@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from rendergraph.declare import Node
 from rendergraph.errors import Problem
@@ -40,6 +41,16 @@ class NodeType:
     def is_shader(self) -> bool:
         """Whether it is a shader file without Python."""
         return self.file.suffix in SHADERS
+
+    @property
+    def word(self) -> str:
+        """What a node of the type may be called in a file; the type's own name is a path where a shader's path is."""
+        return node_word(self.name)
+
+
+def node_word(name: str) -> str:
+    """A type's name as a node's id."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", PurePath(name).stem)
 
 
 @dataclass(frozen=True)

@@ -173,12 +173,14 @@ def in_a_file(found: NodeType, catalog: Catalog) -> str:
 
 def _entry(described: dict[str, Any]) -> str:
     """A node of this type in a pipeline file, with every input it must have."""
+    from rendergraph.catalog.types import node_word
+
     needed = [port for port in described["inputs"] if not port.get("optional")]
     groups = list(dict.fromkeys(port["group"] for port in needed if port.get("group")))
     links = [f"{group}: NODE" for group in groups]
     links += [f"{p['name']}: NODE.{p['name']}" for p in needed if not p.get("group")]
     parts = [f"type: {described['name']}"] + ([f"inputs: {{{', '.join(links)}}}"] if links else [])
-    return f"{described['name']}: {{{', '.join(parts)}}}"
+    return f"{node_word(described['name'])}: {{{', '.join(parts)}}}"
 
 
 # --- facts of a port in words ----------------------------------------------------------------------------------------

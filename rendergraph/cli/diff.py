@@ -23,7 +23,8 @@ def command(a: str, b: str, picture: Path | None, as_json: bool, **selection: An
     """Show what differs between two pipelines.
 
     Nodes, links and parameters after everything is resolved, and what that does to the plan: passes, bytes, peak.
-    Nodes that are equal but for their names are recognised. Needs no GPU.
+    Nodes that are equal but for their names are recognised. Needs no GPU. Where node types are missing there is no
+    plan, and the exit code is 3.
 
     \b
     Examples:
@@ -33,15 +34,18 @@ def command(a: str, b: str, picture: Path | None, as_json: bool, **selection: An
     """
     from rendergraph import diff
 
-    old, new = (options.load(pipeline=name, **selection) for name in (a, b))
-    difference = diff.diff(old.graph, new.graph)
-    plans = diff.figures(old.plan()), diff.figures(new.plan())
+    (old, was), (new, now) = (options.sketched(pipeline=name, **selection) for name in (a, b))
+    difference = diff.diff(was, now)
+    missing = [problem for pipeline in (old, new) for problem in pipeline.sketch[1]]
+    plans = None if missing else (diff.figures(old.plan()), diff.figures(new.plan()))
     if picture is not None:
-        options.write(diff.diff_svg(old.graph, new.graph, difference), picture)
+        options.write(diff.diff_svg(was, now, difference), picture)
     if as_json:
         written = {} if picture is None else {"svg": str(picture)}
-        emit_json(diff.diff_json(difference, plans) | written)
+        lacking = {"missing": [problem.as_json() for problem in missing]}
+        emit_json(diff.diff_json(difference, plans) | written | lacking)
     elif picture is not None:
         emit(str(picture))
     else:
         emit(diff.diff_text(difference, plans).rstrip("\n"))
+    options.conclude(old, new)

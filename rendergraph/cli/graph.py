@@ -23,6 +23,8 @@ _FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".sv
 def command(format_name: str | None, output: Path | None, as_json: bool, **selection: Any) -> None:
     """Draw the graph as text, DOT, Mermaid or SVG.
 
+    Nodes whose type is missing are drawn as such; the exit code is then 3.
+
     \b
     Examples:
       rendergraph graph forward
@@ -31,10 +33,13 @@ def command(format_name: str | None, output: Path | None, as_json: bool, **selec
     """
     from rendergraph import views
 
-    graph = options.load(**selection).graph
+    pipeline, graph = options.sketched(**selection)
     if as_json and not output:
-        emit_json(views.graph_json(graph))
+        missing = [problem.as_json() for problem in pipeline.sketch[1]]
+        emit_json(views.graph_json(graph) | {"missing": missing})
+        options.conclude(pipeline)
         return
     chosen = format_name or (_FORMATS.get(output.suffix.lower(), "text") if output else "text")
     text: str = getattr(views, chosen)(graph)
     options.put(text, output, as_json=as_json)
+    options.conclude(pipeline)

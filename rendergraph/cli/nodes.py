@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
 from rendergraph.cli.describe import describe, summary
 from rendergraph.cli.output import emit, emit_json, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
+
+if TYPE_CHECKING:
+    from rendergraph.catalog import NodeType
 
 
 @click.command("nodes")
@@ -19,7 +23,7 @@ def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> Non
     """List the node types, all or of one family.
 
     `rendergraph explain NODE` tells everything about one. What plugins add beside node types comes last: meanings,
-    choices of parameters, loaders, metrics.
+    choices of parameters, loaders, metrics. Types of a plugin that fails are left out and told, and the exit code is 3.
 
     \b
     Examples:
@@ -33,17 +37,26 @@ def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> Non
     if family is not None and family not in families:
         text = f"there is no family of nodes '{family}'{suggestion(family, families)}"
         raise InputError(Problem("RG511", text))
-    found = [catalog.get(name) for key, names in families.items() if family in (None, key) for name in names]
+    found: list[NodeType] = []
+    problems: list[Problem] = []
+    for name in [name for key, names in families.items() if family in (None, key) for name in names]:
+        try:
+            found.append(catalog.get(name))
+        except InputError as error:  # a plugin's mistake must not hide everybody else's nodes
+            problems += error.problems
+    warn(problems)
     added = catalog.extensions.listed() if family is None else []
     if family is None:
         warn(catalog.extensions.warnings)
     if as_json:
-        emit_json({"nodes": [describe(entry) for entry in found], "extensions": added})
-        return
-    if found:
+        wrong = [problem.as_json() for problem in problems]
+        emit_json({"nodes": [describe(entry) for entry in found], "extensions": added, "problems": wrong})
+    elif found:
         emit(
             table([(entry.family, entry.name, summary(entry)) for entry in found], ("family", "type", "what it makes"))
         )
-    if added:
+    if added and not as_json:
         rows = [(entry["kind"], entry["name"], entry["plugin"], entry["doc"]) for entry in added]
         emit("\n" + table(rows, ("added", "name", "plugin", "")))
+    if problems:
+        click.get_current_context().exit(InputError.exit_code)

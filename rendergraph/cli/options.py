@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
+from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
     import rendergraph as rg
+    from rendergraph.link import Graph
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -161,6 +163,25 @@ def load(**selection: Any) -> rg.Pipeline:
     pipeline = make(**selection)
     warn(pipeline.warnings)
     return pipeline
+
+
+def sketched(**selection: Any) -> tuple[rg.Pipeline, Graph]:
+    """The pipeline and its graph to look at, where node types may be missing; what is, and its warnings, are said.
+
+    Raises:
+        InputError: with every mistake found on the way, where something else is wrong.
+    """
+    pipeline = make(**selection)
+    graph, missing = pipeline.sketch
+    scene = () if missing else pipeline.scene.warnings  # it may be what cannot be read
+    warn((*pipeline.spec.notes, *graph.warnings, *scene, *missing))
+    return pipeline, graph
+
+
+def conclude(*pipelines: rg.Pipeline) -> None:
+    """End with the exit code of a wrong file where something was missing, now that the rest has been shown."""
+    if any(pipeline.sketch[1] for pipeline in pipelines):
+        click.get_current_context().exit(InputError.exit_code)
 
 
 def make(

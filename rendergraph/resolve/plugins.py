@@ -54,7 +54,7 @@ class Plugins:
         file = path.resolve()
         name = self.spelled(file)
         if name not in self.catalog:
-            self.catalog = self.catalog.with_shaders([(name, find.shader(file))])
+            self.catalog = self.catalog.with_file(name, file)
         return name
 
     def add(self, value: Value, folder: Path, roots: Roots) -> None:

@@ -214,6 +214,30 @@ class Pipeline:
             raise InputError([*self.spec.problems, *error.problems]) from None
         return link(self.spec, self.catalog, light_facts(scene), unfilled_selections(scene))
 
+    @cached_property
+    def sketch(self) -> tuple[Graph, tuple[Problem, ...]]:
+        """The graph to look at, and what is missing in it: nodes whose type nobody has are in it as far as known.
+
+        Raises:
+            InputError: something else is wrong; with all mistakes of the file.
+        """
+        from rendergraph.link import sketch
+        from rendergraph.scene.animate import complete
+        from rendergraph.scene.cameras import light_facts
+        from rendergraph.scene.model import Scene
+
+        try:
+            return self.graph, ()
+        except InputError as error:
+            try:
+                scene, unread = self.scene, ()
+            except InputError as lacking:  # a mesh that a missing plugin would read
+                if not self.spec.missing or any(problem.code != "RG303" for problem in lacking.problems):
+                    raise error from None
+                scene, unread = complete(Scene("missing")), lacking.problems
+            graph, missing = sketch(self.spec, self.catalog, light_facts(scene))
+            return graph, (*missing, *unread)
+
     @property
     def warnings(self) -> tuple[Problem, ...]:
         """What was noticed in the pipeline and the scene and is no error."""

@@ -39,6 +39,7 @@ class Card:
         inputs: connected inputs.
         outputs: everything it offers.
         notes: lines beneath the ports.
+        unknown: nobody has the type.
     """
 
     id: str
@@ -46,6 +47,12 @@ class Card:
     inputs: tuple[Socket, ...]
     outputs: tuple[Socket, ...]
     notes: tuple[str, ...] = ()
+    unknown: bool = False
+
+    @property
+    def kind(self) -> str:
+        """The type as it is shown."""
+        return f"{self.type} (unknown)" if self.unknown else self.type
 
 
 @dataclass(frozen=True)
@@ -102,6 +109,7 @@ def cards(graph: Graph) -> list[Card]:
                 for name, port in node.node.outputs().items()
                 if not isinstance(port, InOut) or node.inputs.get(name) or (node.id, name) in used
             ),
+            unknown=node.type.missing,
         )
         for node in graph.nodes
     ]

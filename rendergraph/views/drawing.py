@@ -112,7 +112,7 @@ def _height(card: Card) -> float:
 def _width(card: Card) -> float:
     if not card.type:
         return CHARACTER * len(card.inputs[0].name) + 4 * PAD
-    texts = [len(card.id) * 1.2, len(card.type)]
+    texts = [len(card.id) * 1.2, len(card.kind)]
     texts += [len(socket.name) + (len(socket.carries) + 2 if socket.carries else 0) for socket in card.outputs]
     texts += [len(text) for text in (*(socket.name for socket in card.inputs), *card.notes)]
     return max(110.0, CHARACTER * max(texts) + 2 * PAD)
@@ -247,12 +247,13 @@ def _card(card: Card, x: float, y: float, column: float, mark: Mark | None = Non
             + f'<text class="port" x="{x + 2 * PAD:.1f}" y="{y + 17:.1f}">{escape(card.inputs[0].name)}</text>'
         )
     width, height = column, _height(card)
+    dashes = ' stroke-dasharray="6 4"' if card.unknown else ""
     parts = [
-        f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="6"/>',
+        f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="6"{dashes}/>',
         f'<path class="head" d="M{x + 0.5:.1f} {y + HEAD - 4:.1f}v-{HEAD - 10.5:.1f}q0-6 6-6h{width - 13:.1f}q6 0 6 6'
         f'v{HEAD - 10.5:.1f}z"/>',
         f'<text class="name" x="{x + PAD:.1f}" y="{y + 16:.1f}" font-family="{TITLE_FONT}">{escape(card.id)}</text>',
-        f'<text class="type" x="{x + PAD:.1f}" y="{y + 30:.1f}">{escape(card.type)}</text>',
+        f'<text class="type" x="{x + PAD:.1f}" y="{y + 30:.1f}">{escape(card.kind)}</text>',
     ]
     for socket in card.outputs:
         middle = y + _out_height(card, socket.name)

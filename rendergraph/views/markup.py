@@ -16,7 +16,7 @@ def text(graph: Graph) -> str:
     rows: list[tuple[str, str, str]] = [(graph.name, f"{width}×{height}", "")]
     for id in graph.reading_order():
         card = table[id]
-        rows += [("", "", ""), (f"  {id}", card.type, "")]
+        rows += [("", "", ""), (f"  {id}", card.kind, "")]
         for name, ends in graph[id].inputs.items():
             rows += [(f"    ← {name}", str(end), "") for end in ends]
         for socket in card.outputs:
@@ -53,7 +53,7 @@ def _dot(word: str) -> str:
 
 
 def _dot_table(card: Card) -> str:
-    cells = [f'<tr><td bgcolor="#dfe4ea" align="left"><b>{escape(card.id)}</b>  {escape(card.type)}</td></tr>']
+    cells = [f'<tr><td bgcolor="#dfe4ea" align="left"><b>{escape(card.id)}</b>  {escape(card.kind)}</td></tr>']
     for socket in card.outputs:
         carries = f'<font color="#57606a">{escape(socket.carries)}</font>  ' if socket.carries else ""
         cells.append(
@@ -70,7 +70,7 @@ def mermaid(graph: Graph) -> str:
     number = {card.id: f"n{place}" for place, card in enumerate(found)}  # ids such as `end` are words of the language
     lines = ["flowchart LR"]
     for card in found:
-        lines.append(f'  {number[card.id]}["<b>{_mermaid(card.id)}</b><br/>{_mermaid(card.type)}"]')
+        lines.append(f'  {number[card.id]}["<b>{_mermaid(card.id)}</b><br/>{_mermaid(card.kind)}"]')
     for place, (name, end) in enumerate(graph.outputs.items()):
         lines.append(f'  o{place}(["{_mermaid(name)}"])')
         lines.append(f'  {number[end.node]} -->|"{_mermaid(end.port)}"| o{place}')
@@ -114,6 +114,7 @@ def graph_json(graph: Graph) -> dict[str, Any]:
             {
                 "id": card.id,
                 "type": card.type,
+                "unknown": card.unknown,
                 "family": node.type.family,
                 "inputs": {name: [str(end) for end in ends] for name, ends in node.inputs.items()},
                 "outputs": outputs,
