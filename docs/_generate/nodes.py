@@ -149,6 +149,9 @@ def _range(parameter: dict[str, Any]) -> str:
 def _sources(found: NodeType) -> Iterator[str]:
     """The whole node: its module, and the shaders that the module or one of its bases names."""
     text = found.file.read_text(encoding="utf-8")
+    if found.is_shader:
+        yield folded(f"<code>{found.file.name}</code>", block(text, "glsl"))
+        return
     yield folded(f"<code>{found.file.name}</code>", block(text, "python"))
     for file in shader_files(found):
         yield folded(f"<code>{file.name}</code>", block(file.read_text(encoding="utf-8"), "glsl"))

@@ -229,8 +229,9 @@ class Pipeline:
         try:
             return self.graph, ()
         except InputError as error:
+            unread: tuple[Problem, ...] = ()
             try:
-                scene, unread = self.scene, ()
+                scene = self.scene
             except InputError as lacking:  # a mesh that a missing plugin would read
                 if not self.spec.missing or any(problem.code != "RG303" for problem in lacking.problems):
                     raise error from None
