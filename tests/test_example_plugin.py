@@ -7,16 +7,35 @@ import os
 import shutil
 import subprocess
 import sys
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
+from rendergraph.cli.app import main
+
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "docs" / "examples" / "rendergraph-sketch"
 
-pytestmark = pytest.mark.slow
+
+def test_who_lacks_it_is_told_and_still_sees_the_graph(capsys: pytest.CaptureFixture[str]) -> None:
+    """A node, a shading model and a mesh are missing; what is there is drawn, and what to install is said."""
+    if "rendergraph-sketch" in {entry.dist.name for entry in entry_points(group="rendergraph.nodes") if entry.dist}:
+        pytest.skip("it is installed")
+    code = main(["graph", str(EXAMPLE / "scenes" / "sketch.yaml")])
+    out, err = capsys.readouterr()
+    assert code == 3
+    assert "RG130 the pipeline needs the plugin 'rendergraph-sketch', which is not installed: pip install" in err
+    for said in ("RG102 there is no node type 'outline'", "RG104 'light.shading'", "RG303 'gear.stl' is no mesh file"):
+        assert said in err
+    for said in ("outline", "← radiance        light.radiance", "gbuffer", "display.color"):
+        assert said in out
+
+
+def test_its_folder_stands_for_it_while_it_is_written(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["check", str(EXAMPLE / "scenes" / "sketch.yaml"), "--plugin", str(EXAMPLE / "rendergraph_sketch")]
+    assert main(words) == 0, capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +66,13 @@ def python(site: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_everything_is_installed(source: Path, site: Path) -> None:
     for file in (source / "rendergraph_sketch").rglob("*.*"):
         assert (site / file.relative_to(source)).is_file(), file
 
 
+@pytest.mark.slow
 def test_it_is_found_by_its_entry_points(site: Path) -> None:
     done = python(site, "-m", "rendergraph.cli", "nodes", "--json")
     assert done.returncode == 0, done.stderr
@@ -62,6 +83,7 @@ def test_it_is_found_by_its_entry_points(site: Path) -> None:
     assert added >= {("shading", "toon", "rendergraph-sketch"), ("mesh loader", ".stl", "rendergraph-sketch")}
 
 
+@pytest.mark.slow
 def test_its_own_tests_pass(source: Path, site: Path) -> None:
     words = [
         "-m",

@@ -14,8 +14,7 @@ from rendergraph.errors import Problem, RenderError, UsageError
 from rendergraph.execute import FrameTimes, Runner, median_times, summary
 from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.gl.memory import check_memory
-from rendergraph.images import decode
-from rendergraph.images import Limits
+from rendergraph.images import Limits, decode
 from rendergraph.scene import animate, pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import ImageSource, Scene
