@@ -12,7 +12,9 @@ from rendergraph.expand import ViewTable
 from rendergraph.gl import programs
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
+from rendergraph.glsl.expansion import check_expansion
 from rendergraph.program import compile_problems, link_problems, stage_texts
+from rendergraph.resources import folder
 from rendergraph.steps import Resource, Step
 
 
@@ -38,7 +40,7 @@ class ProgramCache:
         """The program of a step with these macros.
 
         Raises:
-            InputError: the driver refused a shader, or a shader samples what its step does not read.
+            InputError: the driver refused a shader, its macros grow too far, or a file is missing.
         """
         try:
             texts = stage_texts(step, types, resources, views, defines=defines)
@@ -48,6 +50,9 @@ class ProgramCache:
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:
             return self._programs[key]
+        shipped = folder("rendergraph.shaders")
+        for text in texts.values():
+            check_expansion(text.source, (shipped,))
         try:
             program = programs.link(self.device, sources, outputs)
         except programs.ProgramError as error:

@@ -1,0 +1,114 @@
+"""Macros that grow without bound are refused before a driver meets them; ordinary ones pass."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import rendergraph as rg
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Node, Output
+from rendergraph.catalog import Catalog
+from rendergraph.errors import InputError
+from rendergraph.glsl.expansion import Condition, check_expansion
+from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.resources import folder
+
+HERE = Path("/somewhere/a.frag")
+
+
+def text_of(text: str, file: Path = HERE) -> SourceText:
+    rows = tuple(text.split("\n"))
+    return SourceText(rows, tuple(Origin(file, number) for number in range(1, len(rows) + 1)))
+
+
+def chain(length: int, body: str = "A{0} A{0}") -> str:
+    return "\n".join(["#define A0 x", *(f"#define A{i + 1} {body.format(i)}" for i in range(length))])
+
+
+BOMBS = {
+    "doubling words": f"{chain(40)}\nfloat y = A40;",
+    "a doubling call inside itself": "#define D(x) x x\nfloat y = " + "D(" * 40 + "a" + ")" * 40 + ";",
+    "over several lines": "#define D(x) x x\nfloat y = " + "D(\n" * 40 + "a" + ")" * 40 + ";",
+    "a call that is handed on": "#define D(x) x x\n#define AP(f, x) f(x)\nfloat y = "
+    + "AP(D, " * 40 + "a" + ")" * 40 + ";",
+    "all of each other": "\n".join(
+        f"#define M{i} " + " ".join(f"M{j}" for j in range(12) if j != i) for i in range(12)
+    ) + "\nM0;",
+    "in a condition": f"{chain(40, 'A{0} + A{0}')}\n#if A40 > 3\n#endif",
+    "only where the driver has an extension": f"{chain(40)}\n#define B 1\n#ifdef GL_EXT_some\n#undef B\n"
+    "#define B A40\n#endif\nfloat y = B;",
+    "only where it has not": f"{chain(40)}\n#if !defined(GL_EXT_some) && 2 * 3 == 0x6\nfloat y = A40;\n#endif",
+    "continued lines": chain(40).replace("#define A40 ", "#define A40 \\\n") + "\nfloat y \\\n = A40;",
+    "names pasted together": chain(40).replace("#define A40", "#define A4") + "\n#define P(a, b) a##b\nfloat y = P(A, 4);",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_bomb_is_refused_in_time(name: str) -> None:
+    start = time.perf_counter()
+    with pytest.raises(InputError, match=r"RG409 macros make more than 1,000,000 words of this line"):
+        check_expansion(text_of(BOMBS[name]))
+    assert time.perf_counter() - start < 30
+
+
+FINE = {
+    "a macro that names itself": "#define A A A\n#define f(x) f(x) + f(x)\nA f(f(f(1)))",
+    "two that name each other": "#define A B B\n#define B A A\nA",
+    "not taken": f"{chain(40)}\n#ifdef NEVER\nfloat y = A40;\n#elif 0\nA40\n#else\nfloat y;\n#endif",
+    "taken away": f"{chain(40)}\n#undef A40\nfloat y = A40;",
+    "defined again": f"{chain(40)}\n#undef A1\n#define A1 x\n#undef A20\n#define A20 x\nfloat y = A30;",
+    "a name that is not called": "#define D(x) x x\nfloat D = D + D;",
+    "a call that does not end": "#define D(x) x x\nfloat y = D(D(D(1);",
+    "many small ones": "#define sq(x) ((x) * (x))\n" + "float y = sq(sq(a)) + sq(b) * sq(c);\n" * 2000,
+    "text alone": "float f() { return 1.0; }\n" * 20_000,
+}
+
+
+@pytest.mark.parametrize("name", FINE)
+def test_what_stays_small_passes(name: str) -> None:
+    check_expansion(text_of(FINE[name]))
+
+
+def test_shipped_shaders_are_trusted_and_the_line_is_the_authors() -> None:
+    shipped = folder("rendergraph.shaders")
+    check_expansion(text_of(BOMBS["doubling words"], shipped / "include" / "a.glsl"), (shipped,))
+    with pytest.raises(InputError, match=r"/somewhere/a\.frag:42:1: RG409"):
+        check_expansion(text_of(BOMBS["doubling words"]), (shipped,))
+
+
+def test_many_names_of_the_driver_are_refused() -> None:
+    asked = "\n".join(f"#ifdef GL_EXT_n{i}\n#endif" for i in range(6))
+    check_expansion(text_of(asked))
+    with pytest.raises(InputError, match=r"a\.frag:1:1: RG409 conditions ask the driver for GL_EXT_n0, .*; 6 such"):
+        check_expansion(text_of(f"{asked}\n#if defined(GL_EXT_n6)\n#endif"))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1 + 2 * 3 == 7 && ! 0", 1), ("0x10 - 020", 0), ("( 1 < 2 ) || 5 / 0", 1), ("- 7 % 4", -3), ("7 / - 2", -3),
+        ("1 << 31", -(2**31)), ("~ 0 == - 1", 1), ("unknown", 0), ("2 >= 3 || 3 <= 2", 0), ("", 0), ("6 & 3 | 8 ^ 1", 11), ("\u0663 + 1", 1),
+    ],
+)  # fmt: skip
+def test_conditions(text: str, expected: int) -> None:
+    assert Condition(text.split()).value() == expected
+
+
+class Bomb(Node):
+    """A shader that would fill the machine."""
+
+    color = Output(AnyTexel, format="r32f", doc="Nothing.")
+
+
+def test_a_bomb_does_not_reach_the_driver(tmp_path: Path, gl: rg.Session) -> None:
+    (tmp_path / "bomb.frag").write_text(f"{chain(60)}\nout float color;\nvoid main() {{ color = A60; }}\n")
+    (tmp_path / "test.yaml").write_text(
+        "rendergraph: 1\nsize: [8, 8]\nnodes: {bomb: {type: bomb}}\noutputs: {image: bomb.color}"
+    )
+    pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=Catalog.of(Bomb, shaders=tmp_path))
+    with pytest.raises(InputError, match=r"bomb\.frag:63:1: RG409"):
+        gl.render(pipeline)
