@@ -43,6 +43,7 @@ BOMBS = {
     "#define B A40\n#endif\nfloat y = B;",
     "only where it has not": f"{chain(40)}\n#if !defined(GL_EXT_some) && 2 * 3 == 0x6\nfloat y = A40;\n#endif",
     "continued lines": chain(40).replace("#define A40 ", "#define A40 \\\n") + "\nfloat y \\\n = A40;",
+    "calls that do not end": "#define D(x) x\n" + "D(" * 100_000,
     "names pasted together": chain(40).replace("#define A40", "#define A4") + "\n#define P(a, b) a##b\nfloat y = P(A, 4);",
 }  # fmt: skip
 

@@ -184,7 +184,9 @@ class _Preprocessor:
             elif not rest or rest[-1][0] != "(":
                 done.append(token)
             else:
+                before = len(rest)
                 found = _arguments(rest)
+                self.spent += before - len(rest) if found else before  # looking for the end is work too
                 if found is None:
                     done.append(token)
                     continue
