@@ -79,6 +79,12 @@ def test_unknown_names_and_paths(plugin: Path) -> None:
         Catalog.discover([plugin / "nowhere"], installed=False)
 
 
+def test_tests_beside_nodes_are_no_nodes(tmp_path: Path) -> None:
+    for name in ("good", "test_good", "conftest", "contest"):
+        (tmp_path / f"{name}.py").write_text(GOOD)
+    assert Catalog.discover([tmp_path], installed=False).names() == ["contest", "good"]
+
+
 def test_two_of_one_name(plugin: Path, tmp_path: Path) -> None:
     (tmp_path / "good.py").write_text(GOOD)
     catalog = Catalog.discover([plugin, tmp_path / "good.py"], installed=False)

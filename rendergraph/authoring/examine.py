@@ -43,7 +43,13 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
         found = catalog.get(file.stem)
         if found.file.resolve() == file:
             return found
-    return Catalog.discover([*plugins, _plugin_of(file)]).get(file.stem)
+    named = [*plugins, _plugin_of(file)]
+    try:
+        return Catalog.discover(named).get(file.stem)
+    except InputError as error:
+        if any(problem.code != "RG493" for problem in error.problems):
+            raise
+        return Catalog.discover(named, installed=False).get(file.stem)  # the installed one is an older copy of it
 
 
 def examine(node: NodeType, scene: Path = SCENE, tell: Tell = lambda stage, what: None) -> Report:

@@ -24,6 +24,8 @@ from rendergraph.stamps import look
 MOST_FILES = 10_000
 """Files of a folder that a pipeline file names; a plugin has a few dozen."""
 
+_NO_NODE = re.compile(r"_|test_|conftest\Z")
+"""Modules that are helpers, or that pytest looks for: tests may lie beside the nodes they test."""
 _STEM = re.compile(r"[A-Za-z][A-Za-z0-9_-]*\Z")
 _HEAD_BYTES = 100_000
 
@@ -78,7 +80,7 @@ def _files(folder: Path) -> Iterator[tuple[Path, str, str, str]]:
         family = Path(where).relative_to(folder).as_posix().removeprefix(".")
         for file in sorted(files):
             stem, suffix = os.path.splitext(file)
-            is_module = suffix == ".py" and not stem.startswith("_") and (family, stem) != ("", MODULE)
+            is_module = suffix == ".py" and not _NO_NODE.match(stem) and (family, stem) != ("", MODULE)
             if is_module or (suffix in SHADERS and _STEM.match(stem)):
                 yield Path(where), family, stem, suffix
 
