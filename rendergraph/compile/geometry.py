@@ -19,7 +19,7 @@ import numpy.typing as npt
 from rendergraph.compile.executable import Call, Draw, SortedDraws
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, suggestion
 from rendergraph.expand import CAMERA
 from rendergraph.scene.model import Material, Mesh, Scene, Texture
 from rendergraph.scene.selection import selected
@@ -190,10 +190,13 @@ def select(scene: Scene, step: Step) -> list[int]:
     if isinstance(step.objects, str):
         return selected(scene, step.objects)
     names = {placed.name: number for number, placed in enumerate(scene.objects)}
-    missing = [name for name in step.objects if name not in names]
-    if missing:
-        text = f"node '{step.node}' draws object '{missing[0]}', which the scene does not have"
-        raise InputError(Problem("RG431", text))
+    problems = [
+        step.problem("RG431", f"it draws object '{name}', which the scene does not have{suggestion(name, names)}")
+        for name in step.objects
+        if name not in names
+    ]
+    if problems:
+        raise InputError(problems)
     return [names[name] for name in step.objects]
 
 

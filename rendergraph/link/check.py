@@ -94,7 +94,7 @@ class Checker:
     def _format(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         texel = FORMATS[info.desc.format]
-        smooth = port.filter(bound.node) if callable(port.filter) else port.filter
+        smooth = self.infer.filter_of(bound, port)
         takes = ""
         if port.use == "depth_test" and not texel.is_depth:
             takes = "is attached as depth"

@@ -135,6 +135,17 @@ class Infer:
             raise _Unknown
         return info
 
+    def filter_of(self, bound: Bound, port: Input) -> str:
+        """How an input is filtered; `nearest` where its rule fails, which is said."""
+        if not callable(port.filter):
+            return port.filter
+        try:
+            return port.filter(bound.node)
+        except (Exception, SystemExit) as error:  # a stranger's function
+            text = f"the rule for its filter fails: {what_happened(error, bound.type.cls)}"
+            self._say(Endpoint(bound.spec.id, port.name), "RG209", text)
+            return "nearest"
+
     def _say(self, end: Endpoint, code: str, text: str) -> None:
         bound = self.nodes[end.node]
         self.problems.append(bound.spec.value.problem(code, f"'{end}' ({bound.type.name}): {text}", key=True))

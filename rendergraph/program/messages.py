@@ -101,13 +101,32 @@ def _problem(code: str, said: str, line: int, column: int, severity: str, stage:
         column = len(shown_line[: column - 1].replace(origin.prefix, "")) + 1
         shown_line = shown_line.replace(origin.prefix, "")
     if origin.file is None:
+        near = _nearest_author(rows, shown_line, said)
         what = f"what rendergraph writes for {origin.made}" if origin.made else "generated text"
         said += f" (in {what}: {shown_line.strip()})"
-        near = _nearest_author(rows, shown_line, said)
         place = near.place() if near else None
         return Problem(code, f"{stage.who}: {said}", place, severity=severity)  # type: ignore[arg-type]
+    macro = _macro(rows, shown_line, said)
+    if macro is not None:
+        column, where = macro
+        said += where
     said += _included(origin)
     return Problem(code, f"{stage.who}: {said}", origin.place(column), shown_line, severity)  # type: ignore[arg-type]
+
+
+def _macro(source: SourceText, line: str, said: str) -> tuple[int, str] | None:
+    """The macro of a line that a driver's name comes from: drivers give the line that uses it, and odd columns."""
+    words = [(match.group(), match.start()) for match in _WORD.finditer(line)]
+    for name in _QUOTED.findall(said):
+        if name in (word for word, _ in words):
+            return None
+        for word, start in words:
+            pattern = re.compile(rf"\s*#\s*define\s+{re.escape(word)}\b.*\b{re.escape(name)}\b")
+            for text, origin in zip(source.lines, source.origins, strict=True):
+                if pattern.match(text):
+                    place = origin.place()
+                    return start + 1, f" (in macro {word}" + (f" of {place.file}:{place.line})" if place else ")")
+    return None
 
 
 def _included(origin: Origin) -> str:

@@ -1,0 +1,263 @@
+"""A mistake in GLSL is shown at the author's own file and line, in the words of every driver and through everything."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Depth, Function, Input, Node, Output, ShadowLookup, ShadowMap
+from rendergraph.catalog import NodeType
+from rendergraph.errors import Problem
+from rendergraph.expand import ViewTable
+from rendergraph.program import StageText, compile_problems, link_problems, stage_texts
+from rendergraph.steps import FunctionBinding, Read, Resource, Step
+from rendergraph.textures import TextureDesc
+
+if TYPE_CHECKING:
+    from conftest import Author
+
+    import rendergraph as rg
+
+FORMS = {
+    "mesa": "0:{line}({column}): error: `{name}' undeclared",
+    "nvidia": '0({line}) : error C1503: undefined variable "{name}"',
+    "amd": "ERROR: 0:{line}: error(#143) Undeclared identifier: '{name}'",
+    "amd_mesa_like": "ERROR: 0:{line}: '{name}' : undeclared identifier",
+    "intel": "ERROR: 0:{line}: '{name}' : undeclared identifier",
+}
+
+FILES = {
+    "main.frag": '#include "one.glsl"\nout vec4 color;\n\nvoid main() {\n    color = one() + mistake_main;\n}\n',
+    "one.glsl": '#include "two.glsl"\nvec4 one() { return two() + mistake_one; }\n',
+    "two.glsl": "#define TWICE(x) ((x) * mistake_macro)\n\nvec4 two() { return vec4(TWICE(1.0)) + mistake_two; }\n",
+    "shadow.glsl": (
+        "uniform sampler2DArrayShadow shadow_map;\n"
+        "float shadow(int light, vec3 position, vec3 normal) {\n    return mistake_shadow;\n}\n"
+    ),
+    "lit.frag": "out vec4 color;\nvoid main() {\n    color = vec4(shadow(0, vec3(0.0), vec3(0.0)));\n}\n",
+    "fog.frag": (
+        "uniform sampler2D depth;\nout vec4 color;\nvoid main() {\n"
+        "    color = depth_views[0].eye + texture(depth, vec2(0));\n}\n"
+    ),
+}
+
+
+class Provider(Node):
+    """Shadows."""
+
+    shadow_map = Input(ShadowMap, kind="texture2d_array", doc="Map.")
+    lookup = Function(ShadowLookup, "shadow.glsl", reads=("shadow_map",), doc="Shadows.")
+
+
+class Consumer(Node):
+    """Light."""
+
+    depth = Input(Depth, optional=True, doc="Depth.")
+    lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows.")
+    color = Output(AnyTexel, doc="Colour.")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def texts(folder: Path, shader: str) -> dict[str, StageText]:
+    types = {
+        name: NodeType(name, "", cls, folder / "x.py", folder) for name, cls in (("a", Consumer), ("sun", Provider))
+    }
+    resources = {
+        "sun.map": Resource("sun.map", TextureDesc("texture2d_array", "depth32f", 8, 8), view="camera", lights=(0,)),
+        "z.depth": Resource("z.depth", TextureDesc("texture2d", "depth32f", 8, 8), view="camera"),
+    }
+    functions = (FunctionBinding("shadow", "sun", "shadow.glsl", (Read("shadow_map", "sun.map", 1),)),)
+    reads = (Read("depth", "z.depth", 1),)
+    step = Step("a", 0, "fullscreen", (("fragment", shader),), reads, functions=functions, defines=(("SAMPLES", "4"),))
+    return stage_texts(step, types, resources, {"camera": ViewTable()})
+
+
+def answer(form: str, text: StageText, fragment: str, name: str) -> Problem:
+    """What is made of a driver's message about the line that holds a piece of text."""
+    lines = text.text.splitlines()
+    number = next(number for number, line in enumerate(lines, start=1) if fragment in line)
+    column = lines[number - 1].find(name) + 1 or 1
+    (found,) = compile_problems(FORMS[form].format(line=number, column=column, name=name), text)
+    return found
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    ("shader", "fragment", "name", "file", "line", "more"),
+    [
+        ("main.frag", "mistake_main", "mistake_main", "main.frag", 5, ""),
+        ("main.frag", "mistake_one", "mistake_one", "one.glsl", 2, "(included at main.frag:1)"),
+        ("main.frag", "mistake_two", "mistake_two", "two.glsl", 3, "(included at one.glsl:1)"),
+        ("main.frag", "mistake_two", "mistake_macro", "two.glsl", 3, "(in macro TWICE of two.glsl:1)"),
+        ("lit.frag", "mistake_shadow", "mistake_shadow", "shadow.glsl", 3, ""),
+        ("lit.frag", "color = vec4(shadow", "shadow", "lit.frag", 3, ""),
+        # lines that nobody wrote: the author's nearest, and what they are there for
+        ("fog.frag", "depth_view_block", "View", "fog.frag", 4, "(in what rendergraph writes for the views of 'depth': "),
+        ("lit.frag", "float result = 1.0", "result", "lit.frag", 1, "(in what rendergraph writes for shadow() of all "),
+        ("main.frag", "#define SAMPLES 4", "SAMPLES", "main.frag", 1, "(in what rendergraph writes for the macro SAMPLES: "),
+    ],
+)  # fmt: skip
+def test_every_driver_leads_to_the_authors_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, form: str, shader: str, fragment: str, name: str, file: str, line: int,
+    more: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(folder)
+    found = answer(form, texts(folder, shader)["fragment"], fragment, name)
+    assert found.place is not None
+    assert (found.place.file, found.place.line) == (file, line)
+    assert found.text.startswith("node 'a': fragment shader: ")
+    assert name in found.text
+    assert more in found.text
+
+
+def test_the_vertex_stage_of_the_frameworks_own(folder: Path) -> None:
+    vertex = texts(folder, "main.frag")["vertex"]
+    found = answer("nvidia", vertex, "gl_Position", "gl_Position")
+    assert found.place is not None
+    assert Path(found.place.file).name == "fullscreen.vert"
+    assert found.text.startswith("node 'a': vertex shader: ")
+
+
+NVIDIA_LINK = """Vertex info
+-----------
+(0) : warning C7050: "v_uv" might be used before being initialized
+Fragment info
+-------------
+0({line}) : error C5145: must write to gl_Position
+"""
+
+
+def test_nvidias_link_messages_have_lines(folder: Path) -> None:
+    both = texts(folder, "main.frag")
+    rows = both["fragment"].text.splitlines()
+    number = next(number for number, row in enumerate(rows, start=1) if "mistake_main" in row)
+    (found,) = link_problems(NVIDIA_LINK.format(line=number), both)
+    assert (found.code, found.place and found.place.line) == ("RG411", 5)
+    assert "must write to gl_Position" in found.text
+
+
+@pytest.mark.parametrize(
+    "message",
+    ["error: fragment shader input `color' has no matching output in the previous stage",
+     "error: vertex shader output `color' declared as type `vec3'",
+     "ERROR: Type mismatch of varying 'color'"],
+)  # fmt: skip
+def test_link_messages_are_at_the_variable(folder: Path, message: str) -> None:
+    (found,) = link_problems(message, texts(folder, "main.frag"))
+    assert found.place is not None
+    assert (Path(found.place.file).name, found.place.line, found.place.column) == ("main.frag", 2, 10)
+
+
+# --- the driver at hand -----------------------------------------------------------------------------------------------
+
+COLOR = 'color = Output(Radiance, doc="Colour.")\n'
+DRAWN = COLOR + 'def record(self, steps):\n    steps.geometry("wrong.frag", vertex="wrong.vert")'
+SCENE = "objects: {box: {shape: box}}\n"
+CASES = {
+    "include in include": (
+        COLOR,
+        {"wrong.frag": '#include "a.glsl"\nout vec4 color; void main() { color = a(); }',
+         "a.glsl": '\n#include "b.glsl"\nvec4 a() { return b(); }', "b.glsl": "// B\nvec4 b() {\n    return nothing;\n}"},
+        r"b\.glsl:3:\d+: RG410 node 'a': fragment shader: .*nothing.* \(included at a\.glsl:2\)",
+    ),
+    "inside a macro": (
+        COLOR,
+        {"wrong.frag": "#define M(x) (x + nothing)\nout vec4 color;\nvoid main() {\n    color = vec4(M(1.0));\n}"},
+        r"wrong\.frag:4:18: RG410 node 'a': fragment shader: .*nothing.* \(in macro M of wrong\.frag:1\)",
+    ),
+    "a macro redefined": (
+        COLOR + 'samples: int = define(default=3, doc="Samples.")',
+        {"wrong.frag": "#define SAMPLES 4\nout vec4 color;\nvoid main() { color = vec4(SAMPLES); }"},
+        r"wrong\.frag:1:\d+: RG410 node 'a': fragment shader: .*SAMPLES",
+    ),
+    "shared include": (
+        COLOR,
+        {"wrong.frag": "out vec4 color;\n#define vec3 nothing\n#include <tone_curves.glsl>\nvoid main() { color = vec4(1); }"},
+        r"luminance\.glsl:\d+:\d+: RG410 node 'a': fragment shader: .* \(included at wrong\.frag:3\)",
+    ),
+    "the vertex stage": (
+        DRAWN,
+        {"wrong.vert": "#include <geometry_vertex.glsl>\nvoid main() {\n    pass_vertex_on();\n    v_positon.x = 1.0;\n}"},
+        r"wrong\.vert:4:\d+: RG410 node 'a': vertex shader: .*v_positon",
+    ),
+    "stages that do not fit": (
+        DRAWN,
+        {"wrong.vert": "in vec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }",
+         "wrong.frag": "\nin vec2 v_place;\nout vec4 color;\nvoid main() { color = v_place.xyxy; }"},
+        r"wrong\.frag:2:9: RG411 node 'a': the stages vertex, fragment do not link: .*v_place",
+    ),
+    "an attribute misspelt": (
+        DRAWN,
+        {"wrong.vert": "\nin vec3 in_positon;\nvoid main() { gl_Position = vec4(in_positon, 1.0); }"},
+        r"wrong\.vert:2:9: RG428 node 'a' \(wrong\): wrong\.py:18: wrong\.vert reads vertex attribute 'in_positon', which "
+        r"the scene does not have; did you mean 'in_position'\?",
+    ),
+    "floats as whole numbers": (
+        DRAWN,
+        {"wrong.vert": "in ivec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }"},
+        r"wrong\.vert:1:10: RG428 .*: wrong\.vert reads vertex attribute 'in_position' as whole numbers, but it holds "
+        r"floats \(3f\)",
+    ),
+    "a sampler of nobody's": (
+        COLOR + 'last = Input(AnyTexel, optional=True, doc="Last.")',
+        {"wrong.frag": "out vec4 color;\nuniform sampler2D lost;\nvoid main() { color = texture(lost, vec2(0)); }"},
+        r"wrong\.frag:2:19: RG430 node 'a' \(wrong\): wrong\.frag samples 'lost', but the step reads no texture of that "
+        r"name; it reads none",
+    ),
+    "a uniform of nobody's": (
+        COLOR + 'gain: float = param(default=1.0, doc="Gain.")',
+        {"wrong.frag": "out vec4 color;\nuniform float gian, gain;\nvoid main() { color = vec4(gian + gain); }"},
+        r"wrong\.frag:2:15: RG434 node 'a' \(wrong\): wrong\.frag looks at uniform 'gian', which nothing sets; did you "
+        r"mean 'gain'\?",
+    ),
+    "an object that is not there": (
+        COLOR + 'def record(self, steps):\n    steps.geometry("wrong.frag", objects=["boks"])',
+        {},
+        r"test\.yaml:5:3: RG431 node 'a' \(wrong\): wrong\.py:18: it draws object 'boks', which the scene does not have; "
+        r"there is box",
+    ),
+    "a buffer's attribute misspelt": (
+        COLOR + 'numbers = Internal(kind="buffer", bytes=64)\n\n'
+        'def record(self, steps):\n    steps.draw("wrong.frag", vertex="wrong.vert", vertices=3, '
+        'attributes={"2f in_corner": self.numbers})\n\ndef update(self, frame):\n    pass',
+        {"wrong.vert": "in vec2 in_cornre;\nvoid main() { gl_Position = vec4(in_cornre, 0.0, 1.0); }"},
+        r"wrong\.vert:1:9: RG428 .*: wrong\.vert reads vertex attribute 'in_cornre', which no buffer of `attributes` holds; "
+        r"did you mean 'in_corner'\?",
+    ),
+    "no work group": (
+        'shader = "wrong.comp"\n' + COLOR,
+        {"wrong.comp": "uniform writeonly image2D color;\nvoid main() { imageStore(color, ivec2(0), vec4(1.0)); }"},
+        r"wrong\.comp:1:1: RG411 node 'a': the stages compute do not link: .*local group size",
+    ),
+    "an image of another format": (
+        'shader = "wrong.comp"\n' + COLOR,
+        {"wrong.comp": "layout(local_size_x = 8) in;\nlayout(r32f) uniform writeonly image2D color;\n"
+                       "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"},
+        r"wrong\.comp:2:1: RG427 node 'a': image 'color' has layout\(r32f\), but 'a\.color' is rgba16f; leave the layout out",
+    ),
+    "an image of whole numbers": (
+        'shader = "wrong.comp"\ncolor = Output(Radiance, format="r32ui", doc="Colour.")',
+        {"wrong.comp": "layout(local_size_x = 8) in;\nuniform writeonly image2D color;\n"
+                       "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"},
+        r"wrong\.comp:2:1: RG427 node 'a': image 'color' is an image2D, but 'a\.color' is r32ui, which takes uimage2D",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_the_driver_at_hand_says(author: Author, gl: rg.Session, case: str) -> None:
+    body, files, expected = CASES[case]
+    author.node(body)
+    author.write(**{name.replace(".", "__"): text for name, text in files.items()})
+    said = author.said(lambda: gl.render(author.pipeline(scene=SCENE)))
+    assert re.match(expected, re.sub(r"^\S*/", "", said[0])), said[0]

@@ -1,0 +1,231 @@
+"""Hooks that fail: rules of ports, validators, `record`, `update`, and what one node forgets and another reads."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from rendergraph.errors import InputError
+
+if TYPE_CHECKING:
+    from conftest import Author
+
+    import rendergraph as rg
+
+COLOR = 'color = Output(Radiance, doc="Colour.")\n'
+
+RULES = {
+    # what fails, by the rule's name
+    'more = Output(Radiance, size=lambda node, facts: node.side(), doc="D.")  # here':
+        "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: AttributeError: 'Wrong' object has no attribute "
+        "'side'",
+    'more = Output(Radiance, size=lambda node, facts: "large", doc="D.")':
+        "'a.more' (wrong): the rule for its size gives 'large', not width and height",
+    'more = Output(Radiance, size=lambda node, facts: 64, doc="D.")':
+        "'a.more' (wrong): the rule for its size gives 64, not width and height",
+    'more = Output(Radiance, format=lambda node, facts: facts.input("nothing").desc.format, doc="D.")  # here':
+        "'a.more' (wrong): the rule for its format fails: wrong.py:{line}: KeyError: 'nothing'",
+    'more = Output(Radiance, format=lambda node, facts: ["rgba16f"], doc="D.")':
+        "RG211 'a.more' (wrong): there is no format '['rgba16f']'",
+    'more = Output(Radiance, kind="texture2d_array", layers=lambda node, facts: 1 / 0, doc="D.")  # here':
+        "'a.more' (wrong): the rule for its layers fails: wrong.py:{line}: ZeroDivisionError: division by zero",
+    'more = Output(Radiance, mips=lambda node, facts: "all", doc="D.")':
+        "RG208 'a.more' (wrong): a texture of 16×8 has 1 to 5 mips, not all",
+    'more = Output(Radiance, samples=lambda node, facts: [4], doc="D.")':
+        "RG208 'a.more' (wrong): a texture cannot have [4] samples a texel",
+    'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 2.5, doc="D.")':
+        "RG208 'a.more' (wrong): a buffer has at least 1 byte, not 2.5",
+    'color = Output(Radiance, clear=lambda node: node.dark, doc="D.")  # here':
+        "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
+        "attribute 'dark'",
+    'color = Output(Radiance, clear=lambda node: "black", doc="D.")':
+        "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four, or None",
+    'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")':
+        "'a.more' (wrong): the rule for its lights gives 3, not the indices of lights",
+    'more = Views(count=lambda node, facts: None, doc="D.")':
+        "'a.more' (wrong): the rule for its count gives None, not a whole number from 0",
+    'more = Views(count=lambda node, facts: facts.lamps, doc="D.")  # here':
+        "'a.more' (wrong): the rule for its count fails: wrong.py:{line}: AttributeError: 'Facts' object has no "
+        "attribute 'lamps'",
+    'more = Views(lights=lambda node, facts: facts.lights[9], doc="D.")  # here':
+        "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",
+    'last = Input(AnyTexel, filter=lambda node: node.smooth, optional=True, doc="D.")  # here':
+        "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
+        "attribute 'smooth'",
+    'last = Input(AnyTexel, filter=lambda node: "bicubic", optional=True, doc="D.")':
+        "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
+    'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here':
+        "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: ValueError: invalid literal for int() with base "
+        "10: 'x'",
+    'more = Output(Radiance, size=lambda node, facts: node.refuse(), doc="D.")\n'
+    'def refuse(self):\n    raise ValueError("it takes two lights")':
+        "node 'a' (wrong): it takes two lights",
+    'more = Output(Radiance, size=lambda node, facts: exit(), doc="D.")  # here':
+        "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: SystemExit: None",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", RULES)
+def test_a_rule_that_fails(author: Author, body: str) -> None:
+    author.node(body if body.startswith("color") else COLOR + body)
+    last = "" if "last =" not in body else ", inputs: {last: a.color@previous}"
+    text = f"nodes:\n  a: {{type: wrong{last}}}\noutputs: {{image: a.color}}\n"
+    (said,) = author.said(author.pipeline(text).check)
+    expected = RULES[body] if RULES[body].startswith("RG") else f"RG209 {RULES[body]}"
+    line = author.line() if "{line}" in expected else 0
+    assert said == f"test.yaml:4:3: {expected.replace('{line}', str(line))}"
+
+
+VALIDATORS = {
+    "raise KeyError(value)  # here": "RG490 node type 'wrong': it",
+    "return value if value == 1.0 else 1 / 0  # here":
+        "RG209 node 'a' (wrong): its own checks fail: wrong.py:{line}: ZeroDivisionError: division by zero",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", VALIDATORS)
+def test_a_validator_that_fails(author: Author, body: str) -> None:
+    before = "from pydantic import field_validator\n\n\n"
+    author.node(
+        f'{COLOR}gain: float = param(default=1.0, doc="Gain.")\n\n@field_validator("gain")\n@classmethod\n'
+        f"def right(cls, value):\n    {body}",
+        before=before,
+    )
+    text = "nodes:\n  a: {type: wrong, params: {gain: 2.0}}\noutputs: {image: a.color}\n"
+    said = author.said(author.pipeline(text).check)
+    assert VALIDATORS[body].replace("{line}", str(author.line())) in said[0]
+
+
+HELPER = "def shade(steps, port):\n    steps.fullscreen('wrong.frag', source=port.x)  # deep\n"
+
+
+def test_a_helper_beside_the_node_is_the_authors_own(author: Author) -> None:
+    author.write(_shade__py=HELPER)
+    author.node(
+        COLOR + "def record(self, steps):\n    shade(steps, self.color)", before="from ._shade import shade\n\n\n"
+    )
+    (said,) = author.said(author.pipeline().check)
+    where = f"_shade.py:{author.line('# deep', '_shade.py')}"
+    assert said == f"test.yaml:4:3: RG420 node 'a' (wrong) failed while recording: {where}: " + (
+        "AttributeError: 'Output' object has no attribute 'x'"
+    )
+
+
+def test_what_numpy_raises_is_at_the_authors_line(author: Author) -> None:
+    author.node(COLOR + "def record(self, steps):\n    numpy.linalg.inv(numpy.zeros((2, 2)))  # here")
+    (said,) = author.said(author.pipeline().check)
+    assert f"wrong.py:{author.line()}: LinAlgError: Singular matrix" in said
+
+
+@pytest.mark.parametrize(
+    ("head", "body", "kind"),
+    [("def", "yield steps.fullscreen('wrong.frag')", "generator"),
+     ("async def", "steps.fullscreen('wrong.frag')", "coroutine"),
+     ("def", "return steps", "Steps")],
+)  # fmt: skip
+def test_a_record_that_gives_something_back(author: Author, head: str, body: str, kind: str) -> None:
+    author.node(f"{COLOR}{head} record(self, steps):\n    {body}")
+    (said,) = author.said(author.pipeline().check)
+    expected = f"wrong.py: `record` gives back a {kind}; it calls steps.… and returns nothing"
+    assert said == f"test.yaml:4:3: RG423 node 'a' (wrong): {expected}"
+
+
+UPDATES = {
+    "frame.set_views(self.views, [])": "'a.views' has 1 views, but update set 0",
+    "frame.set_views(self.views, [None])": "set_views is given NoneType, not ViewMatrices",
+    "frame.set_views(self.color, [frame.camera])": "set_views is given 'color', which is no Views port",
+    "frame.set_views('views', [])": "set_views is the text 'views'; give the port itself, self.views",
+    "frame.write(self.color, numpy.zeros(4))": "write is the Output 'color', which is no buffer",
+    "frame.connected('color')": "connected's argument is the text 'color'; give the port itself, self.color",
+    "frame.scene.lights[3]": "IndexError: tuple index out of range",
+    "numpy.linalg.inv(numpy.zeros((2, 2)))": "LinAlgError: Singular matrix",
+    "raise SystemExit(3)": "SystemExit: 3",
+}
+
+
+@pytest.mark.parametrize("body", UPDATES)
+def test_an_update_that_fails(author: Author, gl: rg.Session, body: str) -> None:
+    author.node(f'{COLOR}views = Views(doc="Views.")\n\ndef update(self, frame):\n    {body}  # here')
+    (said,) = author.said(lambda: gl.render(author.pipeline()))
+    where = f"wrong.py:{author.line()}"
+    assert said == f"test.yaml:4:3: RG433 node 'a' (wrong) failed in update: {where}: {UPDATES[body]}"
+
+
+def test_views_that_nobody_sets(author: Author, gl: rg.Session) -> None:
+    author.node(
+        f'{COLOR}views = Views(count=2, doc="Views.")\n\n'
+        'def record(self, steps):\n    steps.geometry("wrong.frag", view=self.views)'
+    )
+    (said,) = author.said(lambda: gl.render(author.pipeline(scene="objects: {box: {shape: box}}\n")))
+    assert said == "test.yaml:5:3: RG433 node 'a' (wrong) never sets the views of 'a.views'; do so in `update`"
+
+
+# --- what one node forgets and another reads -------------------------------------------------------------------------
+
+READER = 'source = Input(AnyTexel, doc="Source.")\ncolor = Output(Radiance, doc="Colour.")'
+TWO = "nodes:\n  a: {type: wrong}\n  b: {type: reader, inputs: {source: a.mask}}\noutputs: {image: b.color, own: a.color}\n"
+
+
+def test_an_output_that_is_forgotten_names_its_node(author: Author) -> None:
+    author.node(
+        f'{COLOR}mask = Output(Radiance, doc="Mask.")\n\ndef record(self, steps):\n'
+        '    steps.fullscreen("wrong.frag", out=self.color)'
+    )
+    author.node(READER, "reader")
+    assert author.said(author.pipeline(TWO).check) == [
+        "test.yaml:5:3: RG604 node 'b' reads 'a.mask', but no step of 'a' writes it; write it in its `record`"
+    ]
+    alone = TWO.replace("own: a.color", "own: a.mask")
+    assert (
+        "test.yaml:4:3: RG604 output 'own' shows 'a.mask', but no step writes it; write it in the node's `record`"
+        in (author.said(author.pipeline(alone).check))
+    )
+
+
+def test_a_maker_that_does_nothing_is_said_to(author: Author) -> None:
+    author.node(f'{COLOR}mask = Output(Radiance, doc="Mask.")\n\ndef record(self, steps):\n    pass')
+    author.node(READER, "reader")
+    text = TWO.replace(", own: a.color", "")
+    assert author.said(author.pipeline(text).check) == [
+        "test.yaml:5:3: RG607 node 'b' reads 'a.mask', but 'a' does nothing: it recorded no step"
+    ]
+
+
+def test_a_maker_that_has_nothing_to_read_is_said_to(author: Author) -> None:
+    author.node(
+        'layers = Output(Radiance, kind="texture2d_array", layers=lambda node, facts: 0, doc="No layers.")', "nolayers"
+    )
+    author.node('layers = Input(AnyTexel, kind="texture2d_array", doc="Layers.")\nmask = Output(Radiance, doc="Mask.")')
+    author.node(READER, "reader")
+    text = (
+        "nodes:\n  n: {type: nolayers}\n  a: {type: wrong, inputs: {layers: n.layers}}\n"
+        "  b: {type: reader, inputs: {source: a.mask}}\noutputs: {image: b.color}\n"
+    )
+    assert author.said(author.pipeline(text).check) == [
+        "test.yaml:6:3: RG607 node 'b' reads 'a.mask', but 'a' does nothing: "
+        "n.layers has no layers: there is nothing to read"
+    ]
+
+
+def test_a_node_that_nobody_wants_remembers_nothing(author: Author) -> None:
+    """Whoever is not wanted does not keep alive what it would read of last frame."""
+    author.node(f'{COLOR}spare = Output(Radiance, doc="Spare.")\n\ndef record(self, steps):\n'
+                '    assert not steps.used(self.spare)\n    steps.fullscreen("wrong.frag", out=self.color)')  # fmt: skip
+    author.node(READER, "reader")
+    text = (
+        "nodes:\n  a: {type: wrong}\n  b: {type: reader, inputs: {source: a.spare@previous}}\n"
+        "  c: {type: reader, inputs: {source: b.color@previous}}\noutputs: {image: a.color}\n"
+    )
+    expansion = author.pipeline(text).expansion()
+    assert set(expansion.idle) == {"b", "c"}
+    assert all(resource.role != "history" for resource in expansion.resources.values())
+
+
+def test_a_missing_shader_names_the_call(author: Author, gl: rg.Session) -> None:
+    author.node(COLOR + 'def record(self, steps):\n    steps.fullscreen("worng.frag")  # here')
+    with pytest.raises(InputError, match="RG400"):
+        gl.render(author.pipeline())
+    (said,) = author.said(lambda: gl.render(author.pipeline()))
+    where = f"node 'a' (wrong): wrong.py:{author.line()}"
+    assert said == f"test.yaml:4:3: RG400 {where}: there is no shader 'worng.frag'; did you mean 'wrong.frag'?"
