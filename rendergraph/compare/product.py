@@ -15,6 +15,7 @@ from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import Progress, light_error, opened
 from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, unique_names
 from rendergraph.compare.runs import Run, is_kept, keep, key_of, open_folder, restored
+from rendergraph.compare.sources import file_digest
 from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result
 from rendergraph.metrics import Encoding
@@ -131,7 +132,7 @@ def sweep(
     names = unique_names([run_name(run) for run in settings])
     picture = read_picture(reference, variants[0].graph.size, names[0]) if isinstance(reference, Path) else None
     output, encoding = compared_output(staged, picture[1] if picture else None)
-    against = str(reference) if picture else key_of(other or variants[0], frame, "")
+    against = key_of(other or variants[0], frame, "") if picture is None else file_digest(Path(str(reference)))
     ledger, records, torn = open_folder(out, resume=resume)
     runs = [
         Run(name, run, pipeline, output, key_of(pipeline, frame, against), out / name)

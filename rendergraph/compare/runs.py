@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rendergraph import __version__, metrics
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
+from rendergraph.compare.sources import sources_digest
 from rendergraph.compare.timing import Times
 from rendergraph.compare.values import Pixels, Result, machine
 from rendergraph.errors import InputError, Place, Problem, RenderError
@@ -51,13 +52,10 @@ class Run:
 
 
 def key_of(pipeline: Pipeline, frame: int, against: str) -> str:
-    """What decides a run: the resolved file, the scene, the camera, the frame, and what it is measured against."""
-    scene = pipeline.spec.scene
-    stamp = [str(scene)]
-    if scene is not None and scene.is_file():
-        stamp += [str(scene.stat().st_mtime_ns), str(scene.stat().st_size)]
+    """What decides a run: the resolved file and what it is drawn from, camera and frame, what it is measured against."""
+    files = [str(pipeline.spec.scene), str(pipeline.environment), sources_digest(pipeline)]
     spec = pipeline.spec.to_yaml(origins=False)
-    parts = [__version__, spec, stamp, str(pipeline.environment), pipeline.camera, pipeline.graph.size, frame, against]
+    parts = [__version__, spec, files, pipeline.camera, pipeline.graph.size, frame, against]
     parts += sorted(metric.name for metric in pipeline.catalog.extensions.metrics())
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 

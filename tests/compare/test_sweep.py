@@ -24,7 +24,7 @@ from rendergraph.compare.ledger import Ledger, checksum
 from rendergraph.compare.product import pareto, sweep
 from rendergraph.compare.report import sweep_page
 from rendergraph.errors import InputError
-from rendergraph.images import read
+from rendergraph.images import read, write
 
 AXES = tuple(parse_axis(x) for x in ("shadows.taps=1,3", "light.shading=pbr,phong", "display.curve=aces,none,neutral"))
 
@@ -73,6 +73,80 @@ def test_resuming_draws_what_is_missing_and_nothing_else(base: rg.Pipeline, gl: 
     assert sweep(base, few, tmp_path, frames=1, resume=True, session=gl).resumed == 1
     other = sweep(base.set("light.ambient", 0.1), few, tmp_path, frames=1, resume=True, session=gl)
     assert other.resumed == 0
+
+
+GLOW = """
+from rendergraph.api import Node, Output, Radiance, Steps, param
+
+from ._strength import STRENGTH
+from .more import helpers
+
+
+class Glow(Node):
+    \"\"\"One colour.\"\"\"
+
+    color = Output(Radiance, format="rgba16f", doc="The colour.")
+    much: float = param(default=1.0, min=0, max=9, doc="How much.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("glow.frag", strength=STRENGTH * helpers.ONE)
+"""
+
+
+def test_results_are_kept_only_as_long_as_what_they_were_drawn_from(gl: rg.Session, tmp_path: Path) -> None:
+    files = {
+        "plugin/glow.py": GLOW,
+        "plugin/_strength.py": "STRENGTH = 0.5\n",
+        "plugin/more/__init__.py": "",
+        "plugin/more/helpers.py": "ONE = 1.0\n",
+        "plugin/glow.frag": '#include "shape.glsl"\nuniform float strength, much;  // a comment\n'
+        "out vec4 color;\nvoid main() { color = vec4(shape() * strength * much); }\n",
+        "plugin/shape.glsl": "float shape() { return 1.0; }\n",
+        "plugin/other.frag": "out vec4 color;\nvoid main() { color = vec4(1.0); }\n",
+        "scene.yaml": "scene: 1\nmaterials: {m: {base_color_texture: t.png}}\n"
+        "objects: {o: {shape: plane, size: [1, 1], material: m}}\n",
+        "p.yaml": "rendergraph: 1\nsize: [8, 8]\nscene: scene.yaml\nnodes: {g: {type: glow}}\n"
+        "outputs: {radiance: g.color}\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    picture = tmp_path / "t.png"
+    write(picture, np.zeros((2, 2, 3), np.uint8))
+
+    def drawn() -> int:
+        base = rg.load(tmp_path / "p.yaml", plugins=[tmp_path / "plugin"])
+        axes = (Axis("g.much", ("1", "2")),)
+        found = sweep(base, axes, tmp_path / "out", frames=1, resume=True, session=gl)
+        return 2 - found.resumed
+
+    assert drawn() == 2
+    assert drawn() == 0
+    for name, old, new in (
+        ("plugin/shape.glsl", "1.0", "0.9"), ("plugin/glow.frag", "* much", "* 0.5 * much"),
+        ("plugin/glow.py", "ONE)", "ONE * 0.5)"), ("plugin/_strength.py", "0.5", "0.6"),
+        ("plugin/more/helpers.py", "1.0", "0.7"), ("scene.yaml", "[1, 1]", "[2, 1]"),
+    ):  # fmt: skip
+        file = tmp_path / name
+        file.write_text(file.read_text().replace(old, new))
+        assert drawn() == 2, name
+        assert drawn() == 0, name
+    write(picture, np.ones((2, 2, 3), np.uint8))
+    assert drawn() == 2
+    for name, old, new in (("plugin/glow.frag", "a comment", "b comment"), ("plugin/other.frag", "1.0", "0.5")):
+        file = tmp_path / name
+        file.write_text(file.read_text().replace(old, new))
+        assert drawn() == 0, name
+
+
+def test_a_reference_picture_counts_by_its_content(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    axes = (Axis("display.curve", ("aces", "none")),)
+    picture = tmp_path / "reference.png"
+    for shade in (10, 20):
+        write(picture, np.full((27, 48, 3), shade, np.uint8))
+        options: dict[str, Any] = {"frames": 1, "resume": True, "session": gl, "reference": picture}
+        assert sweep(base, axes, tmp_path / "out", **options).resumed == 0
+        assert sweep(base, axes, tmp_path / "out", **options).resumed == 2
 
 
 def test_a_torn_line_is_left_out_and_the_file_goes_on(tmp_path: Path) -> None:

@@ -1,0 +1,105 @@
+"""What a picture is made from beside its pipeline file: the text of its shaders, its nodes' code, its scene's files."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import sys
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from importlib.util import resolve_name
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rendergraph.errors import InputError
+from rendergraph.program import stage_texts
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from rendergraph.session import Pipeline
+
+_BUILTIN = "rendergraph.nodes"
+
+
+def sources_digest(pipeline: Pipeline) -> str:
+    """SHA-256 of everything that a pipeline is drawn from and its resolved file does not hold.
+
+    Shaders count as they reach the driver, without comments; of Python the nodes' modules and what they import of their
+    own package; of the scene every file that was read. The framework's own code is told by its version.
+    """
+    found = hashlib.sha256()
+    for text in (*_shader_texts(pipeline), *_code(pipeline), *_scene_files(pipeline)):
+        found.update(hashlib.sha256(text.encode()).digest())
+    return found.hexdigest()
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file's content, empty where it cannot be read."""
+    try:
+        status = path.stat()
+        return _read_digest(path, status.st_mtime_ns, status.st_size)
+    except OSError:
+        return ""
+
+
+@lru_cache(maxsize=4096)
+def _read_digest(path: Path, modified_ns: int, size: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _shader_texts(pipeline: Pipeline) -> Iterator[str]:
+    expansion = pipeline.expansion()
+    types = {node.id: node.type for node in pipeline.graph.nodes}
+    for step in expansion.steps:
+        try:
+            texts = stage_texts(step, types, expansion.resources, expansion.views)
+        except InputError as error:  # said when it is drawn, at its place
+            yield str(error)
+            continue
+        yield from (text.text for text in texts.values())
+
+
+def _code(pipeline: Pipeline) -> Iterator[str]:
+    seen: set[str] = set()
+    for node in pipeline.graph.nodes:
+        if node.type.is_shader:
+            yield file_digest(node.type.file)  # its header's declarations
+        else:
+            yield from _module_digests(type(node.node).__module__, seen)
+
+
+def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
+    """The digests of a module and of all it imports of its own package."""
+    package = _BUILTIN if name.startswith(f"{_BUILTIN}.") else name.partition(".")[0]
+    waiting = [name]
+    while waiting:
+        module = sys.modules.get(waiting.pop())
+        file = getattr(module, "__file__", None)
+        if module is None or file is None or module.__name__ in seen:
+            continue
+        seen.add(module.__name__)
+        yield file_digest(Path(file))
+        waiting += [other for other in _imported(module) if other == package or other.startswith(f"{package}.")]
+
+
+def _imported(module: ModuleType) -> Iterable[str]:
+    """Names that a module's imports may mean, absolute."""
+    try:
+        tree = ast.parse(Path(str(module.__file__)).read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return
+    for statement in ast.walk(tree):
+        if isinstance(statement, ast.Import):
+            yield from (alias.name for alias in statement.names)
+        elif isinstance(statement, ast.ImportFrom):
+            base = statement.module or ""
+            if statement.level:
+                base = resolve_name("." * statement.level + base, module.__package__ or "")
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in statement.names)
+
+
+def _scene_files(pipeline: Pipeline) -> Iterator[str]:
+    return (file_digest(path) for path in sorted(pipeline.scene.files))
