@@ -52,7 +52,7 @@ class Run:
 
 
 def key_of(pipeline: Pipeline, frame: int, against: str) -> str:
-    """What decides a run: the resolved file and what it is drawn from, camera and frame, what it is measured against."""
+    """What decides a run: the resolved file, what it is drawn from, camera and frame, what it is measured against."""
     files = [str(pipeline.spec.scene), str(pipeline.environment), sources_digest(pipeline)]
     spec = pipeline.spec.to_yaml(origins=False)
     parts = [__version__, spec, files, pipeline.camera, pipeline.graph.size, frame, against]
