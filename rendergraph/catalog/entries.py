@@ -166,7 +166,7 @@ class Entries:
         many = bool("many" in entry and entry["many"].data)
         found = self.declared.get(name)
         if found is None and many:
-            found = next((other for other in self.globals.declared if self._is_of_many(other.name)), None)
+            found = next((other for other in self.globals.declared if re.fullmatch(rf"{name}_\d+", other.name)), None)
         options: dict[str, Any] = {
             key: entry[key].data
             for key in ("doc", "optional", "many", "size", "filter", "wrap", "anisotropy", "group")

@@ -53,6 +53,8 @@ class Flattener:
             if name not in used:
                 self._warn(value.problem("RG151", f"the parameter '{name}' is used nowhere", key=True))
         top = dict(tree.data) if isinstance(tree.data, dict) else {}
+        if scope:
+            top.pop("plugins", None)  # the resolved file names those of all files at its top
         if "nodes" in top:
             top["nodes"] = top["nodes"].with_data(nodes)
         return tree.with_data(top)

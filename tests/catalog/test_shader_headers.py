@@ -1,0 +1,254 @@
+"""The YAML header of a shader file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from rendergraph.catalog import Catalog, NodeType, header
+from rendergraph.declare import Facts, Input, Output, TextureInfo
+from rendergraph.errors import InputError
+from rendergraph.schema import schema
+from rendergraph.textures import Depth, Radiance, TextureDesc, Visibility
+
+BODY = """uniform sampler2D color;
+uniform float strength;
+out vec4 darkened;
+void main() { darkened = texelFetch(color, ivec2(0), 0) * strength; }
+"""
+WHOLE = """// A first comment.
+/*---
+doc: |
+  Darken.
+
+  More about it.
+inputs:
+  color: {semantic: radiance, size: any, filter: linear, wrap: mirror, anisotropy: 4, optional: true, doc: What.}
+outputs:
+  darkened: {like: color, format: r32f, size: [color, $scale], mips: all, clear: [1, 2, 3, 4], first: 5, doc: Result.}
+params:
+  strength: {default: 0.25, min: 0, max: 1, unit: EV, doc: How much.}
+  taps: {default: 4, min: 1, max: 8, role: define, doc: How often.}
+  curve: {choices: [soft, hard], doc: How.}
+  smooth_it: {default: true, doc: Whether.}
+  scale: {default: 0.5, min: 0.1, max: 1, role: structural, doc: How large.}
+---*/
+"""
+
+
+def load(folder: Path, text: str, name: str = "effect.frag") -> NodeType:
+    (folder / name).write_text(text, encoding="utf-8")
+    return Catalog.discover([folder / name], installed=False).get(Path(name).stem)
+
+
+def mistakes(folder: Path, text: str, name: str = "effect.frag") -> list[str]:
+    with pytest.raises(InputError) as caught:
+        load(folder, text, name)
+    return [str(problem).splitlines()[0].removeprefix(f"{folder / name}:") for problem in caught.value.problems]
+
+
+def test_a_header_says_everything_that_a_class_can(tmp_path: Path) -> None:
+    found = load(tmp_path, WHOLE + BODY)
+    cls = found.cls
+    assert found.warnings == ()
+    assert cls.__doc__ == "Darken.\n\nMore about it."
+    color, darkened = cls.ports()["color"], cls.ports()["darkened"]
+    assert isinstance(color, Input)
+    assert (color.semantic, color.size, color.filter, color.wrap) == (Radiance, "any", "linear", "mirror")
+    assert (color.anisotropy, color.optional, color.doc) == (4, True, "What.")
+    assert isinstance(darkened, Output)
+    assert (darkened.like, darkened.format, darkened.mips, darkened.clear) == ("color", "r32f", 0, (1.0, 2.0, 3.0, 4.0))
+    assert (darkened.first, darkened.semantic, darkened.doc) == (5, None, "Result.")
+    assert cls().model_dump() == {
+        "strength": 0.25, "taps": 4, "curve": "soft", "smooth_it": True, "scale": 0.5,
+    }  # fmt: skip
+    assert [cls.role_of(name) for name in cls.parameters()] == ["param", "define", "define", "define", "structural"]
+    assert get_args(cls.parameters()["curve"].annotation) == ("soft", "hard")
+    desc = TextureDesc("texture2d", "rgba16f", 101, 50)
+    assert callable(darkened.size)
+    assert darkened.size(cls(), Facts((64, 64), inputs={"color": (TextureInfo(desc, Radiance),)})) == (51, 25)
+    assert darkened.size(cls(), Facts((64, 64))) == (32, 32)
+
+
+@pytest.mark.parametrize(
+    ("size", "rule"), [("0.5", 0.5), ("color", "color"), ("[64, 32]", (64, 32)), ("[color, 0.5]", ("color", 0.5))]
+)
+def test_sizes(tmp_path: Path, size: str, rule: object) -> None:
+    text = f"/*---\noutputs: {{darkened: {{size: {size}}}}}\n---*/\n" + BODY
+    (port,) = load(tmp_path, text).cls.outputs().values()
+    assert isinstance(port, Output)
+    assert port.size == rule
+
+
+def test_a_single_output_may_have_any_name(tmp_path: Path) -> None:
+    text = "/*---\noutputs: {dark: {doc: It.}}\n---*/\n" + BODY
+    assert list(load(tmp_path, text).cls.outputs()) == ["dark"]
+
+
+def test_depth_needs_no_declaration(tmp_path: Path) -> None:
+    text = "/*---\noutputs: {depth: {semantic: depth, format: depth32f}}\n---*/\nvoid main() { gl_FragDepth = 0.5; }"
+    (port,) = load(tmp_path, text).cls.outputs().values()
+    assert isinstance(port, Output)
+    assert (port.semantic, port.format) == (Depth, "depth32f")
+
+
+def test_functions_and_lists(tmp_path: Path) -> None:
+    text = """/*---
+    inputs:
+      lookup: {kind: function, semantic: shadow, optional: true, many: true}
+      visibility: {semantic: visibility, optional: true, many: true}
+      layer: {many: true}
+    ---*/
+    uniform sampler2D layer_0, layer_1;
+    out vec4 c;
+    """
+    inputs = load(tmp_path, text).cls.inputs()
+    assert list(inputs) == ["lookup", "visibility", "layer"]
+    lookup, visibility, layer = inputs.values()
+    assert isinstance(lookup, Input)
+    assert isinstance(visibility, Input)
+    assert isinstance(layer, Input)
+    assert (lookup.kind, lookup.semantic.name, lookup.many) == ("function", "shadow", True)
+    assert (visibility.kind, visibility.semantic) == ("texture2d_array", Visibility)
+    assert (layer.kind, layer.many) == ("texture2d", True)
+
+
+def test_compute_images_and_buffers(tmp_path: Path) -> None:
+    text = """/*---
+    inputs: {source: {doc: It.}}
+    outputs: {counts: {bytes: 1024, clear: 0}, picture: {}}
+    threads: source
+    ---*/
+    const int SIDE = 8;
+    layout(local_size_x = SIDE, local_size_y = 4) in;
+    layout(r32f) uniform readonly image2D source;
+    layout(r32ui) uniform uimage2DArray picture;
+    layout(std430) buffer counts { uint count[256]; };
+    layout(std430) readonly buffer table { float values[]; };
+    void main() {}
+    """
+    cls = load(tmp_path, text, "effect.comp").cls
+    assert {name: (port.kind, port.use) for name, port in cls.inputs().items() if isinstance(port, Input)} == {
+        "source": ("texture2d", "image"), "table": ("buffer", "sample"),
+    }  # fmt: skip
+    made = {name: (port.kind, port.format) for name, port in cls.outputs().items() if isinstance(port, Output)}
+    assert made == {"counts": ("buffer", None), "picture": ("texture2d_array", "r32ui")}
+
+
+def test_the_schema_treats_it_like_any_node(tmp_path: Path) -> None:
+    (tmp_path / "effect.frag").write_text(WHOLE + BODY)
+    found = schema(Catalog.discover([tmp_path], installed=False))
+    rules = found["definitions"]["node"]["allOf"]
+    (rule,) = [rule["then"]["properties"] for rule in rules if rule["if"]["properties"]["type"]["const"] == "effect"]
+    assert list(rule["inputs"]["properties"]) == ["color"]
+    assert list(rule["params"]["properties"]) == ["strength", "taps", "curve", "smooth_it", "scale"]
+
+
+def headed(text: str) -> str:
+    return f"/*---\n{text}\n---*/\n{BODY}"
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ("docs: x", ["2:1: RG440 a header has no key 'docs'; did you mean 'doc'?"]),
+        ("- 1", ["2:1: RG440 a header is a mapping with doc, inputs, outputs, params, this is a list"]),
+        ("doc: 3", ["2:6: RG440 'doc' takes text, this is 3"]),
+        ("inputs: [color]", ["2:9: RG440 'inputs' takes a mapping of names, this is a list"]),
+        ("inputs: {color: radiance}", ["2:17: RG440 'color' takes a mapping as in {doc: …}, this is text"]),
+        ("inputs: {color: {filter: smooth}}",
+         ["2:26: RG440 'filter' takes one of nearest, linear, trilinear, this is 'smooth'"]),
+        ("inputs: {color: {semantic: radiant}}",
+         ["2:28: RG440 there is no semantic 'radiant'; did you mean 'radiance'?"]),
+        ("inputs: {colour: {}}",
+         ["2:10: RG444 the header has input 'colour', but the shader declares no 'uniform sampler2D colour;'; "
+          "did you mean 'color'?"]),
+        ("inputs: {strength: {}}",
+         ["2:10: RG444 the header has input 'strength', but the shader declares 'uniform float strength'"]),
+        ("outputs: {darkened: {format: rgba9}}", None),
+        ("outputs: {darkened: {like: colour}}",
+         ["2:28: RG444 'like' names no input of this node: 'colour'; did you mean 'color'?"]),
+        ("outputs: {darkened: {size: $scale}}", ["2:28: RG444 there is no parameter 'scale' with role: structural"]),
+        ("outputs: {darkened: {size: 0}}",
+         ["2:28: RG440 'size' takes a factor of the picture's size, an input's name, [input, factor], or "
+          "[width, height] in texels, this is 0"]),
+        ("outputs: {darkened: {}, more: {}}",
+         ["2:25: RG444 the header has output 'more', but the shader declares no 'out vec4 more;'"]),
+        ("params: {strength: {default: [1, 2]}}",
+         ["2:30: RG442 the default of 'strength' (float) is a number, not [1, 2]"]),
+        ("params: {strength: {default: true}}",
+         ["2:30: RG442 the default of 'strength' (float) is a number, not true"]),
+        ("params: {strength: {min: 2, max: 1}}", ["2:26: RG442 'strength' has a min of 2 above its max of 1"]),
+        ("params: {strength: {min: 2}}", ["2:26: RG442 the default of 'strength' is 0, outside of its own range"]),
+        ("params: {strength: {role: define}}",
+         ["2:10: RG444 the header has parameter 'strength', which the shader declares as 'uniform float strength;', "
+          "no define"]),
+        ("params: {strenght: {role: param}}",
+         ["2:10: RG444 the header has parameter 'strenght', but the shader declares no 'uniform float strenght;'; "
+          "did you mean 'strength'?"]),
+        ("params: {more: {doc: It.}}",
+         ["2:10: RG444 'more' is no uniform of the shader; it needs choices, or a number or a switch as default"]),
+        ("params: {mode: {choices: [a, b], default: c}}",
+         ["2:43: RG442 the default of 'mode' is one of a, b, not 'c'"]),
+        ("inputs: {color: {}}\nparams: {color: {}}",
+         ["3:10: RG440 'color' stands in line 2 too; no port or parameter has the name of another"]),
+        ("params: {filter: {default: 1}}",
+         ["2:10: RG490 shader 'effect.frag': 'filter' is reserved by GLSL or by the node's base class; "
+          "choose another name"]),
+        ("doc: 'open", ["2:6: RG001 not valid YAML: the quote that starts here is not closed"]),
+        ("doc: a\ndoc: b", ["3:1: RG002 the key 'doc' stands here twice, first in line 2; remove one"]),
+        ("doc: 1\ninputs: 2\nparams: {strength: {min: x, uint: EV}}",
+         ["2:6: RG440 'doc' takes text, this is 1", "3:9: RG440 'inputs' takes a mapping of names, this is a number",
+          "4:26: RG440 'min' takes a number, this is 'x'",
+          "4:29: RG440 a parameter has no key 'uint'; did you mean 'unit'?"]),
+    ],
+)  # fmt: skip
+def test_a_wrong_header_is_told_at_its_line(tmp_path: Path, text: str, messages: list[str] | None) -> None:
+    found = mistakes(tmp_path, headed(text))
+    if messages is None:
+        assert found[0].startswith("2:30: RG440 'format' takes a format; did you mean 'rgba8'?") or "rgba" in found[0]
+    else:
+        assert found == messages
+
+
+def test_a_header_ends(tmp_path: Path) -> None:
+    assert mistakes(tmp_path, "\n/*---\ndoc: x\n") == ["2:1: RG440 the header has no end; it ends with a line '---*/'"]
+    assert mistakes(tmp_path, "/*---\ndoc: x */\n---*/\n") == [
+        "2:1: RG440 the header is ended by '*/' here; it ends with a line '---*/'"
+    ]
+
+
+def test_a_banner_is_no_header(tmp_path: Path) -> None:
+    banner = "/*--------\n * doc: no\n *--------*/\n"
+    assert load(tmp_path, banner + BODY).cls.__doc__ == "The shader effect.frag."
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("layout(r32f) uniform image2D a;", "1:1: RG443 a compute shader says how many threads a group has"),
+        ("layout(local_size_x = N) in;\nlayout(r32f) uniform image2D a;",
+         "1:1: RG443 local_size_x: the value of 'N' is not known; write a number"),
+        ("layout(local_size_x = 0) in;\nlayout(r32f) uniform image2D a;",
+         "1:1: RG443 local_size_x is a whole number from 1 to 1024, not 0"),
+        ("/*---\nthreads: b\n---*/\nlayout(local_size_x = 8) in;\nlayout(r32f) uniform image2D a;",
+         "2:10: RG443 'threads' names no texture of this node: 'b'"),
+        ("layout(local_size_x = 8) in;\nbuffer a { uint b; };",
+         "2:8: RG441 how large is the buffer 'a'? say outputs: {a: {bytes: N}} in the header"),
+    ],
+)  # fmt: skip
+def test_wrong_compute_shaders(tmp_path: Path, text: str, message: str) -> None:
+    assert mistakes(tmp_path, text, "effect.comp")[0].startswith(message)
+
+
+def test_the_reference_lists_every_key() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "shader-nodes.md").read_text(encoding="utf-8")
+    parts = re.split(r"^### ", page.partition("## Where they are found")[0], flags=re.MULTILINE)
+    tables = [header.TOP_KEYS, header.INPUT_KEYS, header.OUTPUT_KEYS, header.PARAM_KEYS]
+    for part, keys in zip(parts, tables, strict=True):
+        text = part.partition("## The header")[2] or part
+        firsts = re.findall(r"^\| (`[^|]*`) \|", text, re.MULTILINE)
+        assert sorted(re.findall(r"`(\w+)`", " ".join(firsts))) == sorted(keys)

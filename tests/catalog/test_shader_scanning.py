@@ -1,0 +1,244 @@
+"""What a shader file without a header declares, read without GL."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.declare import Input, Made, Output
+from rendergraph.errors import InputError
+from rendergraph.glsl import strip_comments
+from rendergraph.glsl.constants import constant
+from rendergraph.glsl.globals import globals_of
+from rendergraph.glsl.names import tokens
+
+TAKEN = set("out uniform float int bool vec sampler half filter copy json schema image".split())  # noqa: SIM905 - as text
+WORDS = st.from_regex(r"\A[a-z]{3,8}\Z").filter(lambda word: word not in TAKEN)
+
+
+def load(folder: Path, text: str, name: str = "effect.frag") -> NodeType:
+    (folder / name).write_text(text, encoding="utf-8")
+    return Catalog.discover([folder / name], installed=False).get(Path(name).stem)
+
+
+def mistakes(folder: Path, text: str, name: str = "effect.frag") -> list[str]:
+    with pytest.raises(InputError) as caught:
+        load(folder, text, name)
+    return [str(problem).splitlines()[0].removeprefix(f"{folder / name}:") for problem in caught.value.problems]
+
+
+# --- values of initialisers ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.5", 0.5), (".5", 0.5), ("1.", 1.0), ("1e-3", 1e-3), ("2.5E+2f", 250.0), ("3u", 3), ("0x1F", 31), ("-2", -2),
+        ("true", True), ("1.0 / 4.0", 0.25), ("7 / 2", 3), ("-7 / 2", -3), ("2 * (3 + 4) - 1", 13), ("- -1", 1),
+        ("vec3(1)", (1.0, 1.0, 1.0)), ("vec3(1.0, 2.0, 3.0)", (1.0, 2.0, 3.0)), ("2.0 * vec2(1, 3)", (2.0, 6.0)),
+        ("vec4(vec2(1, 2), vec2(3, 4))", (1.0, 2.0, 3.0, 4.0)), ("ivec2(1.9, -1.9)", (1, -1)), ("float(3)", 3.0),
+        ("vec2(4, 9) / vec2(2, 3)", (2.0, 3.0)), ("radius * 2.0", 3.0), ("1e-3 - 1", -0.999),
+    ],
+)  # fmt: skip
+def test_constant_expressions(text: str, value: object) -> None:
+    found = constant(tokens(text), {"radius": 1.5})
+    assert found == value
+    assert type(found) is type(value)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "unknown", "1.0 /", "1 / 0", "vec3(1, 2)", "(1", "1 2", "sin(1.0)", "true + 1", "vec2(1) + vec3(1)"]
+)
+def test_what_is_no_constant_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"."):
+        constant(tokens(text))
+
+
+def test_nesting_has_an_end() -> None:
+    with pytest.raises(ValueError, match="nested too deeply"):
+        constant(["("] * 10_000)
+
+
+@given(st.floats(min_value=-1e30, max_value=1e30), st.sampled_from(["", "f", "F"]))
+def test_every_float_is_read_as_it_is_written(number: float, suffix: str) -> None:
+    text = f"{number!r}{suffix}" if "." in repr(number) or "e" in repr(number) else f"{number!r}.0{suffix}"
+    found = constant(tokens(text))
+    assert isinstance(found, float | int)
+    assert math.isclose(found, number, rel_tol=0, abs_tol=0)
+
+
+# --- declarations ----------------------------------------------------------------------------------------------------
+
+
+def test_ports_and_parameters_of_a_plain_shader(tmp_path: Path) -> None:
+    found = load(
+        tmp_path,
+        """#version 330 core
+        #define HALF 0.5
+        const float both = 2.0 * HALF;
+        uniform sampler2D color, other;
+        uniform sampler2DShadow shadows; // a comment; uniform float no;
+        layout(binding = 3) uniform usampler2DArray ids;
+        uniform float strength = both, plain;
+        uniform vec3 tint = vec3(1.0, HALF, 0.25);
+        uniform ivec2 axis = ivec2(1, 0);
+        uniform uint count = 4u;
+        uniform bool on = true;
+        in vec2 v_uv;
+        uniform camera_like { mat4 view; } block;
+        struct Light { vec3 position; };
+        float helper(in float x);
+        out vec4 fragColor;
+        void main() { float local; fragColor = vec4(helper(strength)); }
+        """,
+    )
+    ports = {name: port for name, port in found.cls.ports().items() if isinstance(port, Input)}
+    assert list(ports) == ["color", "other", "shadows", "ids"]
+    assert [(p.semantic.name, p.kind, p.compare, p.optional) for p in ports.values()] == [
+        ("any", "texture2d", False, False), ("any", "texture2d", False, False), ("any", "texture2d", True, False),
+        ("any", "texture2d_array", False, False),
+    ]  # fmt: skip
+    (output,) = found.cls.outputs().values()
+    assert isinstance(output, Output)
+    assert (output.name, output.format, output.size, output.semantic) == (
+        "fragColor",
+        None,
+        None,
+        ports["color"].semantic,
+    )
+    assert found.cls().model_dump() == {
+        "strength": 1.0, "plain": 0.0, "tint": (1.0, 0.5, 0.25), "axis": (1, 0), "count": 4, "on": True,
+    }  # fmt: skip
+    assert {found.cls.role_of(name) for name in found.cls.parameters()} == {"param"}
+
+
+def test_whole_numbers_have_their_formats(tmp_path: Path) -> None:
+    found = load(tmp_path, "out uvec4 ids; out int number;")
+    assert [port.format for port in found.cls.ports().values() if isinstance(port, Made)] == ["rgba32ui", "r32i"]
+
+
+def test_includes_count_and_shared_ones_do_not(tmp_path: Path) -> None:
+    (tmp_path / "more.glsl").write_text("uniform float inside = 2.0;\n")
+    text = '#include "more.glsl"\n#include <depth_surface.glsl>\nout vec4 color;\n'
+    found = load(tmp_path, text)
+    assert found.cls().model_dump() == {"inside": 2.0}
+    assert list(found.cls.inputs()) == []
+
+
+def test_both_branches_of_an_if_are_one_declaration(tmp_path: Path) -> None:
+    text = "#if A\nuniform float size = 1.0;\n#else\nuniform float size = 2.0;\n#endif\nout vec4 color;"
+    assert load(tmp_path, text).cls().model_dump() == {"size": 1.0}
+
+
+KINDS: dict[str, Any] = {
+    "float": st.floats(-100, 100, width=32), "int": st.integers(-100, 100), "uint": st.integers(0, 100),
+    "bool": st.booleans(),
+}  # fmt: skip
+
+
+@given(st.data())
+def test_what_is_written_is_what_is_read(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    """Random declarations in random layouts, printed and scanned."""
+    names = data.draw(st.lists(WORDS, min_size=2, max_size=8, unique=True))
+    parts: list[str] = []
+    wanted: dict[str, tuple[str, object]] = {}
+    blank = st.sampled_from([" ", "\n", "  \t", " /* uniform int no; */ ", " // out vec4 no;\n"])
+    for name in names:
+        kind = data.draw(st.sampled_from([*KINDS, "vec2", "vec3", "ivec4", "sampler2D", "out vec4"]))
+        gap = data.draw(blank)
+        if kind == "sampler2D" or kind.startswith("out"):
+            wanted[name] = (kind.removeprefix("out "), None)
+            parts.append(f"{'' if kind.startswith('out') else 'uniform'}{gap}{kind}{gap}{name};")
+            continue
+        width = int(kind[-1]) if kind[-1].isdigit() else 1
+        scalar = KINDS[{"v": "float", "i": "int"}[kind[0]] if width > 1 else kind]
+        values = [data.draw(scalar) for _ in range(width)]
+        texts = [str(v).lower() + ("u" if kind == "uint" else "") for v in values]
+        text = texts[0] if width == 1 else f"{kind}({f',{gap}'.join(texts)})"
+        given_one = data.draw(st.booleans())
+        zero = {"f": 0.0, "v": 0.0, "i": 0, "u": 0, "b": False}[kind[0]]
+        value: object = values[0] if width == 1 else tuple(values)
+        nothing: object = zero if width == 1 else (zero,) * width
+        wanted[name] = (kind, value if given_one else nothing)
+        parts.append(f"uniform{gap}{kind}{gap}{name}{f' = {text}' if given_one else ''};")
+    text = data.draw(blank).join(parts)
+    found = globals_of(strip_comments(text))
+    assert {one.name: one.type for one in found.declared} == {name: kind for name, (kind, _) in wanted.items()}
+    for one in found.declared:
+        assert text[one.at :].startswith(one.name)
+    folder = tmp_path_factory.mktemp("scan")
+    made = load(folder, text + "\nout vec4 result_of_all;\n").cls()
+    assert made.model_dump() == {name: value for name, (_, value) in wanted.items() if value is not None}
+
+
+@given(st.text(alphabet='uniform floatvec3(){}[];=,.#\n/*01ab"<>', max_size=200))
+def test_any_text_is_scanned_to_an_end(text: str) -> None:
+    globals_of(text)
+
+
+# --- mistakes --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("uniform mat3 turn;\nout vec4 c;",
+         "1:14: RG441 'turn' is mat3, which is no parameter; bool, int, uint, float and their vectors can be"),
+        ("out vec4 c;\nuniform float w[4];",
+         "2:15: RG441 'w' is an array of float, which is no parameter; bool, int, uint, float and their vectors can be"),
+        ("uniform sampler2D s[2];\nout vec4 c;",
+         "1:19: RG441 's' is an array of samplers; declare the input `many` and s_0, s_1, …"),
+        ("in vec2 uv;\nout vec4 c;",
+         "1:9: RG441 nothing writes the varying 'uv'; a full-screen pass has v_uv, from 0 to 1"),
+        ("uniform float a;\n", "1:1: RG441 the shader writes nothing; declare what it makes, as in out vec4 color;"),
+        ("out mat2 c;", "1:10: RG441 output 'c' is a mat2; float, vec2 to vec4, uint and int can be"),
+        ("out ivec2 c;", "1:11: RG441 no format holds the ivec2 of output 'c'; use uvec4 or int"),
+        ("out vec4 c;\nuniform float a = other;",
+         "2:15: RG442 the initialiser of 'a' cannot be worked out: the value of 'other' is not known; "
+         "give its default in a header"),
+        ("out vec4 c;\nuniform int a = 1.5;", "2:13: RG442 the default of 'a' (int) is a whole number, not 1.5"),
+        ("layout(location = 1) out vec4 c;",
+         "1:31: RG441 locations of outputs go from 0 without gaps, for all or for none; leave the layouts out"),
+        ("#version 300 es\nout vec4 c;", "1:1: RG404 '#version' is written by rendergraph; take the line out"),
+        ("out vec4 c;\nuniform float distance;",
+         "2:15: RG490 shader 'effect.frag': 'distance' is reserved by GLSL or by the node's base class; "
+         "choose another name"),
+    ],
+)  # fmt: skip
+def test_what_can_be_no_node_is_said_at_its_line(tmp_path: Path, text: str, message: str) -> None:
+    assert mistakes(tmp_path, text) == [message]
+
+
+def test_all_mistakes_of_a_file_are_said_at_once(tmp_path: Path) -> None:
+    found = mistakes(tmp_path, "uniform mat3 a;\nuniform mat3 b;\nin vec3 c;\n")
+    assert [text.split(":")[0] for text in found] == ["1", "2", "3"]
+
+
+def test_a_mistake_in_an_include_is_said_there(tmp_path: Path) -> None:
+    (tmp_path / "more.glsl").write_text("\nuniform mat2 a;\n")
+    (text,) = mistakes(tmp_path, '#include "more.glsl"\nout vec4 color;\n')
+    assert text.removeprefix(f"{tmp_path}/").startswith("more.glsl:2:14: RG441 'a' is mat2")
+
+
+@pytest.mark.parametrize("version", ["330", "330 core", "400", "450 compatibility", "460 core"])
+def test_versions_are_accepted(tmp_path: Path, version: str) -> None:
+    assert list(load(tmp_path, f"  # version {version}\nout vec4 color;").cls.outputs()) == ["color"]
+
+
+def test_what_is_missing_is_one_warning(tmp_path: Path) -> None:
+    (warning,) = load(tmp_path, "uniform float a;\nuniform bool b;\nout vec4 c;").warnings
+    assert str(warning) == (
+        f"{tmp_path}/effect.frag: warning: RG445 shader node 'effect.frag' lacks doc of the node; "
+        "doc of 'c', 'a' and 'b'; min and max of 'a'; its header can say them"
+    )
+
+
+def test_discard_is_a_warning_at_its_line(tmp_path: Path) -> None:
+    *_, warning = load(tmp_path, "out vec4 c;\nvoid main() {\n    discard;\n}").warnings
+    assert (warning.code, warning.severity, str(warning.place)) == ("RG446", "warning", f"{tmp_path}/effect.frag:3:5")
