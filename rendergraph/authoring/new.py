@@ -77,9 +77,9 @@ def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, whe
     schema_file = (Path(pipeline).parent / SCHEMA_FILE).as_posix()
     fresh = not (where / schema_file).exists()
     if fresh:
-        files[schema_file] = _schema(files, kind)
+        files[schema_file] = _schema(files, by_path=kind == "shader-only" and not package)
     _write(where, files)
-    plugin = "" if kind == "shader-only" else "--plugin . " if package else f"--plugin {name}.py "
+    plugin = "--plugin . " if package else "" if kind == "shader-only" else f"--plugin {name}.py "
     commands = [f"cd {name}"] if package else []
     inside = [path.removeprefix(f"{name}/") if package else path for path in files]
     source = next(p for p in inside if Path(p).name == (f"{name}.frag" if kind == "shader-only" else f"{name}.py"))
@@ -157,14 +157,15 @@ def _filled(file: Path, words: Mapping[str, str]) -> str:
     return text
 
 
-def _schema(files: Mapping[str, str], kind: Kind) -> str:
-    """The schema of everything installed and of this node, which is not written yet."""
+def _schema(files: Mapping[str, str], *, by_path: bool) -> str:
+    """The schema of everything installed and of this node, which is not written yet; one by path needs no entry."""
     with tempfile.TemporaryDirectory() as place:
+        node = Path(place) / "nodes"
+        node.mkdir()
         for path, text in files.items():
-            if not path.endswith(".yaml") and "test_" not in path:
-                (Path(place) / Path(path).name).write_text(text, encoding="utf-8")
-        plugins = [] if kind == "shader-only" else [next(Path(place).glob("[!_]*.py"))]
-        return json.dumps(schema(Catalog.discover(plugins)), indent=2, ensure_ascii=False) + "\n"
+            if Path(path).suffix in (".py", ".frag", ".comp") and not Path(path).name.startswith(("test_", "_")):
+                (node / Path(path).name).write_text(text, encoding="utf-8")
+        return json.dumps(schema(Catalog.discover([] if by_path else [node])), indent=2, ensure_ascii=False) + "\n"
 
 
 # --- writing ---------------------------------------------------------------------------------------------------------

@@ -56,9 +56,15 @@ def test_everything_works_at_once(kind: Any, package: bool, tmp_path: Path) -> N
     ruff = ["--isolated", "--line-length", "120", "--target-version", "py311"]
     run(shlex.join(["ruff", "check", *ruff, "--select", "E,F,W,I,UP,B,C4,SIM,RUF,PT,RET", "."]), where)
     run(shlex.join(["ruff", "format", "--check", *ruff[:3], "."]), where)
-    if list(where.rglob("lens_falloff.py")):
-        (where / "mypy.ini").write_text(f"[mypy]\nstrict = true\nmypy_path = {ROOT}\n")
-        run("mypy --cache-dir ../types --config-file mypy.ini .", where)
+
+
+@pytest.mark.slow
+def test_templates_pass_the_type_checker(tmp_path: Path) -> None:
+    for kind in KINDS:
+        new_node(f"a_{kind.replace('-', '_')}", kind, where=tmp_path)
+    settings = f"[mypy]\nstrict = true\nmypy_path = {ROOT}\n[mypy-rendergraph.*]\nfollow_imports = silent\n"
+    (tmp_path / "mypy.ini").write_text(settings)
+    run("mypy --config-file mypy.ini .", tmp_path)
 
 
 @pytest.mark.slow
@@ -92,6 +98,8 @@ def test_files_begin_as_editors_and_readers_want_them(kind: Any, tmp_path: Path)
     assert first == "# yaml-language-server: $schema=./rendergraph.schema.json"
     schema = json.loads((tmp_path / "rendergraph.schema.json").read_text(encoding="utf-8"))
     assert ("lens_falloff" in json.dumps(schema)) == (kind != "shader-only")  # a shader by path needs no entry
+    new_node("other", kind, package=True, where=tmp_path)
+    assert '"other"' in (tmp_path / "other" / "pipelines" / "rendergraph.schema.json").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("kind", ["fullscreen", "shader-only"])
@@ -166,7 +174,7 @@ def test_a_full_disk_leaves_nothing_behind(package: bool, tmp_path: Path, monkey
 
 
 def test_a_file_that_appears_meanwhile_is_not_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def late(files: Any, kind: Any) -> str:
+    def late(files: Any, by_path: bool) -> str:
         (tmp_path / "test_lens_falloff.py").write_text("mine")
         return "{}\n"
 
