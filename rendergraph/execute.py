@@ -263,7 +263,7 @@ class Runner:
         desc = executable.plan.resources[resource].desc
         if isinstance(desc, BufferDesc):
             executable.device.ctx.finish()
-            return np.frombuffer(executable.memory.buffer(resource).read(), np.uint8)
+            return np.frombuffer(executable.memory.buffer(resource).read(desc.bytes), np.uint8)
         texels = textures.read(executable.device, executable.memory.texture(resource, self._parity))
         assert isinstance(desc, TextureDesc)
         return texels[0] if desc.kind == "texture2d" else texels
