@@ -18,8 +18,7 @@ def pages() -> Iterator[tuple[str, str]]:
         (
             code(s.name),
             prose(s.doc),
-            s.space,
-            s.encoding,
+            s.space or s.encoding,
             _linked(types, s.name, "outputs"),
             _linked(types, s.name, "inputs"),
         )
@@ -37,7 +36,7 @@ def pages() -> Iterator[tuple[str, str]]:
         for f in FORMATS.values()
     ]
     ends = ("made by", "taken by")
-    yield "semantics-table.md", table(("semantic", "texels", "space", "encoding", *ends), semantics)
+    yield "semantics-table.md", table(("semantic", "texels", "in", *ends), semantics)
     yield (
         "functions-table.md",
         table(("declaration", "returns", "without a provider", "joined by", *ends), functions),
