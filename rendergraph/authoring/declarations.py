@@ -11,7 +11,7 @@ from rendergraph.declare import Function, Input, Made, Node, Views
 from rendergraph.glsl import expand
 from rendergraph.resources import folder
 
-LONGEST_DOC = 120
+LONGEST_DOC = 160
 
 
 def docs(cls: type[Node]) -> Iterator[tuple[str, str]]:
@@ -73,7 +73,9 @@ def unused(node: NodeType, seen: Collection[str], files: Iterable[Path]) -> Iter
 
 def shader_text(file: Path) -> str:
     """A shader with its includes, comments left out."""
-    return expand(file, folder("rendergraph.shaders") / "include", root=file.parent).text if file.is_file() else ""
+    if not file.is_file():
+        return ""
+    return expand(file, folder("rendergraph.shaders") / "include", root=file.parent, versions=True).text
 
 
 def _python_text(node: NodeType) -> str:

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from rendergraph.authoring.declarations import docs
+from rendergraph.authoring.examine import examine
 from rendergraph.catalog import Catalog
-from rendergraph.declare import Function, Input, Made, Node, Views, declaration_mistakes
-from rendergraph.glsl import expand, interface
+from rendergraph.declare import Node, declaration_mistakes
+from rendergraph.glsl import expand
 from rendergraph.resources import folder, shipped_pipelines
 
 CATALOG = Catalog.discover()
@@ -50,15 +52,14 @@ def test_declaration(name: str) -> None:
 
 @pytest.mark.parametrize("name", BUILTIN)
 def test_docs_are_sentences(name: str) -> None:
-    cls = CATALOG.get(name).cls
-    summary = (cls.__doc__ or "").strip().splitlines()[0]
-    assert summary.endswith("."), summary
-    for port_name, port in cls.ports().items():
-        if isinstance(port, Input | Made | Function | Views) and port.doc:
-            assert port.doc.endswith("."), f"{port_name}: {port.doc}"
-            assert len(port.doc) < 120, port_name
-    for parameter, info in cls.parameters().items():
-        assert (info.description or "").endswith("."), parameter
+    assert list(docs(CATALOG.get(name).cls)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BUILTIN)
+def test_it_passes_check_node(name: str) -> None:
+    """Compiled in every variant, uniforms as declared, everything written, nothing else touched or left behind."""
+    assert examine(CATALOG.get(name)).mistakes == ()
 
 
 @pytest.mark.parametrize("name", BUILTIN)
@@ -66,34 +67,6 @@ def test_shaders_exist_and_their_includes_resolve(name: str) -> None:
     for shader in shader_names(name):
         file = resolved(name, shader)
         assert expand(file, SHADERS / "include", root=file.parent).lines
-
-
-@pytest.mark.parametrize("name", BUILTIN)
-def test_what_its_shaders_declare_is_declared_by_the_node(name: str) -> None:
-    """Uniforms of a node's own shaders are its ports, its parameters, what its steps bind, or the framework's."""
-    cls = CATALOG.get(name).cls
-    framework = {"view_index", *re.findall(r"\b(\w+)=", module_text(name))}
-    for shader in shader_names(name):
-        if shader.startswith("<"):
-            continue
-        file = resolved(name, shader)
-        names = set(interface(expand(file, SHADERS / "include", root=file.parent).text).uniforms)
-        materials = {uniform for uniform in names if uniform.endswith("_texture")}
-        assert names - materials - framework <= set(cls.ports()) | set(cls.parameters()), shader
-
-
-@pytest.mark.parametrize("name", BUILTIN)
-def test_every_uniform_parameter_stands_in_a_shader(name: str) -> None:
-    cls = CATALOG.get(name).cls
-    texts = ""
-    for shader in shader_names(name):
-        file = resolved(name, shader)
-        texts += expand(file, SHADERS / "include", root=file.parent).text
-    for parameter in cls.parameters():
-        role = cls.role_of(parameter)
-        word = parameter if role == "param" else parameter.upper()
-        if role != "structural":
-            assert re.search(rf"\b{word}(_\w+)?\b", texts), f"no shader looks at '{parameter}'"
 
 
 def test_no_shader_is_an_orphan() -> None:
