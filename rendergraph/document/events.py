@@ -29,7 +29,7 @@ class Limits:
 
 
 _MOST_PROBLEMS = 100
-_ILLEGAL = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_ILLEGAL = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufeff\ufffe\uffff]")
 _UNITS = {
     "bytes": "is {} bytes long",
     "depth": "is {} levels deep",

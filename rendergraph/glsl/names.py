@@ -95,9 +95,9 @@ def interface(text: str) -> Interface:
 
 def calls(text: str, function: str) -> bool:
     """Whether a text without comments calls a function it does not declare itself."""
-    if any(name.role == "function" and name.name == function for name in declared(text)):
+    if re.search(rf"(?<![\w.]){re.escape(function)}\s*\(", text) is None:
         return False
-    return re.search(rf"(?<![\w.]){re.escape(function)}\s*\(", text) is not None
+    return not any(name.role == "function" and name.name == function for name in declared(text))
 
 
 def mentions(text: str, name: str) -> bool:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.stamps import look
+from rendergraph.stamps import Stamp, look, stamp
 
 MAX_BYTES = 1_000_000
 """Bytes of one stage's text after includes."""
@@ -103,6 +104,7 @@ class Includes:
         self._guards: dict[tuple[Path, str], str] = {}
         self._plugged: dict[str, Path] = {}
         self._versions = False
+        self._resolved: dict[Path, Path] = {}
 
     def expand(
         self,
@@ -126,10 +128,10 @@ class Includes:
         Raises:
             InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
         """
-        root = (root or source.parent).resolve()
+        root = self._resolve(root or source.parent)
         lines: list[str] = []
         origins: list[Origin] = []
-        self._certain.add((source.resolve(), prefix))
+        self._certain.add((self._resolve(source), prefix))
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
@@ -139,10 +141,13 @@ class Includes:
         self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
         depth: list[int],
     ) -> None:  # fmt: skip
-        raw = read_text(file)
-        stack = [*stack, file.resolve()]
-        for number, line in enumerate(strip_comments(raw).split("\n"), start=1):
-            origin = replace(base, file=file, line=number)
+        raw, stripped = _lines(file)
+        stack = [*stack, self._resolve(file)]
+        for number, line in enumerate(stripped, start=1):
+            origin = Origin(file, number, base.column, base.shared, base.prefix, base.by)
+            if "#" not in line:
+                self._take(line, origin, raw, lines, origins)
+                continue
             if self._versions and len(stack) == 1 and _VERSION.match(line):
                 lines.append("")
                 origins.append(origin)
@@ -153,12 +158,7 @@ class Includes:
             include = _INCLUDE.match(line)
             if include is None:
                 depth[0] += bool(_OPENS.match(line)) - bool(_CLOSES.match(line))
-                self.bytes += len(line) + 1
-                if self.bytes > MAX_BYTES:
-                    text = f"the shader with its includes is larger than {MAX_BYTES:,} bytes"
-                    raise _error("RG403", text, origin, raw)
-                lines.append(line.rstrip())
-                origins.append(origin)
+                self._take(line, origin, raw, lines, origins)
                 continue
             parameter = _PARAMETER.match(include[1])
             if parameter is not None and parameter[1] not in self._plugged:
@@ -170,7 +170,7 @@ class Includes:
             else:
                 target, shared = self._find(include[1], file, root, origin, raw, base.shared)
                 home = root if '"' in include[1] else self.include_folder
-            if target.resolve() in stack:
+            if self._resolve(target) in stack:
                 chain = " includes ".join(path.name for path in [*stack, target])
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
             if len(stack) > MAX_DEPTH:
@@ -178,11 +178,24 @@ class Includes:
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)
             self._include(target, home, inner, stack, lines, origins, depth)
 
+    def _take(self, line: str, origin: Origin, raw: str, lines: list[str], origins: list[Origin]) -> None:
+        self.bytes += len(line) + 1
+        if self.bytes > MAX_BYTES:
+            raise _error("RG403", f"the shader with its includes is larger than {MAX_BYTES:,} bytes", origin, raw)
+        lines.append(line)
+        origins.append(origin)
+
+    def _resolve(self, path: Path) -> Path:
+        """A path with links followed; asked for again and again, and slow."""
+        if path not in self._resolved:
+            self._resolved[path] = path.resolve()
+        return self._resolved[path]
+
     def _include(
         self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
         depth: list[int],
     ) -> None:  # fmt: skip
-        key = (file.resolve(), base.prefix)
+        key = (self._resolve(file), base.prefix)
         if key in self._certain:
             return
         certain = depth[0] <= 0
@@ -216,8 +229,8 @@ class Includes:
         shared = not beside or in_shared
         folder = file.parent if beside else self.include_folder
         target = folder / name
-        inside = (root if beside else self.include_folder).resolve()
-        if not target.resolve().is_relative_to(inside):
+        inside = self._resolve(root if beside else self.include_folder)
+        if not self._resolve(target).is_relative_to(inside):
             text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
             raise _error("RG406", text, origin, raw)
         look(target)
@@ -250,6 +263,18 @@ def read_text(file: Path) -> str:
         return file.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise InputError(Problem("RG407", f"the shader is not UTF-8 text: {error}", Place(shown_file(file)))) from error
+
+
+def _lines(file: Path) -> tuple[str, tuple[str, ...]]:
+    """A file's text, and its lines without comments and blanks at their ends."""
+    look(file)
+    return _stripped(file, stamp(file))
+
+
+@lru_cache(maxsize=256)
+def _stripped(file: Path, stamp: Stamp) -> tuple[str, tuple[str, ...]]:
+    raw = read_text(file)
+    return raw, tuple(line.rstrip() for line in strip_comments(raw).split("\n"))
 
 
 def _error(code: str, text: str, origin: Origin, raw: str) -> InputError:
