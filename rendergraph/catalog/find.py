@@ -7,11 +7,11 @@ likely parts of those nodes; there only those with a header are types of their o
 from __future__ import annotations
 
 import importlib.util
+import math
 import os
 import re
 import zlib
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 
 from rendergraph.catalog import header
@@ -72,10 +72,18 @@ def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> I
             yield stem, Listed("", family, file, where, plugin)
 
 
-def _files(folder: Path) -> Iterator[tuple[Path, str, str, str]]:
-    """Folder, family, stem and ending of everything that may be a node type."""
+def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[Path, str, str, str]]:
+    """Folder, family, stem and ending of everything that may be a node type.
+
+    Raises:
+        ValueError: there are more files than `most`, of whatever kind.
+    """
+    seen = 0
     for where, subfolders, files in os.walk(folder):
         look(Path(where))
+        seen += len(files) + len(subfolders)
+        if seen > most:
+            raise ValueError(f"it has more than {most:,} files; name the folder of the effects itself")
         subfolders[:] = sorted(name for name in subfolders if name.isidentifier() and not name.startswith("_"))
         family = Path(where).relative_to(folder).as_posix().removeprefix(".")
         for file in sorted(files):
@@ -86,6 +94,8 @@ def _files(folder: Path) -> Iterator[tuple[Path, str, str, str]]:
 
 
 def _has_header(file: Path) -> bool:
+    if not file.is_file():  # opening a pipe would wait for somebody to write
+        return False
     try:
         with file.open("rb") as opened:
             return header.is_in(opened.read(_HEAD_BYTES).decode("utf-8", "replace"))
@@ -99,9 +109,7 @@ def shaders(folder: Path) -> tuple[list[tuple[str, Listed]], list[Path]]:
     Raises:
         ValueError: it has more files than any plugin.
     """
-    files = list(islice(_files(folder), MOST_FILES + 1))
-    if len(files) > MOST_FILES:
-        raise ValueError(f"it has more than {MOST_FILES:,} files; name the folder of the effects itself")
+    files = list(_files(folder, MOST_FILES))
     python = [where / f"{stem}{suffix}" for where, _, stem, suffix in files if suffix == ".py"]
     found = [
         (stem, Listed("", family, file, where, folder.name))

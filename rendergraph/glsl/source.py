@@ -241,9 +241,9 @@ class Includes:
         return target, shared
 
 
-def expand(source: Path, include_folder: Path, *, root: Path | None = None) -> SourceText:
+def expand(source: Path, include_folder: Path, *, root: Path | None = None, versions: bool = False) -> SourceText:
     """One file with its includes resolved, as `Includes.expand`."""
-    return Includes(include_folder).expand(source, root=root)
+    return Includes(include_folder).expand(source, root=root, versions=versions)
 
 
 def read_text(file: Path) -> str:

@@ -317,6 +317,34 @@ def test_wrong_plugins(write: Write, plugins: str, text: str) -> None:
     assert any(message.startswith(text) for message in messages(folder / "in" / "p.yaml"))
 
 
+def test_a_folder_has_a_plugins_size(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write({**{f"fx/deep/{n}.txt": "" for n in range(30)}, "p.yaml": pipeline("tonemap", "plugins: [./fx]\n")})
+    monkeypatch.setattr("rendergraph.catalog.find.MOST_FILES", 30)
+    (message, *_) = messages(folder / "p.yaml")
+    assert message == (
+        "2:11: RG131 './fx' is no folder of plugins: it has more than 30 files; name the folder of the effects itself"
+    )
+
+
+def test_a_pipe_in_a_folder_is_not_waited_for(write: Write) -> None:
+    folder = write({"fx/a.py": "", "fx/times.frag": EFFECT, "p.yaml": pipeline("times", "plugins: [./fx]\n")})
+    os.mkfifo(folder / "fx" / "wait.frag")
+    assert link(spec_of(folder / "p.yaml"), Catalog.discover())["effect"].type.name == "times"
+    os.mkfifo(folder / "own.frag")
+    (folder / "p.yaml").write_text(pipeline("./own.frag"))
+    assert messages(folder / "p.yaml") == ["3:18: RG011 './own.frag' is not a regular file"]
+
+
+def test_check_node_takes_it(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    """With a version of its own; what is missing and what the compiler removed are warnings."""
+    text = "#version 330\nuniform float unused;\nout vec4 c;\nvoid main() { c = vec4(0.5); }\n"
+    folder = write({"plain.frag": text})
+    assert main(["check-node", str(folder / "plain.frag")]) == 0
+    printed = capsys.readouterr().err
+    assert "warning: RG445 shader node 'plain.frag' lacks doc of the node" in printed
+    assert "plain.frag:2:1: warning: RG455 'unused' is declared, but no program looks at it" in printed
+
+
 def test_a_link_in_a_folder_leads_nowhere_outside(write: Write) -> None:
     folder = write(
         {"secret.frag": EFFECT, "in/fx/times.frag": EFFECT, "in/p.yaml": pipeline("secret", "plugins: [./fx]\n")}
