@@ -35,6 +35,15 @@ def _inputs_of(cls: type[Node]) -> dict[str, Input | InOut]:
     return {name: port for name, port in _ports_of(cls).items() if isinstance(port, Input | InOut)}
 
 
+@cache
+def _roles_of(cls: type[Node]) -> dict[str, Literal["param", "define", "structural"]]:
+    extras = {name: info.json_schema_extra for name, info in cls.model_fields.items()}
+    return {
+        name: extra["role"] if isinstance(extra, Mapping) and "role" in extra else "structural"  # type: ignore[misc]
+        for name, extra in extras.items()
+    }
+
+
 class Node(BaseModel):
     """Base of every node: ports and parameters as class attributes, nothing more for a plain full-screen pass.
 
@@ -122,5 +131,4 @@ class Node(BaseModel):
     @classmethod
     def role_of(cls, parameter: str) -> Literal["param", "define", "structural"]:
         """How a parameter reaches the program."""
-        extra = cls.model_fields[parameter].json_schema_extra
-        return extra["role"] if isinstance(extra, Mapping) and "role" in extra else "structural"  # type: ignore[return-value]
+        return _roles_of(cls)[parameter]

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.declare import Choice, Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError
+from rendergraph.expand.ending import mark_roles, wanted_resources
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recorder, now
@@ -49,8 +50,8 @@ class Numbering:
         """Number everything that was recorded."""
         for recorder in self.recorders.values():
             self._node(recorder)
-        wanted = self._wanted()
-        self._mark_roles(wanted)
+        wanted = wanted_resources(self)
+        mark_roles(self, wanted)
         return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
 
     def _node(self, recorder: Recorder) -> None:
@@ -77,7 +78,7 @@ class Numbering:
             if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recorder.links.get(port.name):
-                self.at_end[end] = self.at_end[self._behind(recorder.links[port.name][0])]
+                self.at_end[end] = self.at_end[self.behind(recorder.links[port.name][0])]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -90,7 +91,7 @@ class Numbering:
             self.written[resource.id] = set()
             self.at_end[end] = (resource.id, 0)
 
-    def _behind(self, end: Endpoint) -> Endpoint:
+    def behind(self, end: Endpoint) -> Endpoint:
         """The port of this frame that a link leads to; through nodes that have nothing to add to what they continue."""
         end = now(end)
         while end in self.passed:
@@ -187,7 +188,7 @@ class Numbering:
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: str, version: int | None = None
     ) -> Read:
-        resource, at_end = self.at_end.get(self._behind(end)) or (str(self._maker(end)), 0)
+        resource, at_end = self.at_end.get(self.behind(end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port]
         if end.previous and isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
@@ -255,13 +256,15 @@ class Numbering:
             text = feedback(request, write, reads)
             if text is not None:
                 raise self._refused(recorder, request, "RG422", text)
-        text = misfit(self.resources, writes, reads)
-        if text is not None:
-            raise self._refused(recorder, request, "RG425", text)
-        for touched in (*writes, *reads):
-            text = no_image(request.kind, touched, self.resources.get(touched.resource))
+        if len(writes) > 1 or any(read.use == "depth_test" for read in reads):
+            text = misfit(self.resources, writes, reads)
             if text is not None:
-                raise self._refused(recorder, request, "RG426", text)
+                raise self._refused(recorder, request, "RG425", text)
+        for touched in (*writes, *reads):
+            if touched.use == "image":
+                text = no_image(request.kind, touched, self.resources.get(touched.resource))
+                if text is not None:
+                    raise self._refused(recorder, request, "RG426", text)
 
     def _refused(self, recorder: Recorder, request: Request, code: str, text: str) -> InputError:
         """A request that cannot be carried out, at the line where the author made it."""
@@ -339,44 +342,6 @@ class Numbering:
                 _includes(node.choices),
             )
         ]  # fmt: skip
-
-    # The end --------------------------------------------------------------------------------------------------------
-
-    def _wanted(self) -> dict[str, str]:
-        wanted: dict[str, str] = {}
-        for name, end in self.wanted.items():
-            end = self._behind(end)
-            if end not in self.at_end or end.node in self.idle:
-                reason = self.idle.get(end.node, "it makes no texture")
-                text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
-                raise InputError(Problem("RG204", text, self.graph[end.node].place))
-            resource, version = self.at_end[end]
-            wanted[name] = resource if version == self.version[resource] else self._keep(end, resource, version)
-        return wanted
-
-    def _keep(self, end: Endpoint, resource: str, version: int) -> str:
-        """A copy of a version that somebody continues: what a tap in the middle of a chain shows."""
-        kept = f"{end} kept"
-        if kept not in self.resources:
-            index = 1 + max(step.index for step in self.steps if step.node == end.node)
-            self.resources[kept] = replace(self.resources[resource], id=kept, role="output")
-            read, write = Read("source", resource, version, "image"), Write("copy", kept, 1, "image")
-            self.steps.append(Step(end.node, index, "copy", reads=(read,), writes=(write,), label=f"{end} kept"))
-        return kept
-
-    def _mark_roles(self, wanted: dict[str, str]) -> None:
-        previous = {read.resource for step in self.steps for read in step.all_reads if read.previous}
-        for end in self.graph.textures:
-            if str(end) in previous and str(end) not in self.resources:  # its node is idle: it stays as it first was
-                port, info = self.graph[end.node].node.ports()[end.port], self.graph.textures[end]
-                assert isinstance(port, Made)
-                assert info.desc is not None
-                first = port.first or 0.0
-                self.resources[str(end)] = Resource(str(end), info.desc, "history", first, info.view, info.lights)
-        for name in set(wanted.values()) | previous:
-            resource = self.resources[name]
-            role: Role = "history" if name in previous or resource.role == "history" else "output"
-            self.resources[name] = replace(resource, role=role, first=self.firsts.get(name, resource.first))
 
 
 def _includes(plugged: Mapping[str, Choice]) -> tuple[tuple[str, Path], ...]:

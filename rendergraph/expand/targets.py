@@ -78,7 +78,7 @@ def misfit(resources: Mapping[str, Resource], writes: Sequence[Write], reads: It
 def no_image(kind: str, touched: Read | Write, resource: Resource | None) -> str | None:
     """Why a texture cannot be stored into or loaded as an image."""
     desc = resource.desc if resource is not None else None
-    if touched.use != "image" or not isinstance(desc, TextureDesc):
+    if not isinstance(desc, TextureDesc):
         return None
     word = "write" if isinstance(touched, Write) else "load"
     if kind != "compute":

@@ -119,6 +119,20 @@ outputs: {image: plus.color}"""
     assert np.all(draw(text, Halve, Plus, shaders=CONTINUED, frames=range(1, 4))["image"] == 1.75)
 
 
+class PlusFrom(Plus):
+    """The same, starting from 4."""
+
+    color = InOut(AnyTexel, first=4.0, doc="One more.")
+
+
+def test_the_first_frame_of_a_continued_texture_is_what_its_reader_s_source_says(draw: Draw) -> None:
+    text = """nodes:
+  half: {type: halve, inputs: {old: plus.color@previous}}
+  plus: {type: plus_from, inputs: {color: half.color}}
+outputs: {image: plus.color}"""
+    assert np.all(draw(text, Halve, PlusFrom, shaders=CONTINUED)["image"] == 3)
+
+
 class Nothing(Node):
     """An array of no layers."""
 
