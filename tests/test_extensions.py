@@ -441,3 +441,17 @@ def test_what_an_image_loader_gives_is_checked(loaders: Path, tmp_path: Path, gi
     assert environment is not None
     with pytest.raises(InputError, match=said):
         decode(environment.image, srgb=False)
+
+
+def test_a_session_notices_changed_files_of_a_plugin(sketch: Path) -> None:
+    """Its include, and its module: the same pipeline is drawn anew, without a new session."""
+    with rg.Session() as session:
+        first = image(session, "forward", sketch, display__curve="halve")
+        (sketch / "halve.glsl").write_text("vec3 tone_curve(vec3 color) { return vec3(1.0, 0.0, 0.0); }\n")
+        red = image(session, "forward", sketch, display__curve="halve")
+        assert (red[..., :3] == [255, 0, 0]).all()
+        assert not (first[..., :3] == [255, 0, 0]).all()
+        (sketch / "green.glsl").write_text("vec3 tone_curve(vec3 color) { return vec3(0.0, 1.0, 0.0); }\n")
+        text = (sketch / "extension.py").read_text()
+        (sketch / "extension.py").write_text(text.replace('"halve.glsl"', '"green.glsl"'))
+        assert (image(session, "forward", sketch, display__curve="halve")[..., :3] == [0, 255, 0]).all()
