@@ -455,3 +455,19 @@ def test_a_session_notices_changed_files_of_a_plugin(sketch: Path) -> None:
         text = (sketch / "extension.py").read_text()
         (sketch / "extension.py").write_text(text.replace('"halve.glsl"', '"green.glsl"'))
         assert (image(session, "forward", sketch, display__curve="halve")[..., :3] == [0, 255, 0]).all()
+
+
+def test_a_meaning_in_a_shader_files_header(write: Write, tmp_path: Path) -> None:
+    home = write(HEAT)
+    header = "/*---\ninputs: {source: {semantic: %s, optional: true, doc: Before.}}\n"
+    header += "outputs: {warmer: {semantic: heat, doc: After.}}\n---*/\n"
+    body = "uniform sampler2D source;\nout vec4 warmer;\nvoid main() { warmer = vec4(1.0); }\n"
+    (home / "warm.frag").write_text(header % "heat" + body)
+    catalog = found(home)
+    assert catalog.get("warm").cls.inputs()["source"].semantic == catalog.extensions.semantic("heat")
+    (tmp_path / "house.yaml").write_text(HOUSE)
+    (tmp_path / "cellar.yaml").write_text(CELLAR % "heat")
+    rg.load(tmp_path / "house.yaml", plugins=[home]).check()
+    (home / "warm.frag").write_text(header % "het" + body)
+    with pytest.raises(InputError, match=r"'het'.*; did you mean 'heat'\?"):
+        found(home).get("warm")
