@@ -114,5 +114,6 @@ nodes:
     ],
 )
 def test_a_patch_is_put_together(cls: type[Node], text: str | None) -> None:
-    catalog = Catalog.of(cls, **{name: CATALOG.get(name).cls for name in TYPES})
+    standard: Any = {name: CATALOG.get(name).cls for name in TYPES}
+    catalog = Catalog.of(cls, **standard)
     assert example(catalog.get(cls.__name__.lower()), catalog) == text
