@@ -9,7 +9,7 @@ from rendergraph.errors import Problem, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.gl.device import Device
 from rendergraph.scene.pack import VIEW
-from rendergraph.steps import Step
+from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
 
@@ -51,7 +51,7 @@ def _texture(name: str, desc: object, limits: Mapping[str, int]) -> list[str]:
 
 
 def _step(step: Step, limits: Mapping[str, int]) -> list[Problem]:
-    uses = (*step.reads, *step.writes)
+    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
     found = []
     for words, value, most in (
         ("colour targets", sum(write.use == "color" for write in step.writes), limits["color_targets"]),

@@ -260,7 +260,8 @@ class Numbering:
             text = misfit(self.resources, writes, reads)
             if text is not None:
                 raise self._refused(recorder, request, "RG425", text)
-        for touched in (*writes, *reads):
+        uses: tuple[Read | Write, ...] = (*writes, *reads)
+        for touched in uses:
             if touched.use == "image":
                 text = no_image(request.kind, touched, self.resources.get(touched.resource))
                 if text is not None:

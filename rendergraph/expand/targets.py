@@ -42,7 +42,8 @@ def target_size(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
 ) -> tuple[tuple[int, int], int]:
     """Width, height and samples of what a step writes."""
-    for touched in (*writes, *(read for read in reads if read.use == "depth_test")):
+    attached: list[Read | Write] = [*writes, *(read for read in reads if read.use == "depth_test")]
+    for touched in attached:
         desc = resources[touched.resource].desc
         if isinstance(desc, TextureDesc):
             return desc.mip_size(touched.mip or 0), desc.samples

@@ -56,7 +56,8 @@ def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resourc
 
 
 def _images(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, tuple[Read | Write, TextureDesc]]]:
-    for use in (*step.reads, *step.writes):
+    uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+    for use in uses:
         desc = resources[use.resource].desc if use.resource in resources else None
         if use.use == "image" and isinstance(desc, TextureDesc):
             yield use.name, (use, desc)

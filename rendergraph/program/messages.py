@@ -56,7 +56,7 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     text = text or "the driver refused the program and did not say why"
     last = list(texts.values())[-1]
     text = f"{last.of_node}the stages {', '.join(texts)} do not link: {text}"
-    for stage_text in reversed(texts.values()):
+    for stage_text in reversed(list(texts.values())):
         spot = declared_at(stage_text.source, _QUOTED.findall(message))
         if spot is not None:
             return [Problem("RG411", text, *spot)]

@@ -161,7 +161,7 @@ def whole(name: str, value: object, least: int = 0) -> None:
 
 def counts(name: str, value: object, most: int = 3) -> tuple[int, int, int]:
     """Up to three whole numbers from 1, filled up with 1."""
-    given = value if isinstance(value, tuple | list) else (value,)
+    given: tuple[Any, ...] = tuple(value) if isinstance(value, tuple | list) else (value,)
     if not 1 <= len(given) <= most:
         raise Misuse(f"{name} is {shown(value)}, not one to three whole numbers")
     for number in given:

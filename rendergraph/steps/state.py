@@ -31,8 +31,9 @@ def _of_type(owner: str, name: str, value: object, types: type | tuple[type, ...
 
 
 def _numbers(owner: str, name: str, value: object, count: int, kind: type, words: str) -> None:
-    fits = isinstance(value, tuple) and len(value) == count
-    if not fits or not all(isinstance(n, kind | int) and (kind is bool or not isinstance(n, bool)) for n in value):
+    numbers = value if isinstance(value, tuple) else ()
+    alike = all(isinstance(n, kind | int) and (kind is bool or not isinstance(n, bool)) for n in numbers)
+    if len(numbers) != count or not alike:
         raise Misuse(f"{owner}: {name} is {value!r}, not {words}")
 
 

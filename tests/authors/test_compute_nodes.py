@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 if TYPE_CHECKING:
-    from conftest import Author
-
     import rendergraph as rg
 
 SOURCE = 'color = Output(Radiance, format="r32f", doc="0 and 1 by turns.")'
@@ -37,7 +35,7 @@ outputs: {image: checks.color}
 
 
 @pytest.fixture
-def histogram(author: Author) -> Author:
+def histogram(author: Any) -> Any:
     author.node(SOURCE, "checks")
     author.node(HISTOGRAM, "histogram")
     author.write(checks__frag=SOURCE_FRAG, histogram__comp=HISTOGRAM_COMP)
@@ -45,20 +43,20 @@ def histogram(author: Author) -> Author:
 
 
 @pytest.mark.parametrize("side", [1, 7, 8, 32])
-def test_a_histogram_is_a_class_and_a_shader(histogram: Author, gl: rg.Session, side: int) -> None:
+def test_a_histogram_is_a_class_and_a_shader(histogram: Any, gl: rg.Session, side: int) -> None:
     pipeline = histogram.pipeline(TEXT, size="[17, 9]").set("count.side", side)
     frame = gl.render(pipeline, taps=["count.counts"], frames=range(1, 4))
     np.testing.assert_array_equal(frame["count.counts"].view(np.uint32), [77, 76])
     assert frame.info("count.counts").kind == "buffer"
 
 
-def test_a_step_covers_what_it_reads_where_it_writes_no_texture(histogram: Author) -> None:
+def test_a_step_covers_what_it_reads_where_it_writes_no_texture(histogram: Any) -> None:
     steps = histogram.pipeline(TEXT, size="[17, 9]").expansion(taps=["count.counts"]).steps
     assert [step.invocations for step in steps if step.kind == "compute"] == [(17, 9, 1)]
 
 
 def test_a_buffer_is_no_picture_on_the_command_line(
-    histogram: Author, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    histogram: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rendergraph.cli.app import main
 
@@ -74,7 +72,7 @@ def test_a_buffer_is_no_picture_on_the_command_line(
 @pytest.mark.parametrize("declared", ["uniform writeonly image2D color;", "writeonly uniform image2D color;",
                                       "layout(rgba16f) uniform writeonly image2D color;", "uniform image2D color;",
                                       "layout(binding = 1) uniform restrict image2D color;"])  # fmt: skip
-def test_an_image_takes_the_format_of_its_port(author: Author, gl: rg.Session, declared: str) -> None:
+def test_an_image_takes_the_format_of_its_port(author: Any, gl: rg.Session, declared: str) -> None:
     author.node('shader = "wrong.comp"\ncolor = Output(Radiance, doc="Where it is.")')
     store = "imageStore(color, p, vec4(p, 0.0, 1.0))"
     author.write(wrong__comp=f"layout(local_size_x = 8, local_size_y = 4) in;\n{declared}\nvoid main() {{\n"
@@ -95,7 +93,7 @@ def record(self, steps):
 """
 
 
-def test_layers_are_covered_too_and_parts_are_flat(author: Author, gl: rg.Session) -> None:
+def test_layers_are_covered_too_and_parts_are_flat(author: Any, gl: rg.Session) -> None:
     author.node(ARRAY)
     author.write(
         wrong__comp="layout(local_size_x = 4, local_size_y = 4) in;\nuniform writeonly uimage2DArray layers;\n"
@@ -122,7 +120,7 @@ def record(self, steps):
 """
 
 
-def test_invocations_may_be_counted(author: Author, gl: rg.Session) -> None:
+def test_invocations_may_be_counted(author: Any, gl: rg.Session) -> None:
     author.node(NUMBERS)
     author.node(SOURCE, "checks")
     author.write(
@@ -136,7 +134,7 @@ def test_invocations_may_be_counted(author: Author, gl: rg.Session) -> None:
     np.testing.assert_array_equal(frame["a.numbers"].view(np.float32), np.arange(100.0) ** 2)
 
 
-def test_more_groups_than_the_device_takes(author: Author, gl: rg.Session) -> None:
+def test_more_groups_than_the_device_takes(author: Any, gl: rg.Session) -> None:
     author.node(NUMBERS.replace("over=100", "over=10_000_000"))
     author.node(SOURCE, "checks")
     author.write(
@@ -171,7 +169,7 @@ def record(self, steps):
 
 
 @pytest.mark.parametrize("iterations", [1, 2, 5, 8])
-def test_ping_pong_between_two_internals(author: Author, gl: rg.Session, iterations: int) -> None:
+def test_ping_pong_between_two_internals(author: Any, gl: rg.Session, iterations: int) -> None:
     author.node(SOURCE, "checks")
     author.node(PING_PONG)
     author.write(
@@ -209,7 +207,7 @@ def record(self, steps):
 """
 
 
-def test_a_mip_chain_down_and_up_again(author: Author, gl: rg.Session) -> None:
+def test_a_mip_chain_down_and_up_again(author: Any, gl: rg.Session) -> None:
     author.node(SOURCE, "checks")
     author.node(CHAIN.replace("out=self.chain.mip(0))", "out=self.chain.mip(0), scale=1)").replace(
         "out=self.color)", "out=self.color, scale=1)"))  # fmt: skip

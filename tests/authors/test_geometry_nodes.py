@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 if TYPE_CHECKING:
-    from conftest import Author
-
     import rendergraph as rg
 
 QUAD = "mtllib none.mtl\no {name}\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn 0 0 1\n"
@@ -48,7 +46,7 @@ def show(name: str, kind: str, value: str) -> dict[str, str]:
     ],
 )
 def test_attributes_that_no_mesh_has_are_constant(
-    author: Author, gl: rg.Session, name: str, kind: str, value: str, expected: tuple[float, ...]
+    author: Any, gl: rg.Session, name: str, kind: str, value: str, expected: tuple[float, ...]
 ) -> None:
     """The second object, so that a constant which is not there for every instance would show."""
     author.node(SHOWN)
@@ -73,7 +71,7 @@ cameras:
     [("'all'", (True, True)), ("['right']", (False, True)), ("('left', 'right')", (True, True)), ("[]", (False, False)),
      ("'transparent'", (False, False))],
 )  # fmt: skip
-def test_objects_by_kind_and_by_name(author: Author, gl: rg.Session, objects: str, drawn: tuple[bool, bool]) -> None:
+def test_objects_by_kind_and_by_name(author: Any, gl: rg.Session, objects: str, drawn: tuple[bool, bool]) -> None:
     author.node(SELECTED.replace("{objects}", objects))
     author.write(**show("in_normal", "vec3", "vec4(1.0)"))
     (author.folder / "quad.obj").write_text(PLAIN)
@@ -111,7 +109,7 @@ void main() {
 """
 
 
-def test_a_wire_frame_by_a_geometry_shader(author: Author, gl: rg.Session) -> None:
+def test_a_wire_frame_by_a_geometry_shader(author: Any, gl: rg.Session) -> None:
     author.node(WIRES)
     author.write(wrong__geom=GEOM, wrong__frag=WIRE_FRAG)
     (author.folder / "quad.obj").write_text(PLAIN)
@@ -121,7 +119,7 @@ def test_a_wire_frame_by_a_geometry_shader(author: Author, gl: rg.Session) -> No
     assert image[10:25, 10:25].max() == image[40:55, 40:55].max() == 0  # not what lies between
 
 
-def test_a_wire_frame_by_state(author: Author, gl: rg.Session) -> None:
+def test_a_wire_frame_by_state(author: Any, gl: rg.Session) -> None:
     author.node(WIRES.replace('geometry="wrong.geom", ', "").replace('cull="none"', 'cull="none", wireframe=True'))
     author.write(wrong__frag="uniform float thickness;\nout float color;\nvoid main() { color = thickness; }")
     (author.folder / "quad.obj").write_text(PLAIN)
@@ -138,7 +136,7 @@ LIMITS = {
 
 
 @pytest.mark.parametrize("body", LIMITS)
-def test_what_the_device_cannot_hold_is_said_with_numbers(author: Author, gl: rg.Session, body: str) -> None:
+def test_what_the_device_cannot_hold_is_said_with_numbers(author: Any, gl: rg.Session, body: str) -> None:
     limit, asked, text = LIMITS[body]
     if gl.device.limits[limit] >= asked:
         pytest.skip("this device can")
@@ -147,7 +145,7 @@ def test_what_the_device_cannot_hold_is_said_with_numbers(author: Author, gl: rg
     assert said == f"RG435 {text}, which is more than this device's {gl.device.limits[limit]}"
 
 
-def test_more_views_than_a_block_holds(author: Author, gl: rg.Session) -> None:
+def test_more_views_than_a_block_holds(author: Any, gl: rg.Session) -> None:
     author.node(
         'color = Output(Radiance, doc="Colour.")\nviews = Views(count=200, doc="Many.")\n\n'
         'def record(self, steps):\n    steps.geometry("wrong.frag", view=self.views)\n\n'
@@ -160,7 +158,7 @@ def test_more_views_than_a_block_holds(author: Author, gl: rg.Session) -> None:
     assert said == f"RG435 view table 'a.views' has 200 views; a uniform block of this device holds {most}"
 
 
-def test_more_targets_than_the_device_takes(author: Author, gl: rg.Session) -> None:
+def test_more_targets_than_the_device_takes(author: Any, gl: rg.Session) -> None:
     names = [f"color{number}" for number in range(gl.device.limits["color_targets"] + 1)]
     author.node("\n".join(f'{name} = Output(Radiance, doc="One of many.")' for name in names))
     outputs = ", ".join(f"{name}: a.{name}" for name in names)

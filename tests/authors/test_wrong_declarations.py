@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from conftest import Author
 
 COLOR = 'color = Output(Radiance, doc="Colour.")\n'
 
@@ -138,7 +135,7 @@ DECLARATIONS = {
 
 
 @pytest.mark.parametrize("body", DECLARATIONS)
-def test_a_wrong_declaration(author: Author, body: str) -> None:
+def test_a_wrong_declaration(author: Any, body: str) -> None:
     author.node(COLOR + body)
     expected = DECLARATIONS[body]
     said = author.said(author.pipeline().check)
@@ -158,7 +155,7 @@ CLASSES = {
 
 
 @pytest.mark.parametrize("body", CLASSES)
-def test_a_class_that_python_refuses(author: Author, body: str) -> None:
+def test_a_class_that_python_refuses(author: Any, body: str) -> None:
     import re
 
     author.node(COLOR + body)
@@ -167,7 +164,7 @@ def test_a_class_that_python_refuses(author: Author, body: str) -> None:
     assert re.search(CLASSES[body], said), said
 
 
-def test_a_port_may_have_a_type(author: Author) -> None:
+def test_a_port_may_have_a_type(author: Any) -> None:
     author.node('color: Output = Output(Radiance, doc="Colour.")\ngain: float = param(default=1.0, doc="Gain.")')
     graph = author.pipeline().check()
     assert list(type(graph["a"].node).ports()) == ["color"]

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
-    from conftest import Author
-
     import rendergraph as rg
 
 COLOR = 'color = Output(Radiance, doc="Colour.")\n'
@@ -67,7 +65,7 @@ RULES = {
 
 
 @pytest.mark.parametrize("body", RULES)
-def test_a_rule_that_fails(author: Author, body: str) -> None:
+def test_a_rule_that_fails(author: Any, body: str) -> None:
     author.node(body if body.startswith("color") else COLOR + body)
     last = "" if "last =" not in body else ", inputs: {last: a.color@previous}"
     text = f"nodes:\n  a: {{type: wrong{last}}}\noutputs: {{image: a.color}}\n"
@@ -85,7 +83,7 @@ VALIDATORS = {
 
 
 @pytest.mark.parametrize("body", VALIDATORS)
-def test_a_validator_that_fails(author: Author, body: str) -> None:
+def test_a_validator_that_fails(author: Any, body: str) -> None:
     before = "from pydantic import field_validator\n\n\n"
     author.node(
         f'{COLOR}gain: float = param(default=1.0, doc="Gain.")\n\n@field_validator("gain")\n@classmethod\n'
@@ -100,7 +98,7 @@ def test_a_validator_that_fails(author: Author, body: str) -> None:
 HELPER = "def shade(steps, port):\n    steps.fullscreen('wrong.frag', source=port.x)  # deep\n"
 
 
-def test_a_helper_beside_the_node_is_the_authors_own(author: Author) -> None:
+def test_a_helper_beside_the_node_is_the_authors_own(author: Any) -> None:
     author.write(_shade__py=HELPER)
     author.node(
         COLOR + "def record(self, steps):\n    shade(steps, self.color)", before="from ._shade import shade\n\n\n"
@@ -112,7 +110,7 @@ def test_a_helper_beside_the_node_is_the_authors_own(author: Author) -> None:
     )
 
 
-def test_what_numpy_raises_is_at_the_authors_line(author: Author) -> None:
+def test_what_numpy_raises_is_at_the_authors_line(author: Any) -> None:
     author.node(COLOR + "def record(self, steps):\n    numpy.linalg.inv(numpy.zeros((2, 2)))  # here")
     (said,) = author.said(author.pipeline().check)
     assert f"wrong.py:{author.line()}: LinAlgError: Singular matrix" in said
@@ -124,7 +122,7 @@ def test_what_numpy_raises_is_at_the_authors_line(author: Author) -> None:
      ("async def", "steps.fullscreen('wrong.frag')", "coroutine"),
      ("def", "return steps", "Steps")],
 )  # fmt: skip
-def test_a_record_that_gives_something_back(author: Author, head: str, body: str, kind: str) -> None:
+def test_a_record_that_gives_something_back(author: Any, head: str, body: str, kind: str) -> None:
     author.node(f"{COLOR}{head} record(self, steps):\n    {body}")
     (said,) = author.said(author.pipeline().check)
     expected = f"wrong.py: `record` gives back a {kind}; it calls steps.… and returns nothing"
@@ -145,14 +143,14 @@ UPDATES = {
 
 
 @pytest.mark.parametrize("body", UPDATES)
-def test_an_update_that_fails(author: Author, gl: rg.Session, body: str) -> None:
+def test_an_update_that_fails(author: Any, gl: rg.Session, body: str) -> None:
     author.node(f'{COLOR}views = Views(doc="Views.")\n\ndef update(self, frame):\n    {body}  # here')
     (said,) = author.said(lambda: gl.render(author.pipeline()))
     where = f"wrong.py:{author.line()}"
     assert said == f"test.yaml:4:3: RG433 node 'a' (wrong) failed in update: {where}: {UPDATES[body]}"
 
 
-def test_views_that_nobody_sets(author: Author, gl: rg.Session) -> None:
+def test_views_that_nobody_sets(author: Any, gl: rg.Session) -> None:
     author.node(
         f'{COLOR}views = Views(count=2, doc="Views.")\n\n'
         'def record(self, steps):\n    steps.geometry("wrong.frag", view=self.views)'
@@ -167,7 +165,7 @@ READER = 'source = Input(AnyTexel, doc="Source.")\ncolor = Output(Radiance, doc=
 TWO = "nodes:\n  a: {type: wrong}\n  b: {type: reader, inputs: {source: a.mask}}\noutputs: {image: b.color, own: a.color}\n"
 
 
-def test_an_output_that_is_forgotten_names_its_node(author: Author) -> None:
+def test_an_output_that_is_forgotten_names_its_node(author: Any) -> None:
     author.node(
         f'{COLOR}mask = Output(Radiance, doc="Mask.")\n\ndef record(self, steps):\n'
         '    steps.fullscreen("wrong.frag", out=self.color)'
@@ -183,7 +181,7 @@ def test_an_output_that_is_forgotten_names_its_node(author: Author) -> None:
     )
 
 
-def test_a_maker_that_does_nothing_is_said_to(author: Author) -> None:
+def test_a_maker_that_does_nothing_is_said_to(author: Any) -> None:
     author.node(f'{COLOR}mask = Output(Radiance, doc="Mask.")\n\ndef record(self, steps):\n    pass')
     author.node(READER, "reader")
     text = TWO.replace(", own: a.color", "")
@@ -192,7 +190,7 @@ def test_a_maker_that_does_nothing_is_said_to(author: Author) -> None:
     ]
 
 
-def test_a_maker_that_has_nothing_to_read_is_said_to(author: Author) -> None:
+def test_a_maker_that_has_nothing_to_read_is_said_to(author: Any) -> None:
     author.node(
         'layers = Output(Radiance, kind="texture2d_array", layers=lambda node, facts: 0, doc="No layers.")', "nolayers"
     )
@@ -208,7 +206,7 @@ def test_a_maker_that_has_nothing_to_read_is_said_to(author: Author) -> None:
     ]
 
 
-def test_a_node_that_nobody_wants_remembers_nothing(author: Author) -> None:
+def test_a_node_that_nobody_wants_remembers_nothing(author: Any) -> None:
     """Whoever is not wanted does not keep alive what it would read of last frame."""
     author.node(f'{COLOR}spare = Output(Radiance, doc="Spare.")\n\ndef record(self, steps):\n'
                 '    assert not steps.used(self.spare)\n    steps.fullscreen("wrong.frag", out=self.color)')  # fmt: skip
@@ -222,7 +220,7 @@ def test_a_node_that_nobody_wants_remembers_nothing(author: Author) -> None:
     assert all(resource.role != "history" for resource in expansion.resources.values())
 
 
-def test_a_missing_shader_names_the_call(author: Author, gl: rg.Session) -> None:
+def test_a_missing_shader_names_the_call(author: Any, gl: rg.Session) -> None:
     author.node(COLOR + 'def record(self, steps):\n    steps.fullscreen("worng.frag")  # here')
     with pytest.raises(InputError, match="RG400"):
         gl.render(author.pipeline())

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from conftest import Author
 
 PORTS = """
 source = Input(AnyTexel, optional=True, doc="Source.")
@@ -182,7 +179,7 @@ CALLS = {
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_a_wrong_call(author: Author, call: str) -> None:
+def test_a_wrong_call(author: Any, call: str) -> None:
     author.node(PORTS.replace("{call}", call))
     (said,) = author.said(author.pipeline().check)
     code, _, text = CALLS[call].partition(" ")
