@@ -322,8 +322,8 @@ class Entries:
                     self.problems.append(part.problem("RG444", text))
         for entry in self.header.outputs.values():
             for key in ("like", "size"):
-                value = entry.get(key)
-                first = value.data[0] if value is not None and isinstance(value.data, list) else value
+                given = entry.get(key)
+                first = given.data[0] if given is not None and isinstance(given.data, list) else given
                 if first is None or not isinstance(first.data, str) or first.data.startswith("$"):
                     continue
                 if first.data not in inputs:

@@ -239,8 +239,8 @@ class _Reader:
             elif self.right(key, value, _text if key == "doc" else _threads):
                 doc = str(value.data).strip() if key == "doc" else doc
                 threads = value if key == "threads" else threads
-        sections = [parts.get(key, {}) for key in _SECTIONS]
-        return Header(doc, *sections, self.names, threads, tuple(self.problems), True)
+        inputs, outputs, params = (parts.get(key, {}) for key in ("inputs", "outputs", "params"))
+        return Header(doc, inputs, outputs, params, self.names, threads, tuple(self.problems), True)
 
     def section(self, section: str, value: Value) -> dict[str, dict[str, Value]]:
         what, keys = _SECTIONS[section]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from rendergraph.declare import define, param, structural
@@ -58,8 +58,8 @@ class Parameter:
             low = 0
         self._check_range(low, high, default)
         self.lacks_range = not {"min", "max", "choices"} & entry.keys() and annotation is not bool
-        make = {"param": param, "define": define, "structural": structural}[role]
-        field = make(default=default, min=low, max=high, doc=self._word("doc"), unit=self._word("unit"))
+        kinds: dict[str, Callable[..., Any]] = {"param": param, "define": define, "structural": structural}
+        field = kinds[role](default=default, min=low, max=high, doc=self._word("doc"), unit=self._word("unit"))
         return annotation, field
 
     def _word(self, key: str) -> str:

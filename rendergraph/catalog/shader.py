@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from types import new_class
 from typing import Any
 
 from pydantic import create_model
@@ -62,7 +63,7 @@ def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
 def _plugged(header: Header, extensions: Extensions) -> list[Any]:
     """The plugins' semantics, where the header has a word of theirs: part of what the class is made of."""
     entries = [*header.inputs.values(), *header.outputs.values()]
-    own = {known.name for known in (*SEMANTICS, *SIGNATURES)}
+    own = {semantic.name for semantic in SEMANTICS} | {signature.name for signature in SIGNATURES}
     foreign = any("semantic" in entry and entry["semantic"].data not in own for entry in entries)
     return list(extensions.semantics()) if foreign else []
 
@@ -78,7 +79,7 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
     doc = header.doc or f"The shader {file.name}."
     words = "".join(part.capitalize() for part in file.stem.replace("-", "_").split("_")) or "Shader"
     parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record, **entries.ports}
-    base = type(Node)(words, (Node,), parts)
+    base = new_class(words, (Node,), {}, lambda space: space.update(parts))
     cls: type[Node] = create_model(words, __base__=base, __module__=__name__, __doc__=doc, **entries.fields)
     mistakes = [mistake for mistake in declaration_mistakes(cls) if not _is_forgiven(mistake)]
     if mistakes:

@@ -87,11 +87,11 @@ def _threads(entries: Entries) -> Threads:
 
 def _counted(said: Value) -> Threads:
     rules = [number_rule(part) for part in (said.data if isinstance(said.data, list) else [said])]
-    return lambda node, steps: tuple(rule(node, steps.facts) if callable(rule) else int(rule) for rule in rules)
+    return lambda node, steps: tuple(int(rule(node, steps.facts)) if callable(rule) else int(rule) for rule in rules)
 
 
 def _texels(port: Port, steps: Steps) -> tuple[int, ...]:
     if isinstance(port, Input) and not steps.connected(port):
         return (1,)
     desc = steps.desc(port)
-    return *desc.size, desc.layers
+    return desc.width, desc.height, desc.layers

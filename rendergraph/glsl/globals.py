@@ -19,7 +19,7 @@ Storage = Literal["uniform", "in", "out", "buffer"]
 _TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|[^\s\w]")
 _WORD = re.compile(r"[A-Za-z_]\w*\Z")
 _MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\S.*?)[ \t]*$", re.MULTILINE)
-_STORAGE = ("uniform", "in", "out", "buffer")
+_STORAGE: tuple[Storage, ...] = ("uniform", "in", "out", "buffer")
 _WORDS_BEFORE = frozenset(
     """
     const flat smooth noperspective centroid sample invariant precise coherent volatile restrict readonly writeonly
@@ -147,7 +147,7 @@ def _head(
             position = end + 1
             continue
         if word in _STORAGE:
-            storage = next(known for known in _STORAGE if known == word)  # type: ignore[assignment]  # one of four words
+            storage = next(known for known in _STORAGE if known == word)
         elif word in _WORDS_BEFORE:
             qualifiers.add(str(word))
         else:

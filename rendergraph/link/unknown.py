@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import new_class
 from typing import Any
 
 from pydantic import create_model
@@ -35,7 +36,8 @@ def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
     taken = {name: Input(AnyTexture, optional=True, many=_is_list(value)) for name, value in node.inputs.items()}
     made = {name: Output(AnyTexture) for name in _asked_of(spec, node.id)}
     ports = {name: port for name, port in {**taken, **made}.items() if not hasattr(Node, name)}
-    base = type(Node)("Unknown", (Node,), {"__module__": __name__, "__doc__": "A node of unknown type.", **ports})
+    parts = {"__module__": __name__, "__doc__": "A node of unknown type.", **ports}
+    base = new_class("Unknown", (Node,), {}, lambda space: space.update(parts))
     fields: dict[str, Any] = {
         name: (Any, structural(default=None, doc=""))
         for name in node.params

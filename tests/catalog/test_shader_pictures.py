@@ -206,7 +206,9 @@ def test_a_cleared_output_is_certain_where_fragments_are_discarded(gl: rg.Sessio
     )
     files = {"d.frag": text, "p.yaml": "nodes: {d: {type: ./d.frag}}\noutputs: {image: d.c}\n"}
     found = drawn(gl, tmp_path, files)
-    np.testing.assert_array_equal(found[:, :10], np.broadcast_to(np.float32([0.25, 0, 0, 1]), (SIZE[1], 10, 4)))
+    np.testing.assert_array_equal(
+        found[:, :10], np.broadcast_to(np.asarray([0.25, 0, 0, 1], np.float32), (SIZE[1], 10, 4))
+    )
     np.testing.assert_array_equal(found[:, 10:], np.float32(1))
 
 
