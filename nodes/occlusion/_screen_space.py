@@ -51,19 +51,26 @@ class ScreenSpaceOcclusion(Node):
         assert desc is not None
         return desc.size
 
+    def sizes(self, steps: Steps) -> dict[str, int]:
+        """The macro that says whether `surfaces` is smaller than the picture."""
+        return {} if steps.desc(self.surfaces).size == self.screen(steps) else {"REDUCED": 1}
+
     def see(self, steps: Steps) -> None:
         """Bring normals and distances into `surfaces`."""
         size = steps.desc(self.surfaces).size
-        steps.fullscreen("surfaces.frag", out=self.surfaces, depth=self.depth, normal=self.normal, reduced=size)
+        steps.fullscreen(
+            "surfaces.frag", out=self.surfaces, depth=self.depth, normal=self.normal, reduced=size,
+            defines=self.sizes(steps),
+        )  # fmt: skip
 
     def target(self, steps: Steps, small: Port) -> Port:
         """Where the last pass at reduced size goes: `occlusion` itself where nothing is reduced, else `small`."""
-        return self.occlusion if steps.desc(self.surfaces).size == self.screen(steps) else small
+        return small if self.sizes(steps) else self.occlusion
 
     def finish(self, steps: Steps, source: Port) -> None:
         """Bring a reduced occlusion to full size."""
         if source is not self.occlusion:
             steps.fullscreen(
                 "upsample.frag", out=self.occlusion, source=source, surfaces=self.surfaces, depth=self.depth,
-                normal=self.normal,
+                normal=self.normal, defines=self.sizes(steps),
             )  # fmt: skip

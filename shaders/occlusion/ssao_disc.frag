@@ -1,11 +1,24 @@
 // Ambient occlusion from samples on a spiral in the disc that the radius covers on the screen. The surface seen at each
-// is a disc in space, as large as the part of the picture it stands for.
+// is a disc in space. Every pixel turns and stretches the spiral in its own way, and four share what they find.
 #include "surfaces.glsl"
+#include "neighbours.glsl"
 #include <disc_to_disc.glsl>
 uniform sampler2D surfaces;
 uniform ivec2 screen;
 uniform float radius;  // metres
 out float rough;
+
+const vec2 GOLDEN = vec2(-0.73736888, 0.67549029);  // cosine and sine of the golden angle: no two arms in line
+
+// A large disc hides less than its parts would. All are as large as if there were this many of them, so that how dark it
+// is does not depend on how many samples are taken.
+const float DISCS = 512.0;
+
+// Even over any few neighbours, without a period that shows (J. Jimenez, "Next Generation Post Processing in Call of
+// Duty: Advanced Warfare", 2014).
+float gradient_noise(ivec2 texel) {
+    return fract(52.9829189 * fract(dot(vec2(texel), vec2(0.06711056, 0.00583715))));
+}
 
 // What a disc at `offset` hides; nothing from beyond the radius or below the horizon.
 float hiding(View v, vec3 offset, vec3 normal, float far_off, float area, float facing) {
@@ -14,22 +27,18 @@ float hiding(View v, vec3 offset, vec3 normal, float far_off, float area, float 
     return disc_occlusion(apart, area, facing, dot(normal, offset) / apart);
 }
 
-void main() {
-    View v = surfaces_views[0];
-    ivec2 texel = ivec2(gl_FragCoord.xy);
+float blocked_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     ivec2 size = textureSize(surfaces, 0);
-    vec4 here = texelFetch(surfaces, texel, 0);
-    rough = 1.0;
-    if (here.w == 0.0) return;
-    vec2 middle = place_for(texel, size, screen);
-    vec3 position = view_position(v, middle, here.w);
     float w = clip_w(v, here.w);
     vec2 reach = 0.5 * radius / w * vec2(v.projection[0][0], v.projection[1][1]);
+    float turn = 6.28318531 * gradient_noise(texel);
+    vec2 along = vec2(cos(turn), sin(turn));
+    float stretch = gradient_noise(texel.yx + 7);
     float blocked = 0.0;
     for (int i = 0; i < SAMPLES; ++i) {
-        float turn = float(i) * 2.39996323;  // the golden angle: no two arms in line
-        float out_to = (float(i) + 0.5) / float(SAMPLES);
-        vec2 place = middle + out_to * reach * vec2(cos(turn), sin(turn));
+        float out_to = (float(i) + stretch) / float(SAMPLES);
+        vec2 place = middle + out_to * reach * along;
+        along = mat2(GOLDEN.x, GOLDEN.y, -GOLDEN.y, GOLDEN.x) * along;
         ivec2 there = ivec2(floor(place * vec2(size)));
         if (there != clamp(there, ivec2(0), size - 1) || there == texel) continue;
         vec4 seen = texelFetch(surfaces, there, 0);
@@ -37,7 +46,7 @@ void main() {
         vec3 at = view_position(v, place_for(there, size, screen), seen.w);
         // The ring's share of the disc on the screen, at the distance of what is seen there.
         float scale = clip_w(v, seen.w) / w;
-        float ring = 6.28318531 * out_to / float(SAMPLES) * radius * radius * scale * scale;
+        float ring = 6.28318531 * out_to / DISCS * radius * radius * scale * scale;
         vec3 sight = v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, -1.0) : at / seen.w;
         vec3 offset = at - position;
         float facing = -dot(seen.xyz, offset) / length(offset);
@@ -53,5 +62,26 @@ void main() {
         }
         blocked += hidden;
     }
-    rough = max(1.0 - blocked, 0.0);
+    return blocked * DISCS / float(SAMPLES);
+}
+
+// The mean with the other pixel of a pair, which holds what this one does and `change`, along x or y of the window.
+void share(inout float blocked, float change, vec4 here, vec4 there, vec3 offset, View v) {
+    if (there.w == 0.0) return;
+    float weight = same_surface(offset, here.xyz, there.xyz, 0.1 * radius + depth_error(v, here.w));
+    blocked += change * weight / (1.0 + weight);
+}
+
+void main() {
+    View v = surfaces_views[0];
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec4 here = texelFetch(surfaces, texel, 0);
+    vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
+    vec3 position = view_position(v, middle, here.w);
+    float blocked = here.w == 0.0 ? 0.0 : blocked_at(v, texel, middle, position, here);
+    // Derivatives are differences within the four pixels that are computed together: what leads to the other one.
+    vec2 to_other = vec2(1 - 2 * (texel & 1));
+    share(blocked, to_other.x * dFdxFine(blocked), here, here + to_other.x * dFdxFine(here), to_other.x * dFdxFine(position), v);
+    share(blocked, to_other.y * dFdyFine(blocked), here, here + to_other.y * dFdyFine(here), to_other.y * dFdyFine(position), v);
+    rough = blocked / MOST_KEPT;
 }

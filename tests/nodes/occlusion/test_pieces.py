@@ -242,6 +242,38 @@ def test_hemispheres_in_numpy(show: Show) -> None:
     assert np.mean(np.abs(found - expected) > 1e-3) < 0.01
 
 
+def gradient_noise(x: Floats, y: Floats) -> Floats:
+    """In float32, as the shader has it: the outer factor magnifies every rounding."""
+    inner = np.float32(x) * np.float32(0.06711056) + np.float32(y) * np.float32(0.00583715)
+    return np.asarray((np.float32(52.9829189) * (inner % np.float32(1))) % np.float32(1), np.float64)
+
+
+def shared_by_four(blocked: Floats, surfaces: Floats, where: Floats) -> Floats:
+    """Pairs along x, then along y; which of a pair is the other one depends on the parity alone."""
+    for axis in (1, 0):
+        other = np.arange(blocked.shape[axis]) ^ 1
+        there = np.take(surfaces, other, axis)
+        offset = np.take(where, other, axis) - where
+        weight = same_surface(offset, surfaces[..., :3], there[..., :3]) * (there[..., 3] > 0)
+        blocked = blocked + (np.take(blocked, other, axis) - blocked) * weight / (1 + weight)
+    return blocked
+
+
+def mean_of_four(blocked: Floats, surfaces: Floats, where: Floats) -> Floats:
+    """The mean of the diagonal neighbours, each of which stands for four pixels."""
+    height, width = blocked.shape
+    total = np.full(blocked.shape, 1e-3)
+    weighted = total * blocked
+    for up, right in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        rows, columns = np.arange(height) + up, np.arange(width) + right
+        inside = ((rows >= 0) & (rows < height))[:, None] & ((columns >= 0) & (columns < width))
+        there = np.ix_(rows % height, columns % width)
+        seen = surfaces[there]
+        weight = same_surface(where[there] - where, surfaces[..., :3], seen[..., :3]) * inside * (seen[..., 3] > 0)
+        total, weighted = total + weight, weighted + weight * blocked[there]
+    return weighted / total
+
+
 def test_discs_in_numpy(show: Show) -> None:
     size = (64, 48)
     frame, camera = show(size, 1)
@@ -258,17 +290,17 @@ def test_discs_in_numpy(show: Show) -> None:
         share = 1 - apart / np.sqrt(area / np.pi + apart**2)
         return np.asarray(share * emitter * np.clip(4 * receiver, 0, 1) * (apart <= RADIUS) * (receiver > 0.02))
 
+    at_x, at_y = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
+    begin, stretch = 2 * np.pi * gradient_noise(at_x, at_y), gradient_noise(at_y + 7, at_x + 7)
     for number in range(SAMPLES):
-        out_to, turn = (number + 0.5) / SAMPLES, number * np.pi * (3 - 5**0.5)
+        out_to, turn = (number + stretch) / SAMPLES, begin + number * np.pi * (3 - 5**0.5)
         column = np.floor((x + out_to * reach * camera.projection[0, 0] * np.cos(turn)) * size[0]).astype(int)
         row = np.floor((y[:, None] + out_to * reach * camera.projection[1, 1] * np.sin(turn)) * size[1]).astype(int)
         inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
         there = np.clip(row, 0, size[1] - 1), np.clip(column, 0, size[0] - 1)
         at, facing, far = where[there], normal[there], np.maximum(distance[there], 1e-3)
         inside &= (distance[there] > 0) & (np.linalg.norm(at - where, axis=-1) > 0)
-        across = (
-            np.pi * RADIUS**2 * ((number + 1) ** 2 - number**2) / SAMPLES**2 * (far / np.maximum(distance, 1e-3)) ** 2
-        )
+        across = 2 * np.pi * RADIUS**2 * out_to / 512 * (far / np.maximum(distance, 1e-3)) ** 2
         offset, sight = at - where, at / far[..., None]
         emitter = -(facing * offset).sum(-1) / np.maximum(np.linalg.norm(offset, axis=-1), 1e-9)
         slant = np.maximum(np.abs((facing * sight).sum(-1)), 0.05)
@@ -276,8 +308,9 @@ def test_discs_in_numpy(show: Show) -> None:
         line = sight / np.maximum(np.linalg.norm(sight, axis=-1, keepdims=True), 1e-9)
         nearest = offset + line * np.clip(-(offset * line).sum(-1), 0, RADIUS)[..., None]
         unseen = hiding(nearest, across, np.ones(distance.shape))
-        blocked += inside * np.where(emitter < 0, np.maximum(seen, unseen), seen)
-    expected = np.where(distance > 0, np.maximum(1 - blocked, 0), 1)
+        blocked += inside * np.where(emitter < 0, np.maximum(seen, unseen), seen) * 512 / SAMPLES
+    kept = np.minimum(shared_by_four(blocked, surfaces, where), 4)
+    expected = np.where(distance > 0, np.clip(1 - mean_of_four(kept, surfaces, where), 0, 1), 1)
     found = flipped(frame, "disc")[..., 0]
     assert found.std() > 0.05
     assert np.mean(np.abs(found - expected) > 1e-3) < 0.02

@@ -44,14 +44,11 @@ def test_hemispheres_find_the_ray_traced_occlusion(
     assert rmse < 0.08
 
 
-@pytest.mark.parametrize(("case", "radius", "bound"), [(*case, 0.13 if case[1] == 0.8 else 0.1) for case in CASES])
-def test_discs_find_the_ray_traced_occlusion(
-    occlusion: Occlusion, shared: Path, case: str, radius: float, bound: float
-) -> None:
-    """The second case reaches farthest across the picture, and 64 samples leave gaps: its RMSE is 0.126."""
+@pytest.mark.parametrize(("case", "radius"), CASES)
+def test_discs_find_the_ray_traced_occlusion(occlusion: Occlusion, shared: Path, case: str, radius: float) -> None:
     correlation, rmse = errors(occlusion, shared, "disc", case, radius, samples=64)
-    assert correlation > 0.84
-    assert rmse < bound
+    assert correlation > 0.87
+    assert rmse < 0.095
 
 
 @pytest.mark.parametrize(("case", "radius"), CASES)
@@ -60,7 +57,7 @@ def test_more_samples_are_nearer(occlusion: Occlusion, shared: Path, case: str, 
         return [errors(occlusion, shared, technique, case, radius, samples=n, **params)[1] for n in (8, 32, 128)]
 
     few, some, many = falling("disc")
-    assert few > 1.1 * some > 1.1 * many
+    assert few > 1.07 * some > 1.07 * many
     few, some, many = falling("hemisphere", blur=0)
     assert few > 1.1 * some > many
 
