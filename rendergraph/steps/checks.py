@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rendergraph.declare import Made, Node, Part, Port
-from rendergraph.errors import Misuse, suggestion
+from rendergraph.errors import Misuse, nearest, suggestion
 from rendergraph.steps.model import UniformValue
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -176,10 +176,10 @@ def objects(value: object) -> str | tuple[str, ...]:
     """Which objects a geometry step draws."""
     known = ("all", "opaque", "transparent", "casters")
     if isinstance(value, str):
-        if value not in known:
-            near = suggestion(value, known, most=99)
-            raise Misuse(f"objects is '{value}'{near}; objects by name are given as a list, ['{value}']")
-        return value
+        near = nearest(value, known)
+        if near is not None and near != value:  # a name this close to a word is given as a list
+            raise Misuse(f"objects is '{value}'; did you mean '{near}'? An object of this name is ['{value}']")
+        return value if near == value else (value,)
     if not isinstance(value, list | tuple | set | frozenset) or not all(isinstance(name, str) for name in value):
         raise Misuse(f"objects is {shown(value)}; it is {', '.join(known)} or a list of objects' names")
     return tuple(value)

@@ -157,7 +157,7 @@ class Steps:
             view: a `Views` port, a `view` input or a texture that carries one; the node's connected `view` input, else
                 the pipeline's camera.
             view_index: which view of it, None where a geometry shader sets `gl_Layer`.
-            objects: `all`, `opaque`, `transparent`, `casters`, or object names.
+            objects: `all`, `opaque`, `transparent`, `casters`, an object's name or several.
             materials: what of the material the shader looks at.
             order: `front_to_back`, `back_to_front` or `scene`.
             per_light: one light's index, for a pass a light.

@@ -68,8 +68,8 @@ cameras:
 
 @pytest.mark.parametrize(
     ("objects", "drawn"),
-    [("'all'", (True, True)), ("['right']", (False, True)), ("('left', 'right')", (True, True)), ("[]", (False, False)),
-     ("'transparent'", (False, False))],
+    [("'all'", (True, True)), ("['right']", (False, True)), ("('left', 'right')", (True, True)),
+     ("'left'", (True, False)), ("[]", (False, False)), ("'transparent'", (False, False))],
 )  # fmt: skip
 def test_objects_by_kind_and_by_name(author: Any, gl: rg.Session, objects: str, drawn: tuple[bool, bool]) -> None:
     author.node(SELECTED.replace("{objects}", objects))

@@ -91,10 +91,7 @@ CALLS = {
         "RG420 TypeError: State.__init__() got an unexpected keyword argument 'culling'",
     # geometry
     'steps.geometry("wrong.frag", objects="transparnt")':
-        "RG423 objects is 'transparnt'; did you mean 'transparent'?; objects by name are given as a list, ['transparnt']",
-    'steps.geometry("wrong.frag", objects="teapot")':
-        "RG423 objects is 'teapot'; there is all, casters, opaque, transparent; objects by name are given as a list, "
-        "['teapot']",
+        "RG423 objects is 'transparnt'; did you mean 'transparent'? An object of this name is ['transparnt']",
     'steps.geometry("wrong.frag", objects=3)':
         "RG423 objects is 3; it is all, opaque, transparent, casters or a list of objects' names",
     'steps.geometry("wrong.frag", materials="all")': "RG423 materials is 'all'; there is alpha, full, none",
