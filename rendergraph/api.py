@@ -61,9 +61,10 @@ from rendergraph.textures import (
 )  # fmt: skip
 
 __all__ = [
-    "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Albedo", "Any", "Blend", "Choice", "Depth", "DisplayColor", "Emissive", "Extension", "Facts",
-    "Frame", "Function", "History", "InOut", "Input", "Internal", "IrradianceSH", "LightFacts", "LinearDepth",
-    "Luminance", "Material", "MeshData", "Node", "Normal", "Occlusion", "Output", "Part", "Port", "Radiance", "SceneRef",
-    "Semantic", "ShadowLookup", "ShadowMap", "Signature", "State", "Stencil", "StencilFace", "Steps", "TextureDesc",
-    "TextureInfo", "View", "ViewMatrices", "Views", "Visibility", "define", "full_mip_count", "param", "structural",
+    "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Albedo", "Any", "Blend", "Choice", "Depth", "DisplayColor",
+    "Emissive", "Extension", "Facts", "Frame", "Function", "History", "InOut", "Input", "Internal", "IrradianceSH",
+    "LightFacts", "LinearDepth", "Luminance", "Material", "MeshData", "Node", "Normal", "Occlusion", "Output", "Part",
+    "Port", "Radiance", "SceneRef", "Semantic", "ShadowLookup", "ShadowMap", "Signature", "State", "Stencil",
+    "StencilFace", "Steps", "TextureDesc", "TextureInfo", "View", "ViewMatrices", "Views", "Visibility", "define",
+    "full_mip_count", "param", "structural",
 ]  # fmt: skip
