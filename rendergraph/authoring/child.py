@@ -12,6 +12,7 @@ import os
 import resource
 import signal
 import sys
+import traceback
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -49,15 +50,15 @@ def main() -> None:
         from rendergraph.authoring.examine import examine_file
 
         plugins = [Path(plugin) for plugin in asked["plugins"]]
-        scene = Path(asked["scene"]) if asked["scene"] else None
-        report = examine_file(file, plugins, scene, lambda stage, what: send(stage=stage, what=what))
+        report = examine_file(file, plugins, asked["scene"], lambda stage, what: send(stage=stage, what=what))
         problems = [asdict(_shown(problem)) for problem in report.problems]
         send(report={"node": report.node, "variants": report.variants, "problems": problems})
     except RendergraphError as error:
         found = [_memory(file, asked["memory"], error) or problem for problem in error.problems]
         send(failed=[asdict(_shown(problem)) for problem in dict.fromkeys(found)], exit_code=error.exit_code)
     except BaseException as error:  # whatever a stranger's code can raise, and our own mistakes
-        send(failed=[asdict(_memory(file, asked["memory"], error) or _other(file, error))], exit_code=3)
+        memory = _memory(file, asked["memory"], error)
+        send(**{"failed": [asdict(memory)], "exit_code": 3} if memory else _other(file, error))
     leave(0)  # no handlers and threads of a stranger's at the end
 
 
@@ -75,9 +76,10 @@ def _memory(file: Path, limit: int, error: BaseException) -> Problem | None:
     return Problem(OUT_OF_MEMORY, text, line_through(error, file))
 
 
-def _other(file: Path, error: BaseException) -> Problem:
-    if isinstance(error, SystemExit):
-        text = f"it ends the process: sys.exit({error.code!r}); a node raises an exception instead"
-    else:
-        text = f"it raises {type(error).__name__}: {' '.join(str(error).split())[:300]}"
-    return Problem(ENDED, text, line_through(error, file))
+def _other(file: Path, error: BaseException) -> dict[str, Any]:
+    """What to send for anything else: the author's where it came through the author's lines, else our own mistake."""
+    place = line_through(error, file)
+    if not place.line:
+        return {"mistake": "".join(traceback.format_exception(error))}
+    text = f"it raises {type(error).__name__}: {' '.join(str(error).split())[:300]}"
+    return {"failed": [asdict(Problem(ENDED, text, place))], "exit_code": 3}

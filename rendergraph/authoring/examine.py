@@ -19,7 +19,7 @@ Tell = Callable[[str, str], None]
 """Called with the stage, `import` or `pass`, and what is about to be done."""
 
 
-def examine_file(file: Path, plugins: Sequence[Path], scene: Path | None, tell: Tell) -> Report:
+def examine_file(file: Path, plugins: Sequence[Path], scene: str | None, tell: Tell) -> Report:
     """Find the node of a file and examine it.
 
     Raises:
@@ -36,8 +36,6 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
         InputError: there is none, or it cannot be loaded.
     """
     file = file.resolve()
-    if not file.is_file():
-        raise InputError(Problem("RG011", f"there is no file '{file}'", Place(shown_file(file))))
     catalog = Catalog.discover(plugins)
     if file.stem in catalog:
         found = catalog.get(file.stem)
@@ -52,7 +50,7 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
         return Catalog.discover(named, installed=False).get(file.stem)  # the installed one is an older copy of it
 
 
-def examine(node: NodeType, scene: Path = SCENE, tell: Tell = lambda stage, what: None) -> Report:
+def examine(node: NodeType, scene: str = SCENE, tell: Tell = lambda stage, what: None) -> Report:
     """Examine a type in every variant.
 
     Raises:
@@ -62,6 +60,7 @@ def examine(node: NodeType, scene: Path = SCENE, tell: Tell = lambda stage, what
     with tempfile.TemporaryDirectory() as folder:
         tell("pass", "default")
         trial = Trial(node, Path(folder), scene)
+        trial.check_scene()
         for name in trial.around.unfed:
             text = f"nothing can be made up for input '{name}'; what needs it is not tried"
             problems.append(Problem("RG459", text, port_place(node, name), severity="warning"))

@@ -88,7 +88,7 @@ class Surrounded:
         found = {entry.name: entry for entry in (self.checked, *self.sources.values(), *self.readers.values())}
         return Catalog({}, found) if extensions is None else Catalog({}, found, extensions)
 
-    def pipeline(self, variant: Variant, scene: Path) -> dict[str, Any]:
+    def pipeline(self, variant: Variant, scene: str) -> dict[str, Any]:
         """A pipeline file of one variant, as plain values; outputs are the node's, then what feeds it."""
         cls, node = self.checked.cls, self.checked.name
         nodes: dict[str, Any] = {}
@@ -111,9 +111,9 @@ class Surrounded:
             else:
                 nodes[reader.name] = {"type": reader.name, "inputs": {"read": f"{node}.{name}"}}
                 outputs[f"to_{name}"] = f"{reader.name}.made"
-        return {"rendergraph": 1, "size": list(SIZE), "scene": str(scene), "nodes": nodes, "outputs": outputs}
+        return {"rendergraph": 1, "size": list(SIZE), "scene": scene, "nodes": nodes, "outputs": outputs}
 
-    def write(self, variant: Variant, scene: Path) -> Path:
+    def write(self, variant: Variant, scene: str) -> Path:
         """The pipeline of a variant as a file; JSON is YAML."""
         file = self.folder / "check.yaml"
         file.write_text(json.dumps(self.pipeline(variant, scene)), encoding="utf-8")

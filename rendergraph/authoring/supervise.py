@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rendergraph.authoring.report import Report
+from rendergraph.catalog.types import SHADERS
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, shown_file
 
 _ERRORS = {1: RenderError, 3: InputError, 5: DeviceError}
@@ -48,25 +49,28 @@ class Limits:
 
 
 def check_node(
-    file: Path, *, plugins: Sequence[Path] = (), scene: Path | None = None, limits: Limits = Limits()
+    file: Path, *, plugins: Sequence[Path] = (), scene: str | None = None, limits: Limits = Limits()
 ) -> Report:
     """Examine the node of a file in a child process.
 
     Args:
         file: a Python module or a shader file.
         plugins: further plugins that it needs.
-        scene: what geometry nodes draw; one that has something of everything by default.
+        scene: what geometry nodes draw, a shipped name or a file; one that has something of everything by default.
         limits: what it may take.
 
     Raises:
         InputError: it cannot be loaded, ends or crashes its process, hangs, or takes too much memory.
         DeviceError: there is no usable GL device.
     """
+    if file.suffix not in (".py", *SHADERS) or file.is_dir():
+        kinds = f"a Python module or a shader file ({', '.join(SHADERS)})"
+        raise InputError(Problem("RG461", f"'{file}' is no node; name the file of one: {kinds}"))
     if not file.is_file():
-        raise InputError(Problem("RG011", f"there is no file '{file}'", Place(str(file))))
+        raise InputError(Problem("RG011", f"there is no file '{file}'"))
     asked = {
         "file": str(file.resolve()), "plugins": [str(plugin.resolve()) for plugin in plugins],
-        "scene": str(scene.resolve()) if scene else None, "memory": limits.memory,
+        "scene": str(Path(scene).resolve()) if scene and re.search(r"[./]", scene) else scene, "memory": limits.memory,
     }  # fmt: skip
     with _Child(asked, limits) as child:
         return child.report()
@@ -132,6 +136,8 @@ class _Child:
                 found = event["report"]
                 problems = tuple(map(_problem, found["problems"]))
                 return Report(found["node"], tuple(found["variants"]), problems)
+            elif "mistake" in event:
+                raise RuntimeError(event["mistake"])  # ours
             else:
                 raise _ERRORS[event["exit_code"]]([_problem(entry) for entry in event["failed"]])
         raise InputError(self._ended())

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import rendergraph as rg
 from rendergraph.authoring.feed import Surrounded
 from rendergraph.authoring.gl_watch import let_go, living, watched
 from rendergraph.authoring.places import causes, declared_at, line_through, port_place
@@ -19,7 +18,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import Draw
 from rendergraph.compile.views import FIXED_BLOCKS
 from rendergraph.declare import Node
-from rendergraph.errors import Place, Problem, RendergraphError, shown_file
+from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
 from rendergraph.execute import Runner
 from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
@@ -27,10 +26,11 @@ from rendergraph.gl.textures import Clear
 from rendergraph.program import prefix
 from rendergraph.resources import folder
 from rendergraph.scene.cameras import view_matrices
+from rendergraph.session import Pipeline, Session, load
 from rendergraph.steps import Step
 from rendergraph.textures import FORMATS, BufferDesc
 
-SCENE = Path(__file__).parent / "scene.yaml"
+SCENE = str(Path(__file__).parent / "scene.yaml")
 FRAMES = 2
 _POISON = {  # by family, two values that a texel may hold before a pass; what differs afterwards was never written
     "float": (float("nan"), 0.7319), "unorm": (0.25, 0.75), "snorm": (-0.25, 0.75), "depth": (0.25, 0.75),
@@ -54,7 +54,7 @@ class Trial:
 
     type: NodeType
     folder: Path
-    scene: Path = SCENE
+    scene: str = SCENE
     seen: set[str] = field(default_factory=set)
     files: set[Path] = field(default_factory=set)
     written: set[str] = field(default_factory=set)
@@ -65,7 +65,7 @@ class Trial:
         self.device: Device = open_device()
         let_go(self.device)
         self._before = living(self.device, _MOST_NAMES)
-        self.session = rg.Session(ctx=self.device.ctx)
+        self.session = Session(ctx=self.device.ctx)
         cls = watched(self.type.cls, self.session.device, self._state)
         self.around = Surrounded(replace(self.type, cls=cls), self.folder)
         self._fed: dict[str, npt.NDArray[Any]] = {}
@@ -87,7 +87,7 @@ class Trial:
                     self.run(replace(variant, outputs=rest))
                 return
             for problem in error.problems:
-                self.say(replace(problem, place=self._own(problem.place, error), severity="error"))
+                self.say(self._own(problem, error))
         else:
             self.written |= set(variant.outputs)
 
@@ -95,6 +95,20 @@ class Trial:
         """Whether an error says that the node did not write an output in this variant."""
         shows = f"'{self.type.name}.{output}'"
         return any(problem.code == "RG604" and shows in problem.text for problem in error.problems)
+
+    def check_scene(self) -> None:
+        """Read the scene, which is no matter of the node's.
+
+        Raises:
+            InputError: it is missing or wrong.
+        """
+        try:
+            pipeline = self._pipeline(Variant(""))
+            if pipeline.spec.problems:
+                raise InputError(pipeline.spec.problems)  # of a file that is ours but for the scene's name
+            _ = pipeline.scene
+        except InputError as error:
+            raise InputError([self._own(problem, None) for problem in error.problems]) from None
 
     def close(self) -> list[Problem]:
         """Free everything; what is left then is the node's.
@@ -137,8 +151,7 @@ class Trial:
     # Running ----------------------------------------------------------------------------------------------------------
 
     def _run(self, variant: Variant) -> None:
-        file = self.around.write(variant, self.scene)
-        pipeline = replace(rg.load(file, asset_roots=[self.scene.parent]), known_catalog=self.around.catalog())
+        pipeline = self._pipeline(variant)
         with self.session.device.current():
             runner = self.session.prepare(pipeline, alias=False)
             steps = [c for c in runner.executable.steps[0] if self._is_own(c.step)]
@@ -149,6 +162,10 @@ class Trial:
             drawn = [self._draw(pipeline, runner, number) for number in (0, 1)]
         self._compare(variant, *drawn)
 
+    def _pipeline(self, variant: Variant) -> Pipeline:
+        file = self.around.write(variant, self.scene)
+        return replace(load(file, asset_roots=[Path(self.scene).parent]), known_catalog=self.around.catalog())
+
     def _note_files(self, step: Step) -> None:
         names = [name for _, name in step.shaders] if step.node == self.type.name else []
         names += [function.shader for function in step.functions if function.node == self.type.name]
@@ -158,7 +175,7 @@ class Trial:
     def _is_own(self, step: Step) -> bool:
         return step.node == self.type.name or any(f.node == self.type.name for f in step.functions)
 
-    def _draw(self, pipeline: rg.Pipeline, runner: Runner, number: int) -> dict[str, npt.NDArray[Any]]:
+    def _draw(self, pipeline: Pipeline, runner: Runner, number: int) -> dict[str, npt.NDArray[Any]]:
         """All outputs, after every texture was filled with a poison."""
         executable = runner.executable
         plan, memory, device = executable.plan, executable.memory, self.session.device
@@ -239,18 +256,19 @@ class Trial:
     def _state(self, sentence: str) -> None:
         self.say(Problem("RG456", sentence, self.port_place(sentence.split("'")[1])))
 
-    def _own(self, place: Place | None, error: RendergraphError) -> Place:
-        """A place in the author's files instead of one in the surroundings'."""
-        if place is not None and not Path(place.file).resolve().is_relative_to(self.folder.resolve()):
-            return place
-        return line_through(error, self.type.file)
+    def _own(self, problem: Problem, error: RendergraphError | None) -> Problem:
+        """The same at a place in the author's files instead of one in the surroundings'."""
+        if problem.place is not None and not Path(problem.place.file).resolve().is_relative_to(self.folder.resolve()):
+            return problem
+        return replace(problem, place=line_through(error, self.type.file) if error else None, line_text="")
 
     def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:
         met = list(dict.fromkeys(names))
         if len(met) >= len(self.tried) or met[:1] == ["default"]:
             return problem
         more = f" and {len(met) - 3} more" if len(met) > 3 else ""
-        return replace(problem, text=f"{problem.text} (with {', '.join(met[:3])}{more})")
+        word = "" if met[0].startswith("without ") else "with "
+        return replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
 
 
 def _texels(flags: npt.NDArray[np.bool_], array: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

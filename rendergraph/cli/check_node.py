@@ -14,7 +14,7 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 
 @click.command("check-node", no_args_is_help=True)
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--scene", type=click.Path(path_type=Path), metavar="FILE", help="Draw this scene file.")
+@click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb.")
 @click.option(
     "--limit", "limits", multiple=True, type=options.LIMIT,
     help="Allow it more or less: import-seconds (10), pass-seconds (30), memory in MiB (2048).",
@@ -22,7 +22,7 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 @options.plugin_option
 @options.json_option
 def command(
-    file: Path, scene: Path | None, limits: tuple[tuple[str, int], ...], plugins: tuple[Path, ...], as_json: bool
+    file: Path, scene: str | None, limits: tuple[tuple[str, int], ...], plugins: tuple[Path, ...], as_json: bool
 ) -> None:
     """Try a node, a Python module or a shader file, in every variant.
 

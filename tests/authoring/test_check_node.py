@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import yaml
 
 from rendergraph.authoring import KINDS, Limits, check_node, new_node
 from rendergraph.cli.app import main
 from rendergraph.errors import InputError, RendergraphError
+from rendergraph.resources import folder
 
 HEAD = "from rendergraph.api import Any, Frame, Input, Internal, Node, Output, Radiance, Steps, Views, define, param\n"
 GOOD = (
@@ -111,6 +113,7 @@ HOSTILE = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_import_is_one_message(check: Check, name: str) -> None:
     python, message = HOSTILE[name]
@@ -159,6 +162,7 @@ RUNNING = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING)
 def test_a_hostile_pass_is_one_message(check: Check, name: str) -> None:
     python, message = RUNNING[name]
@@ -187,6 +191,7 @@ SHADERS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHADERS)
 def test_a_wrong_shader_is_one_message(check: Check, name: str) -> None:
     shader, message = SHADERS[name]
@@ -263,6 +268,46 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert main(["check-node", "slow.py", "--limit", "patience=3"]) == 2
 
 
-def test_a_plugin_that_is_needed_can_be_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="RG011 there is no"):
-        check_node(tmp_path / "nowhere.py")
+def test_a_module_may_use_helpers_beside_it_and_lie_in_a_package(tmp_path: Path) -> None:
+    for place in ("nodes/light", "shaders/light"):
+        (tmp_path / place).mkdir(parents=True)
+    helper = GOOD.replace("class Glow", "class _Glow")
+    (tmp_path / "nodes" / "light" / "_shared.py").write_text(helper)
+    python = 'from ._shared import _Glow\n\n\nclass Glow(_Glow):\n    """Everything brighter."""\n'
+    (tmp_path / "nodes" / "light" / "glow.py").write_text(python)
+    (tmp_path / "shaders" / "light" / "glow.frag").write_text(SHADER)
+    assert check_node(tmp_path / "nodes" / "light" / "glow.py").problems == ()
+    (tmp_path / "nodes" / "light" / "_shared.py").write_text(helper.replace("More of it.", "more"))
+    (problem,) = check_node(tmp_path / "nodes" / "light" / "glow.py").problems
+    assert problem.place is not None
+    assert (Path(problem.place.file).name, problem.place.line) == ("_shared.py", 8)
+
+
+def test_what_is_not_there() -> None:
+    with pytest.raises(InputError, match=r"RG011 there is no file 'nowhere.py'"):
+        check_node(Path("nowhere.py"))
+    page = yaml.safe_load((folder("rendergraph.errors") / "RG461-check-not-a-node.yaml").read_text(encoding="utf-8"))
+    with pytest.raises(InputError) as caught:
+        check_node(Path("vignette.yaml"))
+    assert str(caught.value) == page["message"]
+    with pytest.raises(InputError, match="RG461"):
+        check_node(Path())
+
+
+def test_a_scene_of_ones_own(tmp_path: Path) -> None:
+    new_node("edges", "geometry", where=tmp_path)
+    assert check_node(tmp_path / "edges.py", scene="shadow_study").problems == ()
+    with pytest.raises(InputError, match=r"\ARG015 there is no shipped scene 'nowhere'; there is [\w, ]+\Z"):
+        check_node(tmp_path / "edges.py", scene="nowhere")
+
+
+def test_pages_of_what_ends_a_check_tell_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for file in sorted(folder("rendergraph.errors").glob("RG45[0-3]-*.yaml")):
+        page = yaml.safe_load(file.read_text(encoding="utf-8"))
+        Path("blur.py").write_text(page["wrong"])
+        limits = Limits(import_seconds=1) if page["code"] == "RG452" else Limits()
+        with pytest.raises(InputError) as caught:
+            check_node(Path("blur.py"), limits=limits)
+        said = str(caught.value.problems[0]).replace("longer than 1 s", "longer than 10 s")
+        assert said == page["message"]
