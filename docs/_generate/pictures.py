@@ -112,7 +112,7 @@ def shipped(scenes: bool = False) -> list[Path]:
     return sorted(files, key=lambda file: "\nextends:" in file.read_text(encoding="utf-8"))
 
 
-SCENES = ("shadow_study", "cornell_box", "many_lights")
+SCENES = ("shadow_study", "cornell_box", "many_lights", "glass")
 """Scenes for the pictures of nodes; the first one unless another shows more."""
 
 
