@@ -103,7 +103,7 @@ class Trial:
             InputError: it is missing or wrong.
         """
         try:
-            pipeline = self._pipeline(Variant(""))
+            pipeline = self._pipeline(Variant("", outputs=tuple(self.type.cls.outputs())))
             if pipeline.spec.problems:
                 raise InputError(pipeline.spec.problems)  # of a file that is ours but for the scene's name
             _ = pipeline.scene
