@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rendergraph.errors import Problem
+from rendergraph.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rendergraph.errors import Place, Problem, RenderError
+from rendergraph.records import dataclass
 
 CHECKSUM = "sha256"
 

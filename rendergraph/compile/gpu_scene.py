@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import moderngl
@@ -17,6 +17,7 @@ from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
+from rendergraph.records import dataclass
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, Material, Scene, Texture
 from rendergraph.scene.pack import PackedScene

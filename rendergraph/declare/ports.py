@@ -6,10 +6,11 @@ Sizes, formats and counts may be constants or functions `(node, facts)`; `Facts`
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Literal, TypeAlias, TypeVar
 
 from rendergraph.declare.facts import Facts
+from rendergraph.records import dataclass
 from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wrap
 
 T = TypeVar("T")

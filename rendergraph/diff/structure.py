@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.link import Endpoint, Graph, GraphNode
+from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan

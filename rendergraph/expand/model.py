@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from rendergraph.declare import TextureInfo
+from rendergraph.records import dataclass
 from rendergraph.steps import Resource, Step
 
 CAMERA = "camera"

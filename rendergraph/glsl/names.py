@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
+
+from rendergraph.records import dataclass
 
 Role = Literal["uniform", "in", "out", "buffer", "block", "function", "struct", "variable", "macro"]
 

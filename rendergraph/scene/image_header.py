@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from rendergraph.records import dataclass
 
 HEAD_BYTES = 1 << 20
 READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from rendergraph.records import dataclass
 from rendergraph.views.cards import Link
 
 SWEEPS = 8
