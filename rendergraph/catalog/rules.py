@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rendergraph.declare import Facts, SizeRule
+from rendergraph.declare import Facts, Ruled, SizeRule
 from rendergraph.document import Value
 
 
-def number_rule(value: Value) -> Any:
+def number_rule(value: Value) -> Ruled[int]:
     """A whole number, or the value of a structural parameter."""
     if not isinstance(value.data, str):
-        return value.data
+        return int(value.data)  # type: ignore[arg-type]  # the header's reader saw a number
     name = value.data[1:]
     return lambda node, facts: int(getattr(node, name))
 

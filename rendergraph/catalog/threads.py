@@ -87,7 +87,7 @@ def _threads(entries: Entries) -> Threads:
 
 def _counted(said: Value) -> Threads:
     rules = [number_rule(part) for part in (said.data if isinstance(said.data, list) else [said])]
-    return lambda node, steps: tuple(int(rule(node, steps.facts)) if callable(rule) else int(rule) for rule in rules)
+    return lambda node, steps: tuple(rule if isinstance(rule, int) else rule(node, steps.facts) for rule in rules)
 
 
 def _texels(port: Port, steps: Steps) -> tuple[int, ...]:

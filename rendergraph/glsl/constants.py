@@ -13,6 +13,8 @@ _NUMBER = re.compile(r"(?:0[xX][0-9a-fA-F]+|\d+)[uU]?\Z|(?:\d+\.?\d*|\.\d+)(?:[e
 _BEGUN = re.compile(r"(?!0[xX])[\d.]+[eE]\Z")
 _VECTOR = re.compile(r"([iub]?)vec([234])\Z")
 _DEEPEST = 100
+_MOST_WORDS = 1000
+_LARGEST = 1e38  # what 32 bits hold
 
 
 def constant(words: Sequence[str], known: Mapping[str, Constant] = {}) -> Constant:
@@ -25,10 +27,12 @@ def constant(words: Sequence[str], known: Mapping[str, Constant] = {}) -> Consta
     Raises:
         ValueError: it is more than numbers, constructors, `+ - * /` and known names.
     """
+    if len(words) > _MOST_WORDS:
+        raise ValueError("it is too long")
     reader = _Reader(_joined(words), known)
     value = reader.sum(0)
-    if reader.rest:
-        raise ValueError(f"'{reader.rest[0]}' is not expected there")
+    if reader.next:
+        raise ValueError(f"'{reader.next}' is not expected there")
     return value
 
 
@@ -47,35 +51,47 @@ class _Reader:
     """Recursive descent over the tokens."""
 
     def __init__(self, words: list[str], known: Mapping[str, Constant]) -> None:
-        self.rest = words
+        self.words = words
         self.known = known
+        self.at = 0
+
+    @property
+    def next(self) -> str:
+        """The token that comes next, empty at the end."""
+        return self.words[self.at] if self.at < len(self.words) else ""
+
+    def taken(self, *signs: str) -> str:
+        """The next token if it is one of these, and then it is behind us; empty otherwise."""
+        word = self.next
+        if word not in signs:
+            return ""
+        self.at += 1
+        return word
 
     def take(self, word: str) -> None:
-        if not self.rest or self.rest[0] != word:
+        if not self.taken(word):
             raise ValueError(f"'{word}' is missing")
-        self.rest = self.rest[1:]
 
     def sum(self, depth: int) -> Constant:
         value = self.product(depth)
-        while self.rest and self.rest[0] in "+-":
-            sign, self.rest = self.rest[0], self.rest[1:]
+        while sign := self.taken("+", "-"):
             value = _combined(sign, value, self.product(depth))
         return value
 
     def product(self, depth: int) -> Constant:
         value = self.factor(depth)
-        while self.rest and self.rest[0] in "*/":
-            sign, self.rest = self.rest[0], self.rest[1:]
+        while sign := self.taken("*", "/"):
             value = _combined(sign, value, self.factor(depth))
         return value
 
     def factor(self, depth: int) -> Constant:
         if depth > _DEEPEST:
             raise ValueError("it is nested too deeply")
-        if not self.rest:
+        word = self.next
+        self.at += 1
+        if not word:
             raise ValueError("a value is missing")
-        word, self.rest = self.rest[0], self.rest[1:]
-        if word in "+-":
+        if word in ("+", "-"):
             value = self.factor(depth + 1)
             return value if word == "+" else _combined("*", -1, value)
         if word == "(":
@@ -86,11 +102,11 @@ class _Reader:
             return word == "true"
         if _NUMBER.match(word):
             return _number(word)
-        if (vector := _VECTOR.match(word)) or word in ("float", "int", "uint", "bool"):
-            parts = self.arguments(depth + 1)
-            if vector:
-                return _vector(parts, vector[1], int(vector[2]))
-            return _scalar(parts, word)
+        vector = _VECTOR.match(word)
+        if vector:
+            return _vector(self.arguments(depth + 1), vector[1], int(vector[2]))
+        if word in ("float", "int", "uint", "bool"):
+            return _scalar(self.arguments(depth + 1), word)
         if word in self.known:
             return self.known[word]
         raise ValueError(f"the value of '{word}' is not known")
@@ -102,15 +118,16 @@ class _Reader:
         while True:
             value = self.sum(depth)
             parts += value if isinstance(value, tuple) else (value,)
-            if self.rest[:1] != [","]:
+            if not self.taken(","):
                 break
-            self.rest = self.rest[1:]
         self.take(")")
         return parts
 
 
 def _number(word: str) -> int | float:
     plain = word.lower()
+    if len(word) > 100:
+        raise ValueError("it is too long")
     if plain.startswith("0x"):
         return int(plain.rstrip("u"), 16)
     if plain.rstrip("u").isdigit():
@@ -151,7 +168,10 @@ def _combined(sign: str, a: Constant, b: Constant) -> Constant:
         if isinstance(a, int) and isinstance(b, int):
             return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
         return a / b
-    return a * b if sign == "*" else a + b if sign == "+" else a - b
+    value = a * b if sign == "*" else a + b if sign == "+" else a - b
+    if abs(value) > _LARGEST:  # whole numbers would grow without end
+        raise ValueError("it is too large")
+    return value
 
 
 def _number_of(value: Constant) -> float:

@@ -60,9 +60,13 @@ def test_what_is_no_constant_is_refused(text: str) -> None:
         constant(tokens(text))
 
 
-def test_nesting_has_an_end() -> None:
+def test_everything_has_an_end() -> None:
     with pytest.raises(ValueError, match="nested too deeply"):
-        constant(["("] * 10_000)
+        constant(["("] * 1000)
+    with pytest.raises(ValueError, match="too long"):
+        constant(["1", "+"] * 10_000)
+    squares = "#define A0 99999\n" + "\n".join(f"#define A{n + 1} A{n}*A{n}" for n in range(100))
+    assert list(globals_of(squares).constants) == ["A0", "A1", "A2"]
 
 
 @given(st.floats(min_value=-1e30, max_value=1e30), st.sampled_from(["", "f", "F"]))
