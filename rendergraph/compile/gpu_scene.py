@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import field
 from typing import Any
 
@@ -171,6 +170,8 @@ class GpuScene:
         missing = list(dict.fromkeys((t.image, t.srgb) for t in wanted if (t.image, t.srgb) not in self._images))
         if not missing:
             return
+        from concurrent.futures import ThreadPoolExecutor
+
         with ThreadPoolExecutor() as pool:
             for key, pixels in zip(missing, pool.map(lambda k: self.decode(*k), missing), strict=True):
                 self._images[key] = self._upload(pixels, srgb=key[1])

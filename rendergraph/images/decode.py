@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -139,6 +138,8 @@ def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
         path = os.path.abspath(source.path)
         if source.data is not None or Path(path).suffix.lower() != kind:
             # OpenImageIO chooses the decoder by the extension and reads no memory: give the file the name it deserves.
+            import tempfile
+
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))
             named = Path(folder, f"image{kind}")
             if source.data is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -33,7 +32,7 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
         RenderError: flushing or renaming failed.
     """
     targets = [Path(os.path.realpath(path)) for path in paths]
-    temporary = [target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part") for target in targets]
+    temporary = [target.with_name(f".{target.name[:100]}.{os.urandom(4).hex()}.part") for target in targets]
     try:
         yield temporary
         try:
