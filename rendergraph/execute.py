@@ -110,7 +110,10 @@ class FrameContext:
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline
-        data = np.ascontiguousarray(values).tobytes()
+        array = np.ascontiguousarray(values)
+        if array.dtype.kind not in "biuf":
+            raise Misuse(f"write is given {type(values).__name__} of {array.dtype}, not an array of numbers", "RG433")
+        data = array.tobytes()
         buffer = self.executable.memory.buffer(name)
         if len(data) > buffer.size:
             raise Misuse(f"it writes {len(data)} bytes into '{port.name}', which holds {buffer.size}", "RG432")

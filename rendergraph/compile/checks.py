@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.gl.programs import Program
+from rendergraph.gl.programs import Program, Uniform, outputs_of
 from rendergraph.program import StageText, declared_at
 from rendergraph.steps import Read, Step, Write
 
@@ -19,27 +19,94 @@ Texts = Callable[[], Mapping[str, StageText]]
 
 
 def check_uniforms(
-    step: Step, program: Program, uniforms: Mapping[str, Any], sampled: set[str], geometry: bool, texts: Texts
+    step: Step, program: Program, uniforms: Mapping[str, Any], sampled: Collection[str], texts: Texts
 ) -> None:
     """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0.
 
+    Args:
+        step: a step.
+        program: its program.
+        uniforms: what it sets.
+        sampled: the names of the textures that it binds.
+        texts: see `Texts`.
+
     Raises:
-        InputError: the program looks at something that the step does not give (RG430, RG434).
+        InputError: the program looks at something that the step does not give (RG430, RG434), or takes other
+            numbers than it is given (RG436).
     """
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
     images = {use.name for use in uses if use.use == "image"}
     files = ", ".join(file for _, file in step.shaders)
     problems = []
     for name, uniform in program.uniforms.items():
-        known = name in sampled or name in images or name in uniforms or (geometry and name.endswith("_texture"))
         if not uniform.opaque and name not in uniforms:
             hint = suggestion(name, [known for known, _ in step.uniforms])
             text = f"{files} looks at uniform '{name}', which nothing sets{hint}"
             problems.append(_placed(step.problem("RG434", text), name, texts))
-        elif uniform.opaque and not known:
+        elif uniform.opaque and name not in images and name not in sampled:
+            slot = name.endswith("_texture") and step.kind == "geometry"
+            guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
             text = (f"{files} samples '{name}', but the step reads no texture of that name; "
-                    f"it reads {', '.join(sorted(sampled)) or 'none'}")  # fmt: skip
+                    f"it reads {', '.join(sorted(sampled)) or 'none'}{guard}")  # fmt: skip
             problems.append(_placed(step.problem("RG430", text), name, texts))
+        elif not uniform.opaque and (wrong := misfit(uniform, uniforms[name])) is not None:
+            problems.append(_placed(step.problem("RG436", f"{files} {wrong}"), name, texts))
+    if problems:
+        raise InputError(problems)
+
+
+def misfit(uniform: Uniform, value: Any) -> str | None:
+    """What a uniform and the value that it is given disagree about: the driver would read beyond the numbers."""
+    numbers = value if isinstance(value, tuple | list) else (value,)
+    if len(numbers) % uniform.numbers or not 1 <= len(numbers) // uniform.numbers <= uniform.size:
+        array = f"[{uniform.size}]" if uniform.size > 1 else ""
+        count = f"{len(numbers)} number{'' if len(numbers) == 1 else 's'}"
+        return f"declares '{uniform.name}' as {uniform.glsl}{array}, but it is given {count}"
+    if uniform.whole and any(isinstance(number, float) for number in numbers):
+        return f"declares '{uniform.name}' as {uniform.glsl}, but it is given floats, {numbers[0]!r}"
+    return None
+
+
+def check_blocks(step: Step, program: Program, given: Collection[str], texts: Texts) -> None:
+    """A buffer that nothing is bound to would be written nowhere, or over another node's.
+
+    Raises:
+        InputError: the program has a block that the step does not give (RG430).
+    """
+    files = ", ".join(file for _, file in step.shaders)
+    own = sorted(use.name for use in (*step.all_reads, *step.writes) if use.use == "buffer")
+    problems = [
+        _placed(
+            step.problem(
+                "RG430",
+                f"{files} looks at block '{name}', but the step has no buffer of that name; it has "
+                f"{', '.join(own) or 'none'}",
+            ),
+            name,
+            texts,
+        )
+        for name in (*program.storage, *program.blocks)
+        if name not in given
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def check_outputs(step: Step, program: Program, outputs: Sequence[str]) -> None:
+    """A target that the shader does not write would hold what was there before.
+
+    Raises:
+        InputError: there is such a target (RG437).
+    """
+    if len(outputs) < 2:
+        return  # a single one may have any name, and may be discarded everywhere
+    written = outputs_of(program) - {"gl_FragDepth", "gl_SampleMask"}
+    shader = dict(step.shaders).get("fragment", "the step")
+    problems = [
+        step.problem("RG437", f"{shader} writes no output '{name}'{suggestion(name, written - set(outputs))}")
+        for name in outputs
+        if name not in written
+    ]
     if problems:
         raise InputError(problems)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import Any
 
@@ -10,7 +10,15 @@ import moderngl
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
-from rendergraph.compile.checks import Texts, attribute_formats, check_attributes, check_uniforms, layout_for
+from rendergraph.compile.checks import (
+    Texts,
+    attribute_formats,
+    check_attributes,
+    check_blocks,
+    check_outputs,
+    check_uniforms,
+    layout_for,
+)
 from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, SortedDraws, step_uniforms
 from rendergraph.compile.geometry import Batch, GeometryCompiler
 from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
@@ -190,7 +198,7 @@ class _Compiler:
         defines = {"PASS_VIEW_COUNT": str(self._view_count(step)), **self.scene.defines}
 
         def make(batch: Batch) -> Draw:
-            program, binds, uniforms = self._program(step, {**defines, **batch.defines}, geometry=True)
+            program, binds, uniforms = self._program(step, {**defines, **batch.defines}, materials=batch.textures)
             check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **batch.defines}))
             for slot, (texture, sampler) in batch.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
@@ -273,7 +281,7 @@ class _Compiler:
         return max(1, self.view_tables[step.view or CAMERA].count)
 
     def _program(
-        self, step: Step, defines: Mapping[str, str], *, geometry: bool = False
+        self, step: Step, defines: Mapping[str, str], *, materials: Collection[str] = ()
     ) -> tuple[Program, list[Call], dict[str, Any]]:
         """The program of a step with blocks bound and samplers given units."""
         outputs = [write.name for write in step.writes if write.use == "color"]
@@ -307,9 +315,10 @@ class _Compiler:
             if before + read.name in program.uniforms:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
-        check_uniforms(
-            step, program, uniforms, sampled, geometry, self._texts(step, macros)
-        )
+        texts = self._texts(step, macros)
+        check_uniforms(step, program, uniforms, {*sampled, *materials}, texts)
+        check_blocks(step, program, blocks, texts)
+        check_outputs(step, program, outputs)
         return program, binds, uniforms
 
     def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import field, replace
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 from rendergraph.declare.facts import Facts
 from rendergraph.records import dataclass
+from rendergraph.errors import Misuse, suggestion
 from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wrap
 
 T = TypeVar("T")
@@ -19,6 +20,14 @@ Ruled: TypeAlias = "T | Callable[[Any, Facts], T]"
 
 SizeRule: TypeAlias = "float | tuple[int, int] | str | tuple[str, float] | Callable[[Any, Facts], tuple[int, int]]"
 """A factor of the viewport; width and height; an input's name; an input's name with a factor; a function."""
+
+
+def _sampler(filter: Filter, wrap: Wrap, compare: bool) -> Sampler:
+    """A sampler that drivers know."""
+    for what, word, known in (("filter", filter, get_args(Filter)), ("wrap", wrap, get_args(Wrap))):
+        if word not in known:
+            raise Misuse(f"sampled has the {what} {word!r}{suggestion(str(word), known)}")
+    return Sampler(filter, wrap, compare)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +51,7 @@ class Port:
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The whole texture, read with this sampler; inputs have theirs declared."""
-        return Part(self, sampler=Sampler(filter, wrap, compare))
+        return Part(self, sampler=_sampler(filter, wrap, compare))
 
     def tested(self) -> Part:
         """The texture attached read-only for the depth test, of an input that other steps sample."""
@@ -70,7 +79,7 @@ class Part:
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The same part, read with this sampler."""
-        return replace(self, sampler=Sampler(filter, wrap, compare))
+        return replace(self, sampler=_sampler(filter, wrap, compare))
 
 
 @dataclass(frozen=True, eq=False)

@@ -141,8 +141,10 @@ class Numbering:
         if isinstance(vertices, Port):
             reads += self._reads(recorder, vertices.name, Part(vertices))
             vertices = reads[-1].resource
-        for port in attributes.values():
+        held: list[tuple[str, str]] = []
+        for layout, port in attributes.items():
             reads += self._reads(recorder, port.name, Part(port))
+            held.append((layout, reads[-1].resource))
         keep = ("state", "objects", "materials", "order", "per_light", "topology", "instances", "groups", "invocations")
         return Step(
             node=node.id,
@@ -160,7 +162,7 @@ class Numbering:
             view=view,
             view_index=view_index,
             vertices=vertices,
-            attributes=tuple((layout, self._own(recorder, port)) for layout, port in attributes.items()),
+            attributes=tuple(held),
             label=f"{node.id}" + (f" {index}" if len(recorder.requests) > 1 else ""),
             type=node.type.name,
             place=node.place,

@@ -222,8 +222,8 @@ def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", d
     """What a node's own code raised or asked for wrongly, with the author's line."""
     who = f"node '{node.id}' ({node.type.name})"
     happened = what_happened(error, type(node.node))
-    if not isinstance(error, Misuse):
-        return Problem(code, f"{who} failed while {doing}: {happened}", node.place)
     if not author_line(error, type(node.node)) and node.type.file.name:
         happened = f"{shown_file(node.type.file)}: {happened}"
+    if not isinstance(error, Misuse):
+        return Problem(code, f"{who} failed while {doing}: {happened}", node.place)
     return Problem(error.code, f"{who}: {happened}", node.place)

@@ -39,6 +39,12 @@ _WRITERS: dict[int, tuple[str, Any, int]] = {  # GL type: raw function, NumPy ty
     0x8B5C: ("glProgramUniformMatrix4fv", np.float32, 16),
 }  # fmt: skip
 
+_GLSL = {
+    0x1406: "float", 0x8B50: "vec2", 0x8B51: "vec3", 0x8B52: "vec4", 0x1404: "int", 0x8B53: "ivec2", 0x8B54: "ivec3",
+    0x8B55: "ivec4", 0x1405: "uint", 0x8DC6: "uvec2", 0x8DC7: "uvec3", 0x8DC8: "uvec4", 0x8B56: "bool", 0x8B57: "bvec2",
+    0x8B58: "bvec3", 0x8B59: "bvec4", 0x8B5A: "mat2", 0x8B5B: "mat3", 0x8B5C: "mat4",
+}  # fmt: skip
+
 ProgramError = moderngl.Error
 
 
@@ -50,6 +56,21 @@ class Uniform:
     type: int
     size: int
     location: int
+
+    @property
+    def glsl(self) -> str:
+        """The type's name in GLSL."""
+        return _GLSL.get(self.type, "an opaque type")
+
+    @property
+    def numbers(self) -> int:
+        """Numbers in one element."""
+        return _WRITERS[self.type][2]
+
+    @property
+    def whole(self) -> bool:
+        """Whether it takes whole numbers or switches."""
+        return self.type in _WRITERS and _WRITERS[self.type][1] is not np.float32
 
     @property
     def opaque(self) -> bool:

@@ -261,8 +261,9 @@ class Infer:
         if callable(rule):
             given = self._ruled(end, "size", rule)
             try:
-                base = int(given[0]), int(given[1])
-            except (TypeError, ValueError, IndexError):
+                width, height = given
+                base = int(width), int(height)
+            except (TypeError, ValueError, OverflowError):
                 self._say(end, "RG209", f"the rule for its size gives {given!r}, not width and height")
                 return None
         elif isinstance(rule, str) or (isinstance(rule, tuple) and isinstance(rule[0], str)):

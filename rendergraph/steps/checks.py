@@ -207,6 +207,11 @@ def attributes(node: Node, value: object) -> dict[str, Port]:
     return found
 
 
+def unconnected(port: Port) -> Misuse:
+    """What to say of an input that nothing is linked to, where a step cannot do without."""
+    return Misuse(f"input '{port.name}' is not connected; ask `steps.connected` first")
+
+
 def buffer(port: Port, what: str) -> Port:
     """A port that is a buffer."""
     if getattr(port, "kind", "") != "buffer":

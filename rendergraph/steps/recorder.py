@@ -107,10 +107,15 @@ class Steps:
         """
         found = self._desc(checks.own_port(self.node, port, "desc's argument"))
         if found is None:
-            raise Misuse(f"input '{port.name}' is not connected; ask `steps.connected` first")
+            raise checks.unconnected(port)
         if isinstance(found, BufferDesc):
             raise Misuse(f"'{port.name}' holds no texture; its description has no size or format")
         return found
+
+    def _connected(self, port: Port) -> None:
+        """Refuse an input that nothing is linked to."""
+        if isinstance(port, Input) and not self.facts.connected(port.name):
+            raise checks.unconnected(port)
 
     def _desc(self, port: Port) -> TextureDesc | BufferDesc | None:
         """What a port is allocated from, None where nothing is linked to an input."""
@@ -167,6 +172,8 @@ class Steps:
         checks.choice("order", order, DRAW_ORDERS)
         if per_light is not None:
             checks.whole("per_light", per_light)
+            if per_light >= len(self.lights):
+                raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
             "geometry", shaders, out, bindings, defines, state=state, view=view, view_index=view_index,
@@ -205,12 +212,16 @@ class Steps:
         checks.whole("instances", instances)
         if isinstance(vertices, Port):
             checks.buffer(checks.own_port(self.node, vertices, "vertices"), "vertices")
+            self._connected(vertices)
         else:
             checks.whole("vertices", vertices)
+        held = checks.attributes(self.node, attributes)
+        for port in held.values():
+            self._connected(port)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
             "draw", shaders, out, bindings, defines, state=state, vertices=vertices, topology=topology, view=view,
-            view_index=view_index, instances=instances, attributes=checks.attributes(self.node, attributes),
+            view_index=view_index, instances=instances, attributes=held,
         )  # fmt: skip
 
     def compute(

@@ -232,6 +232,53 @@ CASES = {
         r"wrong\.vert:1:9: RG428 .*: wrong\.vert reads vertex attribute 'in_cornre', which no buffer of `attributes` holds; "
         r"did you mean 'in_corner'\?",
     ),
+    "a vector from one number": (
+        COLOR + 'gain: float = param(default=1.0, doc="Gain.")',
+        {"wrong.frag": "uniform vec3 gain;\nout vec4 color;\nvoid main() { color = gain.xyzx; }"},
+        r"wrong\.frag:1:14: RG436 node 'a' \(wrong\): wrong\.frag declares 'gain' as vec3, but it is given 1 number$",
+    ),
+    "too many numbers": (
+        COLOR + 'def record(self, steps):\n    steps.fullscreen("wrong.frag", axis=(1, 0, 0))',
+        {"wrong.frag": "uniform ivec2 axis;\nout vec4 color;\nvoid main() { color = vec4(axis, axis); }"},
+        r"wrong\.frag:1:15: RG436 .*wrong\.py:18: wrong\.frag declares 'axis' as ivec2, but it is given 3 numbers$",
+    ),
+    "more than an array holds": (
+        COLOR + 'def record(self, steps):\n    steps.fullscreen("wrong.frag", weights=[0.1] * 5)',
+        {"wrong.frag": "uniform float weights[4];\nout vec4 color;\n"
+                       "void main() { color = vec4(weights[0], weights[1], weights[2], weights[3]); }"},
+        r"wrong\.frag:1:15: RG436 .* declares 'weights' as float\[4\], but it is given 5 numbers$",
+    ),
+    "floats for a whole number": (
+        COLOR + 'def record(self, steps):\n    steps.fullscreen("wrong.frag", taps=8 / 2)',
+        {"wrong.frag": "uniform int taps;\nout vec4 color;\nvoid main() { color = vec4(taps); }"},
+        r"wrong\.frag:1:13: RG436 .* declares 'taps' as int, but it is given floats, 4\.0$",
+    ),
+    "a parameter as a sampler": (
+        COLOR + 'gain: float = param(default=1.0, doc="Gain.")',
+        {"wrong.frag": "uniform sampler2D gain;\nout vec4 color;\nvoid main() { color = texture(gain, vec2(0)); }"},
+        r"wrong\.frag:1:19: RG430 .* samples 'gain', but the step reads no texture of that name",
+    ),
+    "a buffer misspelt": (
+        COLOR + 'numbers = Internal(kind="buffer", bytes=64)\n\ndef record(self, steps):\n'
+        '    steps.compute("wrong.comp", over=1, out=self.numbers)\n'
+        '    steps.fullscreen("wrong.frag", numbers=self.numbers, out=self.color)',
+        {"wrong.comp": "layout(local_size_x = 1) in;\nlayout(std430) buffer nubmers { float values[]; };\n"
+                       "void main() { values[0] = 1.0; }"},
+        r"wrong\.comp:2:23: RG430 .*wrong\.py:20: wrong\.comp looks at block 'nubmers', but the step has no buffer of that "
+        r"name; it has numbers$",
+    ),
+    "a target that is not written": (
+        COLOR + 'mask = Output(Radiance, doc="Mask.")',
+        {},
+        r"test\.yaml:5:3: RG437 node 'a' \(wrong\): wrong\.frag writes no output 'mask'$",
+    ),
+    "a material's texture without a guard": (
+        COLOR + 'def record(self, steps):\n    steps.geometry("wrong.frag")',
+        {"wrong.frag": "uniform sampler2D base_color_texture;\nout vec4 color;\n"
+                       "void main() { color = texture(base_color_texture, vec2(0)); }"},
+        r"wrong\.frag:1:19: RG430 .*'base_color_texture', but .* reads none; not every material has it, so it stands inside "
+        r"#ifdef HAS_BASE_COLOR_TEXTURE$",
+    ),
     "no work group": (
         'shader = "wrong.comp"\n' + COLOR,
         {"wrong.comp": "uniform writeonly image2D color;\nvoid main() { imageStore(color, ivec2(0), vec4(1.0)); }"},
@@ -257,5 +304,7 @@ def test_what_the_driver_at_hand_says(author: Any, gl: rg.Session, case: str) ->
     body, files, expected = CASES[case]
     author.node(body)
     author.write(**{name.replace(".", "__"): text for name, text in files.items()})
-    said = author.said(lambda: gl.render(author.pipeline(scene=SCENE)))
+    mask = ", mask: a.mask" if "mask =" in body else ""
+    text = f"nodes:\n  a: {{type: wrong}}\noutputs: {{image: a.color{mask}}}\n"
+    said = author.said(lambda: gl.render(author.pipeline(text, scene=SCENE)))
     assert re.match(expected, re.sub(r"^\S*/", "", said[0])), said[0]

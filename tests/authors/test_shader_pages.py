@@ -20,6 +20,7 @@ DRAWN = 'def record(self, steps):\n    steps.geometry("wrong.frag", vertex="wire
 SAMPLED = 'depth = Input(AnyTexel, doc="Depth.")\n'
 STORE = "void main() { imageStore(color, ivec2(gl_GlobalInvocationID.xy), vec4(1.0)); }\n"
 POSITION = "void main() {{ gl_Position = vec4({}, 1.0); }}\n"
+OUT = "out vec4 color; void main() {{ color = {}; }}"
 CASES = {
     # code: body, file, what stands behind the page's text in its wrong and right form
     "RG410": (COLOR, "wrong.frag", "", ""),
@@ -27,6 +28,7 @@ CASES = {
     "RG427": ('shader = "wrong.comp"\n' + COLOR, "wrong.comp", STORE, STORE),
     "RG428": (COLOR + DRAWN, "wires.vert", POSITION.format("in_positon"), POSITION.format("in_position")),
     "RG430": (COLOR, "wrong.frag", "out vec4 color; void main() { color = texelFetch(depht, ivec2(0), 0); }", None),
+    "RG436": (COLOR + GAIN, "wrong.frag", OUT.format("gain.xyzx"), OUT.format("vec4(gain)")),
     "RG434": (
         COLOR + GAIN, "wrong.frag", "out vec4 color; void main() { color = vec4(gian); }",
         "out vec4 color; void main() { color = vec4(gain); }",

@@ -12,6 +12,7 @@ color = Output(Radiance, doc="Colour.")
 small = Internal(Radiance, size=0.5)
 chain = Internal(Radiance, mips=0)
 numbers = Internal(kind="buffer", bytes=64)
+given = Input(AnyTexel, kind="buffer", optional=True, doc="Numbers of another.")
 views = Views(count=2, doc="Two views.")
 gain: float = param(default=1.0, doc="Gain.")
 
@@ -98,12 +99,21 @@ CALLS = {
     'steps.geometry("wrong.frag", order="back to front")':
         "RG423 order is 'back to front'; did you mean 'back_to_front'?",
     'steps.geometry("wrong.frag", per_light=-1)': "RG423 per_light is -1, not a whole number from 0",
-    'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; there is chain, color, numbers, small, source, views",
+    'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; there is chain, color, given, numbers, small, source, views",
     'steps.geometry("wrong.frag", view=self.color)':
         "RG423 view is the Output 'color'; it is a Views port or an input that carries views",
     'steps.geometry("wrong.frag", view=self.views, view_index=2)':
         "RG423 view_index is 2, but 'views' has 2 views, counted from 0",
     'steps.geometry("wrong.frag", view_index="0")': "RG423 view_index is '0', not a whole number from 0",
+    'steps.geometry("wrong.frag", per_light=7)': "RG423 per_light is 7, but the scene has 1 lights, counted from 0",
+    'steps.fullscreen("wrong.frag", source=self.source.sampled("bilinear"))':
+        "RG423 sampled has the filter 'bilinear'; did you mean 'linear'?",
+    'steps.fullscreen("wrong.frag", source=self.source.sampled(wrap="edge"))':
+        "RG423 sampled has the wrap 'edge'; there is border, clamp, mirror, repeat",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.given)':
+        "RG423 input 'given' is not connected; ask `steps.connected` first",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_p": self.given})':
+        "RG423 input 'given' is not connected; ask `steps.connected` first",
     # draws
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, topology="triangle")':
         "RG423 topology is 'triangle'; did you mean 'triangles'?",
