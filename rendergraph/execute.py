@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from rendergraph.compile import Executable
 from rendergraph.declare import Node, Port, Views
-from rendergraph.declare.blame import what_happened
-from rendergraph.errors import Misuse, Problem, RenderError
+from rendergraph.declare.blame import author_line, what_happened
+from rendergraph.errors import Misuse, Problem, RenderError, shown_file
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.surroundings import settle
@@ -235,7 +235,10 @@ class Runner:
             raise
         except (Exception, SystemExit) as error:  # a stranger's code
             code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
-            text = f"node '{node.id}' ({node.type.name}) failed in update: {what_happened(error, type(node.node))}"
+            happened = what_happened(error, type(node.node))
+            if not author_line(error, type(node.node)) and node.type.file.name:
+                happened = f"{shown_file(node.type.file)}: {happened}"
+            text = f"node '{node.id}' ({node.type.name}) failed in update: {happened}"
             raise RenderError(Problem(code, text, node.place)) from error
 
     def _check_views(self) -> None:

@@ -74,7 +74,8 @@ def check_blocks(step: Step, program: Program, given: Collection[str], texts: Te
         InputError: the program has a block that the step does not give (RG430).
     """
     files = ", ".join(file for _, file in step.shaders)
-    own = sorted(use.name for use in (*step.all_reads, *step.writes) if use.use == "buffer")
+    uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
+    own = sorted({use.name for use in uses if use.use == "buffer"})
     problems = [
         _placed(
             step.problem(

@@ -128,6 +128,34 @@ def test_a_wire_frame_by_state(author: Any, gl: rg.Session) -> None:
     assert 0 < image.sum() < 64 * 5
 
 
+GIVEN = """
+corners = Input(AnyTexel, kind="buffer", doc="Two coordinates and a value nobody wants.")
+color = Output(Radiance, clear=0.0, format="r32f", doc="1 in the triangle.")
+
+def record(self, steps):
+    steps.draw("wrong.frag", vertex="wrong.vert", vertices=3, attributes={"2f 1f in_corner in_spare": self.corners})
+"""
+MADE = """
+corners = Output(AnyTexel, kind="buffer", bytes=36, doc="A triangle.")
+
+def record(self, steps):
+    steps.compute("made.comp", over=1)
+"""
+
+
+def test_a_draw_over_a_buffer_that_another_node_filled(author: Any, gl: rg.Session) -> None:
+    author.node(GIVEN)
+    author.node(MADE, "made")
+    author.write(
+        made__comp="layout(local_size_x = 1) in;\nlayout(std430) buffer corners { float values[9]; };\nvoid main() {\n"
+        "    values = float[](-1.0, -1.0, 9.0, 3.0, -1.0, 9.0, -1.0, 3.0, 9.0);\n}",
+        wrong__vert="in vec2 in_corner;\nvoid main() { gl_Position = vec4(in_corner, 0.0, 1.0); }",
+        wrong__frag="out float color;\nvoid main() { color = 1.0; }",
+    )
+    text = "nodes:\n  m: {type: made}\n  a: {type: wrong, inputs: {corners: m.corners}}\noutputs: {image: a.color}\n"
+    assert gl.render(author.pipeline(text))["image"].min() == 1
+
+
 LIMITS = {
     'color = Output(Radiance, samples=16, doc="Colour.")': ("samples", 16, "'a.color' has 16 samples a texel"),
     'color = Output(Radiance, kind="texture2d_array", layers=100_000, size=(1, 1), doc="Colour.")':

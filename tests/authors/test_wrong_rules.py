@@ -135,6 +135,8 @@ UPDATES = {
     "frame.set_views(self.color, [frame.camera])": "set_views is given 'color', which is no Views port",
     "frame.set_views('views', [])": "set_views is the text 'views'; give the port itself, self.views",
     "frame.write(self.color, numpy.zeros(4))": "write is the Output 'color', which is no buffer",
+    "frame.write(self.numbers, [None])": "write is given list of object, not an array of numbers",
+    "frame.write(self.numbers, numpy.zeros(17, numpy.float32))": "RG432 it writes 68 bytes into 'numbers', which holds 64",
     "frame.connected('color')": "connected's argument is the text 'color'; give the port itself, self.color",
     "frame.scene.lights[3]": "IndexError: tuple index out of range",
     "numpy.linalg.inv(numpy.zeros((2, 2)))": "LinAlgError: Singular matrix",
@@ -144,10 +146,33 @@ UPDATES = {
 
 @pytest.mark.parametrize("body", UPDATES)
 def test_an_update_that_fails(author: Any, gl: rg.Session, body: str) -> None:
-    author.node(f'{COLOR}views = Views(doc="Views.")\n\ndef update(self, frame):\n    {body}  # here')
+    author.node(
+        f'{COLOR}views = Views(doc="Views.")\nnumbers = Internal(kind="buffer", bytes=64)\n\n'
+        'def record(self, steps):\n    steps.compute("wrong.comp", over=1, out=self.numbers)\n'
+        '    steps.fullscreen("wrong.frag", numbers=self.numbers, out=self.color)\n\n'
+        f"def update(self, frame):\n    {body}  # here"
+    )
+    author.write(wrong__comp="layout(local_size_x = 1) in;\nvoid main() {}")
     (said,) = author.said(lambda: gl.render(author.pipeline()))
     where = f"wrong.py:{author.line()}"
-    assert said == f"test.yaml:4:3: RG433 node 'a' (wrong) failed in update: {where}: {UPDATES[body]}"
+    code = "RG432" if UPDATES[body].startswith("RG432") else "RG433"
+    text = UPDATES[body].removeprefix("RG432 ")
+    assert said == f"test.yaml:4:3: {code} node 'a' (wrong) failed in update: {where}: {text}"
+
+
+SIGNATURES = {
+    "record": "RG420 node 'a' (wrong) failed while recording: wrong.py: TypeError: Wrong.record() takes 1 positional "
+    "argument but 2 were given",
+    "update": "RG433 node 'a' (wrong) failed in update: wrong.py: TypeError: Wrong.update() takes 1 positional argument but "
+    "2 were given",
+}
+
+
+@pytest.mark.parametrize("hook", SIGNATURES)
+def test_a_hook_that_takes_nothing(author: Any, gl: rg.Session, hook: str) -> None:
+    author.node(f"{COLOR}def {hook}(self):\n    pass")
+    (said,) = author.said(lambda: gl.render(author.pipeline()))
+    assert said == f"test.yaml:4:3: {SIGNATURES[hook]}"
 
 
 def test_views_that_nobody_sets(author: Any, gl: rg.Session) -> None:
