@@ -25,6 +25,7 @@ from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.limits import check_plan, groups_of
 from rendergraph.compile.memory import ClearTarget, Memory
 from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
 from rendergraph.expand import CAMERA, ViewTable
@@ -36,7 +37,7 @@ from rendergraph.gl.timer import Timer
 from rendergraph.program import prefix, stage_texts
 from rendergraph.records import dataclass
 from rendergraph.steps import Read, Step, Write
-from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
+from rendergraph.textures import TextureDesc
 
 _TOPOLOGY = {
     "points": moderngl.POINTS, "lines": moderngl.LINES, "line_strip": moderngl.LINE_STRIP,
@@ -45,7 +46,6 @@ _TOPOLOGY = {
 }  # fmt: skip
 _ALL_BARRIERS = 0xFFFFFFFF
 _TEXTURE_2D = 0x0DE1
-_R8UI, _RED_INTEGER, _UNSIGNED_BYTE = 0x8232, 0x8D94, 0x1401
 
 
 def compile_plan(
@@ -126,11 +126,13 @@ class _Compiler:
         compiled = CompiledStep(step)
         {
             "fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw, "compute": self._compute,
-            "clear": self._clear, "mipmaps": self._mipmaps, "copy": self._copy,
+            "clear": self._transfer, "mipmaps": self._transfer, "copy": self._transfer,
         }[step.kind](step, compiled, parity)  # fmt: skip
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
-            self._clear_buffer(write) for write in stored if write.use == "buffer" and write.load == "clear"
+            clear_buffer(self.device, self.memory, write)
+            for write in stored
+            if write.use == "buffer" and write.load == "clear"
         ]
         if stored and step.kind != "copy":  # what shaders store comes in no order by itself
             compiled.after.append(partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS))
@@ -217,63 +219,14 @@ class _Compiler:
 
     def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, {})
-        images: list[Read | Write] = [read for read in step.reads if read.use == "image"]
-        images += [write for write in step.writes if write.use == "image"]
-        for image, touched in enumerate(images):
-            uniform = program.uniforms.get(touched.name)
-            texture = self.memory.texture(
-                touched.resource, parity, previous=isinstance(touched, Read) and touched.previous
-            )
-            layered = touched.layer is None and texture.desc.kind != "texture2d"
-            gl_format = FORMATS[texture.desc.format].gl
-            compiled.before.append(
-                partial(
-                    self.device.raw.glBindImageTexture, image, texture.glo, touched.mip or 0, int(layered),
-                    touched.layer or 0, 0x88BA, gl_format,
-                )
-            )  # fmt: skip
-            if uniform is not None:
-                uniforms[touched.name] = image
-        for write in step.writes:
-            if write.load == "clear" and write.use == "image":
-                texture = self.memory.texture(write.resource, parity)
-                compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
+        calls, units = image_calls(self.device, self.memory, step, parity)
+        compiled.before += calls
+        uniforms |= {name: unit for name, unit in units.items() if name in program.uniforms}
         call = partial(program.object.run, *groups_of(step, program.local_size, self.device.limits))
         compiled.draws.append(Draw(program, uniforms, None, call, binds))
 
-    def _clear(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        for write in step.writes:
-            if write.use == "buffer":
-                compiled.before.append(self._clear_buffer(write))
-                continue
-            texture = self.memory.texture(write.resource, parity)
-            compiled.before.append(Clear(self.device, texture, write.clear, mip=write.mip, layer=write.layer))
-
-    def _clear_buffer(self, write: Write) -> Call:
-        """Zeros by the device itself: moderngl's clear maps the buffer, and so waits for whoever still reads it."""
-        glo = self.memory.buffer(write.resource).glo
-        return partial(self.device.raw.glClearNamedBufferData, glo, _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, None)
-
-    def _mipmaps(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        for write in step.writes:
-            texture = self.memory.texture(write.resource, parity)
-            compiled.before.append(partial(self.device.raw.glGenerateTextureMipmap, texture.glo))
-
-    def _copy(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        if isinstance(self.plan.resources[step.reads[0].resource].desc, BufferDesc):
-            buffers = (self.memory.buffer(step.writes[0].resource), self.memory.buffer(step.reads[0].resource))
-            compiled.before.append(partial(self.device.ctx.copy_buffer, *buffers))
-            return
-        source = self.memory.texture(step.reads[0].resource, parity)
-        target = self.memory.texture(step.writes[0].resource, parity)
-        for mip in range(source.desc.mips):
-            size = (*source.desc.mip_size(mip), source.desc.layers)
-            compiled.before.append(
-                partial(
-                    self.device.raw.glCopyImageSubData, source.glo, source.target, mip, 0, 0, 0, target.glo,
-                    target.target, mip, 0, 0, 0, *size,
-                )
-            )  # fmt: skip
+    def _transfer(self, step: Step, compiled: CompiledStep, parity: int) -> None:
+        compiled.before += transfer_calls(self.device, self.memory, step, parity)
 
     # Parts ----------------------------------------------------------------------------------------------------------
 
@@ -302,9 +255,7 @@ class _Compiler:
             elif view is not None and isinstance(use, Read):
                 blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
         macros = {**self.scene.light_defines, **defines}
-        program = self.programs.get(
-            step, self.types, self.plan.resources, self.view_tables, macros, blocks, outputs
-        )
+        program = self.programs.get(step, self.types, self.plan.resources, self.view_tables, macros, blocks, outputs)
         binds: list[Call] = buffers
         uniforms = step_uniforms(step)
         sampled: set[str] = set()

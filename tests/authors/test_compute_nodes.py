@@ -151,6 +151,34 @@ def test_more_groups_than_the_device_takes(author: Any, gl: rg.Session) -> None:
     assert f"this device takes {most} × " in said
 
 
+ONE_MORE = """
+numbers = InOut(AnyTexel, kind="buffer", bytes=400, doc="Each one larger.")
+
+def record(self, steps):
+    steps.compute("more.comp", over=100)
+"""
+
+
+def test_a_buffer_that_another_node_continues_is_seen_as_it_was(author: Any, gl: rg.Session) -> None:
+    author.node(NUMBERS)
+    author.node(ONE_MORE, "more")
+    author.node(SOURCE, "checks")
+    author.write(
+        checks__frag=SOURCE_FRAG,
+        wrong__comp="layout(local_size_x = 100) in;\nlayout(std430) buffer numbers { float squares[]; };\n"
+        "uniform float scale;\nvoid main() { squares[gl_GlobalInvocationID.x] = scale; }",
+        more__comp="layout(local_size_x = 100) in;\nlayout(std430) buffer numbers { float squares[]; };\n"
+        "void main() { squares[gl_GlobalInvocationID.x] += 1.0; }",
+    )
+    text = (
+        "nodes:\n  a: {type: wrong}\n  m: {type: more, inputs: {numbers: a.numbers}}\n  c: {type: checks}\n"
+        "outputs: {image: c.color}\n"
+    )
+    frame = gl.render(author.pipeline(text), taps=["a.numbers", "m.numbers"], frames=range(1, 3))
+    assert set(frame["a.numbers"].view(np.float32)) == {1.0}
+    assert set(frame["m.numbers"].view(np.float32)) == {2.0}
+
+
 PING_PONG = """
 source = Input(AnyTexel, doc="Where it starts.")
 color = Output(Radiance, format="r32f", doc="As often as asked.")
