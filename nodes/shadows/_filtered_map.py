@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rendergraph.api import Internal, Steps, param
+from rendergraph.api import Function, Internal, ShadowLookup, Steps, param
 
 from ._map_technique import MapTechnique, map_layers
 
@@ -45,3 +45,9 @@ class FilteredMap(MapTechnique):
                 out={"filtered": self.filtered.layer(layer), "covered": self.covered.layer(layer)},
             )  # fmt: skip
         super().record(steps)
+
+
+def filtered_lookup(shader: str) -> Function:
+    """The function of a technique that reads the filtered map with the hardware's filter."""
+    reads = (FilteredMap.filtered.sampled("linear"), FilteredMap.covered.sampled("linear"))
+    return Function(ShadowLookup, shader, reads=reads, doc="Visibility, for shaders to call.")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rendergraph.api import Function, ShadowLookup, param
+from rendergraph.api import param
 
-from ._filtered_map import FilteredMap
+from ._filtered_map import FilteredMap, filtered_lookup
 
 
 class ShadowESM(FilteredMap):
@@ -21,11 +21,7 @@ class ShadowESM(FilteredMap):
     across: ClassVar[str] = "shadow_esm_across.frag"
     texel: ClassVar[str] = "r32f"
 
-    lookup = Function(
-        ShadowLookup, "shadow_esm.glsl",
-        reads=(FilteredMap.filtered.sampled("linear"), FilteredMap.covered.sampled("linear")),
-        doc="Visibility, for shaders to call.",
-    )  # fmt: skip
+    lookup = filtered_lookup("shadow_esm.glsl")
 
     exponent: float = param(
         default=80.0, min=1, max=80, doc="How steep, depth being 0 to 1 over the range of the light's view."

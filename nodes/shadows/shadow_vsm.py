@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from rendergraph.api import Function, ShadowLookup, param
+from rendergraph.api import param
 
-from ._filtered_map import FilteredMap
+from ._filtered_map import FilteredMap, filtered_lookup
 
 
 class ShadowVSM(FilteredMap):
@@ -21,11 +21,7 @@ class ShadowVSM(FilteredMap):
 
     across: ClassVar[str] = "shadow_vsm_across.frag"
 
-    lookup = Function(
-        ShadowLookup, "shadow_vsm.glsl",
-        reads=(FilteredMap.filtered.sampled("linear"), FilteredMap.covered.sampled("linear")),
-        doc="Visibility, for shaders to call.",
-    )  # fmt: skip
+    lookup = filtered_lookup("shadow_vsm.glsl")
 
     min_variance: float = param(
         default=1e-6, min=0, max=1, doc="Least variance, depth being 0 to 1 over the range of the light's view."

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
@@ -43,31 +41,10 @@ def command(frames: int, fps: float, no_alias: bool, as_json: bool, device: int 
 
 def measured(frame: Frame) -> dict[str, Any]:
     """The frame's report with the spread of every figure over all frames."""
-    passes = []
-    for entry in frame.passes:
-        steps = [[step for step in times.steps if step.node == entry["node"]] for times in frame.times]
-        gpu = [sum(step.gpu_ms for step in own if step.gpu_ms is not None) for own in steps]
-        timed = any(step.gpu_ms is not None for own in steps for step in own)
-        cpu = [sum(step.cpu_ms for step in own) for own in steps]
-        passes.append(
-            {
-                "node": entry["node"],
-                "type": entry["type"],
-                "gpu_ms": spread(gpu) if timed else None,
-                "cpu_ms": spread(cpu),
-            }
-        )
-    whole = spread([times.frame_ms for times in frame.times])
-    return frame.as_json() | {"frames": len(frame.times), "frame_ms": whole, "passes": passes}
+    from rendergraph.compare.timing import times_of
 
-
-def spread(values: Sequence[float]) -> dict[str, float]:
-    """Median, least and most, and the tenth and ninetieth percentile."""
-    if len(values) < 2:
-        return dict.fromkeys(("median", "min", "max", "p10", "p90"), values[0])
-    tenths = statistics.quantiles(values, n=10, method="inclusive")
-    ends = {"min": min(values), "max": max(values), "p10": tenths[0], "p90": tenths[-1]}
-    return {"median": statistics.median(values), **ends}
+    times = times_of(frame.times, {str(entry["node"]): str(entry["type"]) for entry in frame.passes}).as_json()
+    return frame.as_json() | {name: times[name] for name in ("frames", "frame_ms", "passes")}
 
 
 def _text(report: dict[str, Any]) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.errors import Place, Problem, RenderError
+from rendergraph.images.files import flush
 from rendergraph.records import dataclass
 
 CHECKSUM = "sha256"
@@ -52,7 +53,7 @@ class Ledger:
             finally:
                 os.close(handle)
             if new:
-                _flush_folder(self.path.parent)
+                flush(self.path.parent)
         except OSError as error:
             raise self._failed(error) from error
 
@@ -76,11 +77,3 @@ def _record(line: bytes) -> dict[str, Any] | None:
     if not isinstance(record, dict) or record.get(CHECKSUM) != checksum(record):
         return None
     return record
-
-
-def _flush_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -43,6 +43,11 @@ class TextureInfo:
     lights: tuple[int, ...] = ()
     bytes: int = 0
 
+    @property
+    def holds_values(self) -> bool:
+        """Whether it is a texture or a buffer, which can be read back; a function or a view is neither."""
+        return self.desc is not None or self.bytes > 0
+
 
 @dataclass(frozen=True)
 class Facts:

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import field
 
 from rendergraph.declare import TextureInfo
+from rendergraph.link.infer import CAMERA
 from rendergraph.records import dataclass
 from rendergraph.steps import Resource, Step
-
-CAMERA = "camera"
-"""Id of the view table every pipeline has."""
 
 
 @dataclass(frozen=True)
@@ -43,3 +41,6 @@ class Expansion:
 def is_empty(info: TextureInfo | None) -> bool:
     """Whether a texture has no layers: no light casts, nothing is drawn, and readers do without."""
     return info is not None and info.desc is not None and info.desc.layers == 0
+
+
+__all__ = ["CAMERA", "Expansion", "ViewTable", "is_empty"]

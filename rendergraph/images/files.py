@@ -37,11 +37,11 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
         yield temporary
         try:
             for part in temporary:
-                _flush(part)
+                flush(part)
             for part, target in zip(temporary, targets, strict=True):
                 os.replace(part, target)
             for folder in {target.parent for target in targets}:
-                _flush(folder)
+                flush(folder)
         except OSError as error:
             shown = dict(zip(map(str, temporary), paths, strict=True)).get(str(error.filename), paths[0])
             raise failed(shown, error.strerror or str(error)) from error
@@ -51,7 +51,8 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
                 part.unlink()
 
 
-def _flush(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Return when a file, or the names in a folder, are on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -64,7 +64,7 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
     """The port of a linked graph that `node.port` names, internals included; for taps.
 
     Raises:
-        InputError: there is no such node or port, or it holds no texture.
+        InputError: there is no such node or port, or it holds no texture and no buffer.
     """
     if text in graph.aliases:
         return graph.aliases[text]
@@ -73,11 +73,11 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
     if node not in names:
         hint = suggestion(node or text, names) if node else f"; write NODE.PORT{suggestion(text, names)}"
         raise InputError(Problem("RG109", f"there is no node '{node or text}'{hint}"))
-    ports = [end.port for end in graph.textures if end.node == node]
+    ports = [end.port for end, info in graph.textures.items() if end.node == node and info.holds_values]
     found = Endpoint(node, port)
     if found not in graph.textures:
         raise InputError(Problem("RG112", f"node '{node}' has no output '{port}'{suggestion(port, ports)}"))
-    if graph.textures[found].desc is None:
+    if not graph.textures[found].holds_values:
         raise InputError(Problem("RG129", f"'{text}' holds no texture, there is nothing to show"))
     return found
 

@@ -11,13 +11,12 @@ from weakref import WeakValueDictionary
 
 from rendergraph import stamps
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
-from rendergraph.link import Endpoint, Graph
+from rendergraph.link import Endpoint, Graph, endpoint
 from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.catalog import Catalog
-    from rendergraph.declare import TextureInfo
     from rendergraph.expand import Expansion
     from rendergraph.resolve import PipelineSpec
     from rendergraph.scene.model import Scene
@@ -75,11 +74,6 @@ def load(
         limits=tuple((limits or {}).items()),
         plugins=tuple(Path(plugin) for plugin in plugins),
     )
-
-
-def _holds_values(info: TextureInfo | None) -> bool:
-    """Whether a port is a texture or a buffer, which can be read back; views and functions cannot."""
-    return info is not None and (info.desc is not None or info.bytes > 0)
 
 
 def _limit_names() -> dict[str, dict[str, str]]:
@@ -262,22 +256,17 @@ class Pipeline:
                 hint = suggestion(name, graph.outputs)
                 problems.append(Problem("RG205", f"pipeline '{graph.name}' has no output '{name}'{hint}"))
         for tap in taps:
-            node, _, port = tap.rpartition(".")
-            if node not in graph:
-                hint = suggestion(node or tap, list(graph.members))
-                problems.append(Problem("RG206", f"--tap {tap}: there is no node '{node or tap}'{hint}"))
-            elif not _holds_values(graph.textures.get(Endpoint(node, port))):
-                ports = [end.port for end, info in graph.textures.items() if end.node == node and _holds_values(info)]
-                text = f"--tap {tap}: '{node}' has no texture '{port}'{suggestion(port, ports)}"
-                problems.append(Problem("RG206", text))
-            else:
-                wanted[tap] = Endpoint(node, port)
-                needs = getattr(graph[node].node.ports()[port], "needs", ())
-                problems += [
-                    Problem("RG116", f"--tap {tap}: it needs input '{name}' of '{node}', which is not connected")
-                    for name in needs
-                    if not graph[node].inputs.get(name)
-                ]
+            try:
+                end = wanted[tap] = endpoint(graph, tap)
+            except InputError as error:
+                problems += [Problem("RG206", f"--tap {tap}: {problem.text}") for problem in error.problems]
+                continue
+            node = graph[end.node]
+            problems += [
+                Problem("RG116", f"--tap {tap}: it needs input '{name}' of '{end.node}', which is not connected")
+                for name in getattr(node.node.ports()[end.port], "needs", ())
+                if not node.inputs.get(name)
+            ]
         if problems:
             raise InputError(problems)
         return wanted

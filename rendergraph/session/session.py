@@ -14,7 +14,7 @@ from rendergraph.errors import Problem, RenderError, UsageError
 from rendergraph.execute import FrameTimes, Runner, median_times, summary
 from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.gl.memory import check_memory
-from rendergraph.images import Limits, decode
+from rendergraph.images import Limits, PictureInfo, channel_names, decode
 from rendergraph.scene import animate, pack
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import ImageSource, Scene
@@ -293,9 +293,5 @@ def _structure(expansion: Expansion) -> tuple[Any, ...]:
 def _output_info(name: str, semantic: str, encoding: str | None, desc: object) -> OutputInfo:
     if not isinstance(desc, TextureDesc):
         return OutputInfo(name, semantic, "bytes", "buffer", None, ())
-    fmt = FORMATS[desc.format]
-    if fmt.is_depth or semantic in ("depth", "linear_depth", "shadow_map"):
-        channels: tuple[str, ...] = ("Z",)
-    else:
-        channels = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}[fmt.components]
+    channels = channel_names(PictureInfo(semantic, desc.format, encoding), FORMATS[desc.format].components)
     return OutputInfo(name, semantic, desc.format, desc.kind, encoding, channels)
