@@ -12,15 +12,14 @@ from __future__ import annotations
 
 import ctypes
 import statistics
-import sys
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lights_plot import plot
-from measure import cpu_and_wall, frame_loop, keep_memory, options, save
+from measure import cpu_and_wall, figures, frame_loop, keep_memory, markdown, options, save
 
 SIZE = (480, 270)
 COUNTS = (1, 8, 64, 512)
@@ -153,33 +152,20 @@ def bench(frames: int, folder: str | None) -> tuple[list[Cell], str]:
 
 def table(cells: list[Cell], device: str) -> str:
     """Markdown."""
-    lines = [
-        f"On {device}, {SIZE[0]}×{SIZE[1]}; a software rasteriser's times are no measure of a GPU.",
-        "",
-        "| technique | lights | CPU ms (least to most) | fragments shaded | light evaluations | predicted |",
-        "| --- | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    lines += [
-        f"| {c.pipeline} | {c.lights} | {c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f}) | {c.fragments:,} | "
-        f"{c.evaluations:,} | {c.predicted:,.0f} |"
+    heads = ("technique", "lights", "CPU ms (least to most)", "fragments shaded", "light evaluations", "predicted")
+    rows = [
+        (c.pipeline, str(c.lights), f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})", f"{c.fragments:,}",
+         f"{c.evaluations:,}", f"{c.predicted:,.0f}")
         for c in cells
-    ]
-    return "\n".join(lines)
+    ]  # fmt: skip
+    return markdown(device, SIZE, heads, rows)
 
 
 def main() -> None:
     chosen = options(__doc__, frames=5)
     keep_memory()
     cells, device = bench(chosen.frames, chosen.save)
-    if chosen.save:
-        (Path(chosen.save) / "lights.svg").write_text(plot([asdict(cell) for cell in cells], device))
-        (Path(chosen.save) / "lights.txt").write_text(table(cells, device) + "\n")
-    if chosen.json:
-        import json
-
-        json.dump({"device": device, "rows": [asdict(cell) for cell in cells]}, sys.stdout, indent=1)
-    else:
-        print(table(cells, device))
+    figures(chosen, "lights", device, cells, table(cells, device), plot)
 
 
 if __name__ == "__main__":

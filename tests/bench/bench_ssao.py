@@ -8,15 +8,12 @@ size` is with `scale` 0.5.
 
 from __future__ import annotations
 
-import json
 import statistics
-import sys
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from measure import cpu_and_wall, frame_loop, keep_memory, options, save
+from measure import cpu_and_wall, figures, frame_loop, keep_memory, markdown, options, save
 from occlusion_plot import plot
 
 SIZE = (480, 270)
@@ -89,30 +86,20 @@ def _time(session: Any, pipeline: Any, frames: int) -> float:
 
 def table(cells: list[Cell], device: str) -> str:
     """Markdown."""
-    lines = [
-        f"On {device}, {SIZE[0]}×{SIZE[1]}; a software rasteriser's times are no measure of a GPU.",
-        "",
-        "| technique | samples | CPU ms (least to most) | ms at half size | mean occlusion |",
-        "| --- | ---: | ---: | ---: | ---: |",
-    ]
-    lines += [
-        f"| {c.pipeline} | {c.samples} | {c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f}) | {c.half_ms:.1f} | {c.mean:.3f} |"
+    heads = ("technique", "samples", "CPU ms (least to most)", "ms at half size", "mean occlusion")
+    rows = [
+        (c.pipeline, str(c.samples), f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})", f"{c.half_ms:.1f}",
+         f"{c.mean:.3f}")
         for c in cells
-    ]
-    return "\n".join(lines)
+    ]  # fmt: skip
+    return markdown(device, SIZE, heads, rows)
 
 
 def main() -> None:
     chosen = options(__doc__, frames=3, turns=5)
     keep_memory()
     cells, device = bench(chosen.frames, chosen.turns, chosen.save)
-    if chosen.save:
-        (Path(chosen.save) / "occlusion.svg").write_text(plot([asdict(cell) for cell in cells], device))
-        (Path(chosen.save) / "occlusion.txt").write_text(table(cells, device) + "\n")
-    if chosen.json:
-        json.dump({"device": device, "rows": [asdict(cell) for cell in cells]}, sys.stdout, indent=1)
-    else:
-        print(table(cells, device))
+    figures(chosen, "occlusion", device, cells, table(cells, device), plot)
 
 
 if __name__ == "__main__":

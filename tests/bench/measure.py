@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -168,12 +169,35 @@ def report(rows: Sequence[Row], as_json: bool, **more: Any) -> None:
         print(f"{name.replace('_', ' ')}: {value}")
 
 
+def markdown(device: str, size: tuple[int, int], heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table with its first column to the left, beneath what drew it."""
+    lines = [
+        f"On {device}, {size[0]}×{size[1]}; a software rasteriser's times are no measure of a GPU.",
+        "",
+        *(f"| {' | '.join(cells)} |" for cells in (heads, ["---", *["---:"] * (len(heads) - 1)], *rows)),
+    ]
+    return "\n".join(lines)
+
+
+def figures(
+    chosen: argparse.Namespace, name: str, device: str, cells: Sequence[Any], table: str,
+    plot: Callable[[list[dict[str, Any]], str], str],
+) -> None:  # fmt: skip
+    """Print measured cells as a table or JSON; with `--save` the table and a plot are written too."""
+    rows = [asdict(cell) for cell in cells]
+    if chosen.save:
+        (Path(chosen.save) / f"{name}.svg").write_text(plot(rows, device))
+        (Path(chosen.save) / f"{name}.txt").write_text(table + "\n")
+    if chosen.json:
+        json.dump({"device": device, "rows": rows}, sys.stdout, indent=1)
+    else:
+        print(table)
+
+
 def save(folder: str | None, **pictures: npt.NDArray[Any]) -> None:
     """Write pictures as PNG, values 0 to 1 or bytes, top row first."""
     if folder is None:
         return
-    from pathlib import Path
-
     from png import write_png
 
     Path(folder).mkdir(parents=True, exist_ok=True)
