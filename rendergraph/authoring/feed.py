@@ -81,6 +81,11 @@ class Surrounded:
             if reader is not None:
                 self.readers[name] = self._added("use", name, reader)
 
+    @property
+    def fed(self) -> list[str]:
+        """The inputs that are fed a texture."""
+        return [name for name in self.sources if self.checked.cls.inputs()[name].kind in TEXTURE_KINDS]
+
     def _added(self, word: str, name: str, cls: type[Node]) -> NodeType:
         return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
 
@@ -90,7 +95,10 @@ class Surrounded:
         return Catalog({}, found) if extensions is None else Catalog({}, found, extensions)
 
     def pipeline(self, variant: Variant, scene: str) -> dict[str, Any]:
-        """A pipeline file of one variant, as plain values; outputs are the node's, then what feeds it."""
+        """A pipeline file of one variant, as plain values; outputs are what feeds the node, then the node's.
+
+        A variant without outputs is the sources alone.
+        """
         cls, node = self.checked.cls, self.checked.name
         nodes: dict[str, Any] = {}
         inputs: dict[str, Any] = {}
@@ -102,9 +110,10 @@ class Surrounded:
             nodes[source.name] = {"type": source.name}
             link = f"{source.name}.made"
             inputs[name] = [link] if isinstance(port, Input) and port.many else link
-            if isinstance(port, InOut) or (isinstance(port, Input) and port.kind in TEXTURE_KINDS):
+            if name in self.fed:
                 outputs[f"from_{name}"] = link
-        nodes[node] = {"type": node, "inputs": inputs, "params": dict(variant.params)}
+        if variant.outputs:
+            nodes[node] = {"type": node, "inputs": inputs, "params": dict(variant.params)}
         for name in variant.outputs:
             reader = self.readers.get(name)
             if reader is None:

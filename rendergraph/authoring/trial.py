@@ -16,7 +16,6 @@ from rendergraph.authoring.places import causes, declared_at, line_through, port
 from rendergraph.authoring.variants import Variant
 from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import Draw
-from rendergraph.compile.views import FIXED_BLOCKS
 from rendergraph.declare import Node
 from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
 from rendergraph.execute import Runner
@@ -152,8 +151,11 @@ class Trial:
     # Running ----------------------------------------------------------------------------------------------------------
 
     def _run(self, variant: Variant) -> None:
-        pipeline = self._pipeline(variant)
         with self.session.device.current():
+            if not self._fed and self.around.fed:
+                alone = self._pipeline(Variant(""))
+                self._fed = self._draw(alone, self.session.prepare(alone, alias=False), 0)
+            pipeline = self._pipeline(variant)  # read only now: both are the same file
             runner = self.session.prepare(pipeline, alias=False)
             steps = [c for c in runner.executable.steps[0] if self._is_own(c.step)]
             for compiled in steps:
@@ -202,42 +204,24 @@ class Trial:
     # Looking ----------------------------------------------------------------------------------------------------------
 
     def _interface(self, step: Step, draw: Draw) -> None:
-        """What a program looks at and writes, against what its step binds."""
+        """Remember what a program looks at; what it looks at and was not declared is refused when it is compiled."""
         program = draw.program
-        before = prefix(self.type.name)
-        self.seen |= {name.removeprefix(before) for name in program.uniforms}
-        if step.node != self.type.name:
-            return
-        bound = {read.name for read in step.reads} | {write.name for write in step.writes} | set(FIXED_BLOCKS)
-        views = {f"{name}_view_block" for name in bound} | {"pass_view_block"}
-        self.seen |= {name for name in bound if name in program.storage or f"{name}_view_block" in program.blocks}
-        for name in (program.blocks.keys() | program.storage.keys()) - bound - views:
-            if not any(name.startswith(prefix(function.node)) for function in step.functions):
-                text = f"block '{name}' of the shader is none of what its step reads and writes: it meets another's"
-                self.say(Problem("RG457", text, self._shader_place(step, name)))
-        colors = [write.name for write in step.writes if write.use == "color"]
-        written = outputs_of(program)
-        if step.kind != "compute" and colors and not (len(colors) == len(written) == 1):
-            for name in colors:
-                if name not in written:
-                    text = f"the shader never writes '{name}', which its step draws to"
-                    self.say(Problem("RG454", text, self._shader_place(step, name)))
+        self.seen |= {name.removeprefix(prefix(self.type.name)) for name in program.uniforms}
+        names = [read.name for read in step.reads] + [write.name for write in step.writes]
+        self.seen |= {name for name in names if name in program.storage or f"{name}_view_block" in program.blocks}
 
-    def _shader_place(self, step: Step, name: str) -> Place:
-        """The line of the last stage's file that mentions a name, else the file."""
-        file = dict(step.shaders).get("fragment") or dict(step.shaders).get("compute") or ""
-        path = self.type.shaders / file
-        return declared_at(path, name) if path.is_file() else Place(self.shown)
+        colors = [write.name for write in step.writes if write.use == "color"]
+        if step.node == self.type.name and colors and not outputs_of(program):
+            place = declared_at(self.type.shaders / dict(step.shaders)["fragment"], colors[0])
+            self.say(Problem("RG454", f"the shader never writes '{colors[0]}', which its step draws to", place))
 
     def _compare(
         self, variant: Variant, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]
     ) -> None:
-        told = {problem.place for problem in self.problems if problem.code == "RG454"}
         for name in one:
             port = name.partition("_")[2]
             if name.startswith("from_"):
-                known = self._fed.setdefault(name, one[name])
-                if not np.array_equal(known, one[name], equal_nan=True):
+                if not np.array_equal(self._fed[name], one[name]):
                     text = f"the node changes its input '{port}'; an InOut port may be continued, inputs are only read"
                     self.say(Problem("RG457", text, self.port_place(port)))
                 continue
@@ -246,7 +230,7 @@ class Trial:
                 differ &= ~(np.isnan(one[name]) & np.isnan(other[name]))
             count = int(_texels(differ, one[name]).sum())
             total = _texels(differ, one[name]).size
-            if count and not told:
+            if count and not any(problem.code == "RG454" for problem in self.problems):
                 text = f"{count} of {total} texels of '{port}' are not written; write them all, or declare `clear=`"
                 self.say(Problem("RG454", text, self.port_place(port)))
             elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():

@@ -80,6 +80,8 @@ def _colors(array: Pixels, semantic: str) -> Bytes:
         return _palette(array)
     if semantic in _DEPTH:
         return to_bytes(_stretched(array, background=1.0 if semantic != "linear_depth" else math.inf))
+    if array.dtype == np.uint8 and semantic not in _LIGHT and semantic != "normal":
+        return array
     values = array.astype(np.float32) / 255 if array.dtype == np.uint8 else array
     if semantic in _LIGHT:
         return to_bytes(to_srgb(np.nan_to_num(values, nan=0.0, posinf=1.0)))

@@ -177,7 +177,8 @@ BOMB = "\n".join(["#define B0 1.0", *(f"#define B{n + 1} B{n}+B{n}" for n in ran
 SHADERS = {
     "does not compile": (SHADER.replace("gain *", "gain * *"), r"glow.frag:4:\d+: RG410 "),
     "leaves an output unwritten": (SHADER.replace("brighter =", "vec4 lost ="),
-                                   r"glow.frag:3:1: RG454 the shader never writes 'brighter'"),
+                                   r"glow.frag:3:1: RG454 the shader never writes 'brighter', which its step draws to"),
+    "leaves one of two unwritten": (SHADER.replace("void", "out vec4 more;\nvoid"), r"glow.*: RG4(37|54) .*'more'"),
     "writes half": (SHADER.replace("{ ", "{ if (gl_FragCoord.x < 10.0) discard; "),
                     r"glow.py:8:5: RG454 230 of 851 texels of 'brighter' are not written; write them all, or declare"),
     "never looks at a parameter": (SHADER.replace("= gain *", "="), r"glow.py:10:5: RG455 'gain' is declared, but no"),
@@ -195,7 +196,8 @@ SHADERS = {
 @pytest.mark.parametrize("name", SHADERS)
 def test_a_wrong_shader_is_one_message(check: Check, name: str) -> None:
     shader, message = SHADERS[name]
-    answer = check(GOOD, shader)
+    more = '    more = Output(like="radiance", doc="More.")\n' if "more" in shader else ""
+    answer = check(GOOD + more, shader)
     assert answer.code == 3
     assert len(answer.messages) == 1, answer.messages
     assert re.match(message, answer.messages[0]), answer.messages
@@ -231,6 +233,28 @@ def test_an_input_that_is_left_out_is_tried(check: Check) -> None:
     answer = check(GOOD.replace("Input(Radiance, doc", "Input(Radiance, optional=True, doc"))
     assert answer.code == 3
     assert any("without radiance" in message for message in answer.messages), answer.messages
+
+
+def test_an_input_that_is_written_is_found(check: Check, tmp_path: Path) -> None:
+    python = GOOD.replace("Input(Radiance", 'Input(Radiance, use="image"').replace(
+        "    gain", '    shader = "glow.comp"\n    gain'
+    )
+    shader = """layout(local_size_x = 8, local_size_y = 8) in;
+layout(rgba16f) uniform image2D radiance;
+layout(rgba16f) uniform writeonly image2D brighter;
+uniform float gain;
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    imageStore(brighter, texel, gain * imageLoad(radiance, texel));
+    imageStore(radiance, texel, vec4(0.0));
+}
+"""
+    (tmp_path / "glow.comp").write_text(shader)
+    answer = check(python)
+    assert answer.code == 3
+    assert re.match(r"glow.py:7:5: RG457 the node changes its input 'radiance'", answer.messages[-1]), answer.messages
+    (tmp_path / "glow.comp").write_text("".join(shader.splitlines(keepends=True)[:7] + ["}\n"]))
+    assert check(python).messages == []
 
 
 def test_values_that_are_not_finite_are_a_warning(check: Check) -> None:
