@@ -10,9 +10,10 @@ from typing import Any
 
 from rendergraph import document
 from rendergraph.cli.explain import file_keys
-from rendergraph.glsl import source
+from rendergraph.compare.axes import MOST_RUNS
+from rendergraph.glsl import expansion, source
 from rendergraph.resolve import MOST_SIDE, flatten
-from rendergraph.scene import files
+from rendergraph.scene import files, image_header
 from rendergraph.schedule import MOST_STEPS
 
 from .markdown import code, prose, table
@@ -56,21 +57,30 @@ def _default(row: dict[str, Any]) -> str:
 
 
 def _limits() -> str:
-    rows = [*_documented("a YAML file", document.Limits), *_documented("a scene", files.Limits)]
+    rows = [*_documented("a YAML file", "yaml", document.Limits), *_documented("a scene", "scene", files.Limits)]
     rows += [
-        ("a pipeline", "nodes, those of sub-pipelines included", flatten.MOST_NODES),
-        ("a pipeline", "sub-pipelines inside each other", flatten.MOST_NESTED),
-        ("a pipeline", "steps", MOST_STEPS),
-        ("a picture", "pixels along one side; a driver's own limit may be lower", MOST_SIDE),
-        ("a shader", "bytes with its includes", source.MAX_BYTES),
-        ("a shader", "includes inside each other", source.MAX_DEPTH),
+        ("an image", "channels of an EXR", image_header.MOST_CHANNELS, ""),
+        ("a pipeline", "nodes, those of sub-pipelines included", flatten.MOST_NODES, ""),
+        ("a pipeline", "sub-pipelines inside each other", flatten.MOST_NESTED, ""),
+        ("a pipeline", "steps", MOST_STEPS, ""),
+        ("a picture", "pixels along one side; a driver's own limit may be lower", MOST_SIDE, ""),
+        ("a shader", "bytes with its includes", source.MAX_BYTES, ""),
+        ("a shader", "includes inside each other", source.MAX_DEPTH, ""),
+        ("a shader", "words that its macros make", expansion.MOST_TOKENS, ""),
+        ("a shader", "names of extensions that its conditions ask for", expansion.MOST_UNKNOWN, ""),
+        ("a sweep", "runs", MOST_RUNS, ""),
     ]
-    return table(("of", "limit on", "value"), [(of, prose(what), f"{most:,}") for of, what, most in rows])
+    shown = [(of, prose(what), f"{most:,}", code(name) if name else "") for of, what, most, name in rows]
+    return table(("of", "limit on", "value", "`--limit`"), shown)
 
 
-def _documented(of: str, limits: Any) -> list[tuple[str, str, int]]:
-    """The fields of a class of limits, as its docstring explains them."""
+def _documented(of: str, kind: str, limits: Any) -> list[tuple[str, str, int, str]]:
+    """The fields of a class of limits, as its docstring explains them, and what `--limit` calls them."""
     doc = re.sub(r"\n {8,}", " ", inspect.getdoc(limits) or "")
     about = dict(re.findall(r"^ +(\w+): (.*)$", doc, re.MULTILINE))
     values = {field.name: getattr(limits, field.name) for field in dataclasses.fields(limits)}
-    return [(of, about[name].rstrip("."), most) for name, most in values.items() if name in about]
+    return [
+        (of, about[name].rstrip("."), most, f"{kind}-{name.replace('_', '-')}=N")
+        for name, most in values.items()
+        if name in about
+    ]
