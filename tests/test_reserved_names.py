@@ -17,7 +17,7 @@ WORDS = """
     readonly resource restrict return row_major sample shared short sizeof smooth static std140 std430 struct subroutine
     superp switch template texture this triangle triangles true typedef uint uniform union unsigned using uvec2 varying
     vec2 void volatile while writeonly
-""".split()
+""".split()  # noqa: SIM905 - a list of so many words reads best as text
 """Words of GLSL of all versions that a name of a port, in lower case, could be."""
 
 
