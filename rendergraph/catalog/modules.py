@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import traceback
 from pathlib import Path
 
 from pydantic import PydanticUserError
 
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes, mistake_place
+from rendergraph.declare.blame import own_place
 from rendergraph.errors import InputError, Place, Problem
 
 
@@ -23,7 +23,7 @@ def load(name: str, listed: Listed) -> NodeType:
     try:
         module = importlib.import_module(listed.module)
     except (Exception, SystemExit) as error:  # whatever a stranger's module raises is a mistake in that module
-        raise InputError(_failed(name, listed.file, error)) from error
+        raise InputError(_failed(name, listed, error)) from error
     classes = [
         value
         for value in vars(module).values()
@@ -41,14 +41,11 @@ def load(name: str, listed: Listed) -> NodeType:
     return NodeType(name, listed.family, classes[0], listed.file, listed.shaders, listed.plugin)
 
 
-def _failed(name: str, file: Path, error: BaseException) -> Problem:
-    """The author's own line of what a module raised."""
-    line = 0
-    if isinstance(error, SyntaxError) and error.filename == str(file):
-        line = error.lineno or 0
-    for frame in traceback.extract_tb(error.__traceback__):
-        if frame.filename == str(file):
-            line = frame.lineno or line
+def _failed(name: str, listed: Listed, error: BaseException) -> Problem:
+    """The author's own line of what a module raised, or a helper that it imports."""
+    file, line = own_place(error, listed.module) or (str(listed.file), 0)
+    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).is_relative_to(listed.file.parent):
+        file, line = error.filename, error.lineno or 0
     said = getattr(error, "message", error) if isinstance(error, PydanticUserError) else error  # without its link
     text = f"node type '{name}' cannot be imported: {type(error).__name__}: {said}"
-    return Problem("RG491", " ".join(text.split()), Place(str(file), line, 1 if line else 0))
+    return Problem("RG491", " ".join(text.split()), Place(file, line, 1 if line else 0))

@@ -13,7 +13,7 @@ from rendergraph.allocate import ResourcePlan
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
-from rendergraph.gl.textures import GpuTexture
+from rendergraph.gl.textures import GpuTexture, texel
 from rendergraph.records import dataclass
 from rendergraph.steps import Read, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -215,17 +215,13 @@ class ClearTarget:
     ) -> None:  # fmt: skip
         raw, glo, family = device.raw, framebuffer.glo, FORMATS[format].family
         self._args: tuple[int | float, ...]
-        values = np.zeros(4)
-        given = np.atleast_1d(np.asarray(value, np.float64))
-        values[: len(given)] = given
-        values[len(given) :] = given[-1] if len(given) == 1 else 0
         dtype = {"uint": np.uint32, "int": np.int32}.get(family, np.float32)
-        self._data = values.astype(dtype)  # kept alive: the call holds its address
+        self._data = texel(value, 4, dtype)  # kept alive: the call holds its address
         address = self._data.ctypes.data
         if family == "depth":
             self._call, self._args = raw.glClearNamedFramebufferfv, (glo, 0x1801, 0, address)
         elif family == "depth_stencil":
-            self._call, self._args = raw.glClearNamedFramebufferfi, (glo, 0x84F9, 0, float(given[0]), 0)
+            self._call, self._args = raw.glClearNamedFramebufferfi, (glo, 0x84F9, 0, float(self._data[0]), 0)
         else:
             name = {"uint": "glClearNamedFramebufferuiv", "int": "glClearNamedFramebufferiv"}.get(
                 family, "glClearNamedFramebufferfv"

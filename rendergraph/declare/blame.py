@@ -20,8 +20,14 @@ def author_line(error: BaseException, cls: type) -> str:
     Returns:
         The place, or nothing where the exception never met the author's code.
     """
-    own = [(code, line) for frame, code, line in _frames(error.__traceback__) if _is_own(frame, cls)]
-    return f"{shown_file(own[-1][0].co_filename)}:{own[-1][1]}" if own else ""
+    found = own_place(error, cls.__module__)
+    return f"{shown_file(found[0])}:{found[1]}" if found is not None else ""
+
+
+def own_place(error: BaseException, module: str) -> tuple[str, int] | None:
+    """File and line of the innermost line of a module's own package that an exception came through."""
+    own = [(code.co_filename, line) for frame, code, line in _frames(error.__traceback__) if _is_own(frame, module)]
+    return own[-1] if own else None
 
 
 def is_deliberate(error: BaseException, cls: type) -> bool:
@@ -31,7 +37,7 @@ def is_deliberate(error: BaseException, cls: type) -> bool:
     last = error.__traceback__
     while last is not None and last.tb_next is not None:
         last = last.tb_next
-    if last is None or not _is_own(last.tb_frame, cls):
+    if last is None or not _is_own(last.tb_frame, cls.__module__):
         return False
     return last.tb_frame.f_code.co_code[last.tb_lasti] == opmap["RAISE_VARARGS"]
 
@@ -49,11 +55,9 @@ def _frames(trace: TracebackType | None) -> Iterator[tuple[FrameType, CodeType, 
         trace = trace.tb_next
 
 
-def _is_own(frame: FrameType, cls: type) -> bool:
-    module = str(frame.f_globals.get("__name__", ""))
-    if module.partition(".")[0] != cls.__module__.partition(".")[0]:
-        return False
-    return not is_framework(module)
+def _is_own(frame: FrameType, module: str) -> bool:
+    name = str(frame.f_globals.get("__name__", ""))
+    return name.partition(".")[0] == module.partition(".")[0] and not is_framework(name)
 
 
 def is_framework(module: str) -> bool:

@@ -167,6 +167,19 @@ def upload_bytes(device: Device, texture: GpuTexture, texels: npt.NDArray[np.uin
     device.raw.glTextureSubImage2D(texture.glo, 0, 0, 0, width, height, 0x1908, _UBYTE, data.ctypes.data)
 
 
+def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.NDArray[Any]:
+    """A clear value as the channels of a format: one number goes to all of them, missing ones are 0."""
+    values = np.zeros(channels, np.float64)
+    given = np.atleast_1d(np.asarray(value, np.float64))[:channels]
+    values[: len(given)] = given
+    if len(given) == 1:
+        values[:] = given[0]
+    if np.issubdtype(dtype, np.integer):
+        limits = np.iinfo(dtype)
+        values = np.clip(np.nan_to_num(values), limits.min, limits.max)
+    return values.astype(dtype)
+
+
 class Clear:
     """A clear of a texture, one mip or one layer, prepared once and called in every frame."""
 
@@ -178,12 +191,9 @@ class Clear:
         gl_format, gl_type, dtype, channels = transfer_format(desc.format)
         if FORMATS[desc.format].srgb or (dtype is np.uint8):
             gl_type, dtype = _FLOAT, np.float32
-        values = np.zeros(channels, dtype)
-        given = np.broadcast_to(np.asarray(value, np.float64), (channels,) if np.ndim(value) == 0 else np.shape(value))
+        values = texel(value, channels, dtype)
         if FORMATS[desc.format].family == "depth_stencil":
-            values[0] = given[0]
-        else:
-            values[:] = given[:channels].astype(dtype) if np.issubdtype(dtype, np.floating) else given[:channels]
+            values[1:] = 0
         if FORMATS[desc.format].srgb:  # a clear stores what it is given, where drawing encodes it
             color = np.clip(values[:3], 0.0, 1.0)
             values[:3] = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)

@@ -138,10 +138,11 @@ def macro(name: str, value: object) -> str:
     raise Misuse(f"defines gives {name} the value {shown(value)}; a macro is a number, True, False or text")
 
 
-def shader_files(files: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
-    """Stage to file of the stages that a step has."""
+def shader_files(files: Mapping[str, object], required: str) -> tuple[tuple[str, str], ...]:
+    """Stage to file of the stages that a step has; one of them it cannot do without."""
     for stage, file in files.items():
-        if file is not None and (not isinstance(file, str) or not file):
+        missing = file is None and stage != required
+        if not missing and (not isinstance(file, str) or not file):
             raise Misuse(f"the {stage} shader is {shown(file)}, not the name of a file")
     return tuple((stage, str(file)) for stage, file in files.items() if file is not None)
 

@@ -59,6 +59,8 @@ class Request:
 
 Target: TypeAlias = "Port | Part"
 
+_REQUIRED = {"fullscreen": "fragment", "geometry": "vertex", "draw": "vertex", "compute": "compute"}
+
 
 class Steps:
     """The list a node fills in `record`.
@@ -105,11 +107,12 @@ class Steps:
         Raises:
             Misuse: it is no port of this node, holds no texture, or is an input that is not connected.
         """
-        found = self._desc(checks.own_port(self.node, port, "desc's argument"))
+        own = checks.own_port(self.node, port, "desc's argument")
+        found = self._desc(own)
         if found is None:
-            raise checks.unconnected(port)
+            raise checks.unconnected(own)
         if isinstance(found, BufferDesc):
-            raise Misuse(f"'{port.name}' holds no texture; its description has no size or format")
+            raise Misuse(f"'{own.name}' holds no texture; its description has no size or format")
         return found
 
     def _connected(self, port: Port) -> None:
@@ -300,7 +303,7 @@ class Steps:
         self._recorder.add(
             Request(
                 kind=kind,
-                shaders=checks.shader_files(shaders),
+                shaders=checks.shader_files(shaders, _REQUIRED.get(kind, "")),
                 out=tuple(targets.items()),
                 bindings=textures,
                 default_inputs=not textures and kind in ("fullscreen", "geometry", "draw", "compute"),
@@ -329,8 +332,8 @@ class Steps:
 
     def _check_options(self, options: Mapping[str, Any]) -> None:
         """What several kinds of step take."""
-        state = options.get("state")
-        if state is not None and not isinstance(state, State):
+        state = options.get("state", State())
+        if not isinstance(state, State):
             raise Misuse(f"state is {checks.shown(state)}, not a State(…)")
         if options.get("view") is not None:
             port = checks.own_port(self.node, options["view"], "view")

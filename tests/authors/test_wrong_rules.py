@@ -110,6 +110,19 @@ def test_a_helper_beside_the_node_is_the_authors_own(author: Any) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("helper", "said_of"),
+    [("import math\nSIZE = 1 / 0\n", "_shade.py:2:1: RG491 node type 'wrong' cannot be imported: ZeroDivisionError"),
+     ("import math\n\ndef shade(:\n", "_shade.py:3:1: RG491 node type 'wrong' cannot be imported: SyntaxError"),
+     ("SIZE = 1\n", "wrong.py:13:1: RG491 node type 'wrong' cannot be imported: ImportError")],
+)  # fmt: skip
+def test_a_helper_that_cannot_be_imported(author: Any, helper: str, said_of: str) -> None:
+    author.write(_shade__py=helper)
+    author.node(COLOR, before="from ._shade import shade\n\n\n")
+    (said,) = author.said(author.pipeline().check)
+    assert said.startswith(said_of)
+
+
 def test_what_numpy_raises_is_at_the_authors_line(author: Any) -> None:
     author.node(COLOR + "def record(self, steps):\n    numpy.linalg.inv(numpy.zeros((2, 2)))  # here")
     (said,) = author.said(author.pipeline().check)

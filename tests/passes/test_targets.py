@@ -334,3 +334,20 @@ def test_srgb_texels_are_read_back_linear(draw: Draw) -> None:
     image = draw("nodes: {s: {type: encoded}}\noutputs: {image: s.color}", Encoded, shaders=shaders)["image"]
     np.testing.assert_allclose(image[0, 0], [0.5, 0.05, 0.001, 0.5], atol=0.005)
     assert abs(image[0, 0, 2] - 0.001) < 2e-4  # linear near black: a step is 1/255/12.92
+
+
+class Filled(Node):
+    """Textures of one value."""
+
+    color = Output(AnyTexel, format="rgba32f", doc="Colour.")
+    ids = Output(AnyTexel, format="r32ui", doc="Numbers.")
+
+    def record(self, steps: Steps) -> None:
+        steps.clear(self.color, (1, 2, 3))
+        steps.clear(self.ids, -1)
+
+
+def test_a_clear_fills_missing_channels_with_zero_and_stays_in_range(draw: Draw) -> None:
+    frame = draw("nodes: {f: {type: filled}}\noutputs: {image: f.color, ids: f.ids}", Filled)
+    np.testing.assert_array_equal(frame["image"][0, 0], [1, 2, 3, 0])
+    assert frame["ids"].max() == 0
