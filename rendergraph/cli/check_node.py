@@ -24,11 +24,12 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 def command(
     file: Path, scene: str | None, limits: tuple[tuple[str, int], ...], plugins: tuple[Path, ...], as_json: bool
 ) -> None:
-    """Try a node, a Python module or a shader file, in every variant.
+    """Try a node of your own in every variant.
 
-    Looks at its docs and ranges, compiles its shaders with every choice and with inputs connected and not, and draws
-    it: it must write all that it declares, touch nothing else, and leave nothing behind. All of it happens in a
-    process with limits. Exits 0 where all is well; exits 3 with every mistake and its line where not.
+    FILE is a Python module or a shader file. Looks at its docs and ranges, compiles its shaders with every choice and
+    with inputs connected and not, and draws it: it must write all that it declares, touch nothing else, and leave
+    nothing behind. All of it happens in a process with limits. Exits 0 where all is well; exits 3 with every mistake
+    and its line where not.
 
     \b
     Examples:
