@@ -9,13 +9,15 @@ import yaml
 
 from rendergraph.resources import folder
 
-from .markdown import block, listing, page, prose, table
+from .markdown import block, page, prose, table
 
 GROUPS = {
     "RG0": "Text and files", "RG1": "Names, links and parameters", "RG2": "Types at ports, sizes and formats",
     "RG3": "Scenes, meshes and images", "RG4": "Nodes and shaders", "RG5": "The command line",
     "RG6": "Order, limits, memory and devices",
 }  # fmt: skip
+# The index lists them. Rows of a menu that every page repeats, they were most of the time of a build.
+_NOT_IN_THE_TREE = "---\norphan: true\n---\n\n"
 LANGUAGES = {"pipeline": "yaml", "scene": "yaml", "node": "python", "shader": "glsl", "compute": "glsl"}
 
 
@@ -37,12 +39,12 @@ def _index(found: list[dict[str, Any]]) -> str:
         rows = [(f"[`{e['code']}`]({e['code']}.md)", prose(e["title"])) for e in found if e["code"].startswith(start)]
         if rows:
             parts.append(f"## {title}\n\n" + table(("code", "what is wrong"), rows))
-    return page("Error codes", *parts, listing(entry["code"] for entry in found))
+    return page("Error codes", *parts)
 
 
 def _page(entry: dict[str, Any]) -> str:
     language = LANGUAGES.get(str(entry.get("kind", "pipeline")), "text")
-    return page(
+    return _NOT_IN_THE_TREE + page(
         f"{entry['code']}: {prose(entry['title'])}",
         prose(str(entry["about"])),
         f"## Wrong\n\n{block(str(entry['wrong']), language)}" if entry.get("wrong") else "",
