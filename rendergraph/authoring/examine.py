@@ -62,13 +62,15 @@ def examine(node: NodeType, scene: str = SCENE, tell: Tell = lambda stage, what:
         trial = Trial(node, Path(folder), scene)
         trial.check_scene()
         for name in trial.around.unfed:
-            text = f"nothing can be made up for input '{name}'; what needs it is not tried"
+            text = f"nothing can be made up for input '{name}', so the node is not drawn"
             problems.append(Problem("RG459", text, port_place(node, name), severity="warning"))
-        for variant in variants(node.cls):
+        for variant in variants(node.cls) if not trial.around.unfed else ():
             tell("pass", variant.name or "default")
             trial.run(variant)
         problems += _drawn(node, trial.close())
-    if not any(problem.severity == "error" for problem in problems):  # what is not drawn looks at nothing
+    if trial.tried and not any(
+        problem.severity == "error" for problem in problems
+    ):  # what is not drawn looks at nothing
         for name in declarations.unused(node, trial.seen, trial.files):
             text = f"'{name}' is declared, but no program looks at it: none uses it, or it changes nothing"
             problems.append(Problem("RG455", text, port_place(node, name), severity=_mild(node)))

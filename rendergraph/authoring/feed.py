@@ -60,7 +60,7 @@ class Surrounded:
         folder: where shaders and pipelines of the surroundings are written.
         sources: input to the type that feeds it.
         readers: output to the type that reads it.
-        unfed: inputs that nothing can be made for.
+        unfed: required inputs that nothing can be made for.
     """
 
     checked: NodeType
@@ -74,7 +74,7 @@ class Surrounded:
             cls = _source(name, port, self.folder)
             if cls is not None:
                 self.sources[name] = self._added("feed", name, cls)
-            elif not _needs_none(port):
+            elif not port.optional:
                 self.unfed.append(name)
         for name, output in self.checked.cls.outputs().items():
             reader = _reader(name, output, self.folder)
@@ -89,10 +89,11 @@ class Surrounded:
     def _added(self, word: str, name: str, cls: type[Node]) -> NodeType:
         return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
 
-    def catalog(self, extensions: Any = None) -> Catalog:
+    def catalog(self) -> Catalog:
         """The node's type and those around it."""
-        found = {entry.name: entry for entry in (self.checked, *self.sources.values(), *self.readers.values())}
-        return Catalog({}, found) if extensions is None else Catalog({}, found, extensions)
+        return Catalog(
+            {}, {entry.name: entry for entry in (self.checked, *self.sources.values(), *self.readers.values())}
+        )
 
     def pipeline(self, variant: Variant, scene: str) -> dict[str, Any]:
         """A pipeline file of one variant, as plain values; outputs are what feeds the node, then the node's.
@@ -131,10 +132,6 @@ class Surrounded:
 
 
 # --- sources ---------------------------------------------------------------------------------------------------------
-
-
-def _needs_none(port: Port) -> bool:
-    return bool(getattr(port, "optional", False))
 
 
 def _source(name: str, port: Input | InOut, folder: Path) -> type[Node] | None:

@@ -128,7 +128,7 @@ class Trial:
         if left and not any(problem.severity == "error" for problem in self.problems):
             every = ", ".join(f"{count} {kind.lower()}{'s' if count > 1 else ''}" for kind, count in left.items())
             self.say(Problem("RG456", f"the node leaves GL objects behind: {every}", Place(self.shown)), always=True)
-        if not any(problem.severity == "error" for problem in self.problems):
+        if self.tried and not any(problem.severity == "error" for problem in self.problems):
             for name in self.type.cls.outputs().keys() - self.written:
                 text = f"output '{name}' is written in no variant; write it in `record`, or take it away"
                 self.say(Problem("RG454", text, self.port_place(name)), always=True)

@@ -54,7 +54,7 @@ def command(
         raise InputError(report.mistakes)
     warn(report.problems)
     count = len(report.variants)
-    say(f"{report.node}: all is well in {count} variant{'s' if count > 1 else ''}")
+    say(f"{report.node}: all is well in {count} variant{'' if count == 1 else 's'}")
     if as_json:
         emit_json(
             {
