@@ -102,7 +102,8 @@ def _names(cls: type[Node]) -> Iterator[str]:
     for name in [*ports, *(name for name in parameters if name not in plan)]:
         if name in given:
             yield f"'{name}' is what shaders are given for the {given[name][1]} of port '{given[name][0]}'; rename one"
-    for group in cls.groups():
+    named = [getattr(port, "group", None) for port in ports.values()]
+    for group in dict.fromkeys(group for group in named if isinstance(group, str)):
         if group in ports or group in parameters:
             yield f"group '{group}' has the name of a port or parameter"
     shader = cls.shader

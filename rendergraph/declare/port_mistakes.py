@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 from typing import Any, get_args
 
 from rendergraph.declare.node import Node
@@ -27,11 +28,16 @@ def port_mistakes(cls: type[Node]) -> list[str]:
     return found
 
 
-def _word(name: str, what: str, value: object, known: tuple[Any, ...]) -> Iterator[str]:
-    if not callable(value) and value not in known:
-        words = [word for word in known if isinstance(word, str)]
-        near = suggestion(value if isinstance(value, str) else "", words, most=len(words))
+def _word(name: str, what: str, value: object, known: tuple[str, ...]) -> Iterator[str]:
+    if not isinstance(value, str) or value not in known:
+        near = suggestion(value if isinstance(value, str) else "", known, most=len(known))
         yield f"port '{name}' has {what} {value!r}{near}"
+
+
+def _switches(name: str, port: Port, *flags: str) -> Iterator[str]:
+    for flag in flags:
+        if not isinstance(getattr(port, flag), bool):
+            yield f"port '{name}' has {flag}={getattr(port, flag)!r}; it is True or False"
 
 
 def _whole(name: str, what: str, value: object, least: int) -> Iterator[str]:
@@ -42,29 +48,34 @@ def _whole(name: str, what: str, value: object, least: int) -> Iterator[str]:
 
 
 def _input(name: str, port: Input) -> Iterator[str]:
+    yield from _word(name, "kind", port.kind, get_args(Kind))
+    if not isinstance(port.kind, str):
+        return
     wanted = Signature if port.kind == "function" else Semantic
     if not isinstance(port.semantic, wanted):
         yield f"port '{name}' has the semantic {port.semantic!r}; it is a {wanted.__name__}, such as " + (
             "ShadowLookup" if wanted is Signature else "Radiance"
         )
-    yield from _word(name, "kind", port.kind, get_args(Kind))
     yield from _word(name, "size", port.size, ("same", "any"))
-    yield from _word(name, "filter", port.filter, get_args(Filter))
+    if not callable(port.filter):
+        yield from _word(name, "filter", port.filter, get_args(Filter))
     yield from _word(name, "wrap", port.wrap, get_args(Wrap))
     yield from _word(name, "samples", port.samples, ("single", "multi", "any"))
     yield from _word(name, "use", port.use, ("sample", "depth_test", "image"))
     yield from _whole(name, "anisotropy", port.anisotropy, 1)
-    for flag in ("compare", "optional", "many"):
-        if not isinstance(getattr(port, flag), bool):
-            yield f"port '{name}' has {flag}={getattr(port, flag)!r}; it is True or False"
+    yield from _switches(name, port, "compare", "optional", "many")
+    if port.group is not None and not isinstance(port.group, str):
+        yield f"port '{name}' has group={port.group!r}; it is the group's name"
 
 
 def _made(name: str, port: Made, ports: dict[str, Port]) -> Iterator[str]:
+    yield from _word(name, "kind", port.kind, (*sorted(TEXTURE_KINDS), "buffer"))
+    if not isinstance(port.kind, str):
+        return
     if port.semantic is not None and not isinstance(port.semantic, Semantic):
         yield f"port '{name}' has the semantic {port.semantic!r}; it is a Semantic, such as Radiance"
     elif port.semantic is None and port.like is None and not isinstance(port, Internal | History):
         yield f"port '{name}' has neither a semantic nor `like`"
-    yield from _word(name, "kind", port.kind, (*sorted(TEXTURE_KINDS), "buffer"))
     if isinstance(port.format, str) and port.format not in FORMATS:
         yield f"port '{name}' has an unknown format '{port.format}'{suggestion(port.format, FORMATS)}"
     elif port.format is not None and not isinstance(port.format, str) and not callable(port.format):
@@ -77,10 +88,14 @@ def _made(name: str, port: Made, ports: dict[str, Port]) -> Iterator[str]:
         yield from _whole(name, "bytes", port.bytes, 1)
         if isinstance(port, History):
             yield f"'{name}' is a History of a buffer; only textures keep last frame's values"
-        if not callable(port.clear) and port.clear not in (None, 0):
+        if not callable(port.clear) and not (port.clear is None or (_is_texel(port.clear) and port.clear == 0)):
             yield f"port '{name}' is a buffer, which is cleared to 0 alone, not to {port.clear!r}"
     elif not callable(port.clear) and port.clear is not None and not _is_texel(port.clear):
         yield f"port '{name}' has clear={port.clear!r}; it is a number, up to four of them, or None"
+    if port.kind != "buffer" and not (isinstance(port.bytes, int) and port.bytes == 0):
+        yield f"port '{name}' has bytes={port.bytes!r}, but is no buffer; say kind='buffer'"
+    if isinstance(port, InOut):
+        yield from _switches(name, port, "optional")
     if port.first is not None and (isinstance(port.first, bool) or not isinstance(port.first, int | float)):
         yield f"port '{name}' has first={port.first!r}; it is a number, for every channel"
 
@@ -99,17 +114,18 @@ def _size(name: str, rule: Any, ports: dict[str, Port]) -> Iterator[str]:
         if not isinstance(ports.get(source), Input | InOut):
             yield f"port '{name}' has the size of '{source}', which is no input{_near(source, ports)}"
         factor = rule[1] if isinstance(rule, tuple) else 1.0
-        if isinstance(factor, bool) or not isinstance(factor, int | float) or factor <= 0:
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or not 0 < factor < inf:
             yield f"port '{name}' has the size of '{source}' times {factor!r}; a factor is a number above 0"
     elif isinstance(rule, tuple):
         if len(rule) != 2 or not all(isinstance(n, int) and not isinstance(n, bool) and n > 0 for n in rule):
             yield f"port '{name}' has size={rule!r}; width and height are whole numbers from 1"
-    elif isinstance(rule, bool) or not isinstance(rule, int | float) or rule <= 0:
+    elif isinstance(rule, bool) or not isinstance(rule, int | float) or not 0 < rule < inf:
         yield f"port '{name}' has size={rule!r}; a factor of the viewport is a number above 0"
 
 
 def _views(name: str, port: Views) -> Iterator[str]:
     yield from _whole(name, "count", port.count, 0)
+    yield from _switches(name, port, "public")
     if port.lights is not None and not callable(port.lights):
         yield f"port '{name}' has lights={port.lights!r}; it is a function of node and facts"
 
@@ -119,8 +135,8 @@ def _function(name: str, port: Function) -> Iterator[str]:
         yield f"port '{name}' has the signature {port.signature!r}; it is a Signature, such as ShadowLookup"
     if not isinstance(port.shader, str) or not port.shader:
         yield f"port '{name}' has shader={port.shader!r}; it is the name of the file with its text"
-    for read in port.reads:
-        if not isinstance(read, str | Part):
+    for read in port.reads if isinstance(port.reads, tuple | list) else (port.reads,):
+        if not isinstance(read, str | Part) or isinstance(port.reads, str):
             yield f"port '{name}' reads {read!r}; `reads` holds names of ports, or ports with `.sampled(…)`"
 
 
@@ -133,18 +149,24 @@ def _named(name: str, port: Port, ports: dict[str, Port]) -> Iterator[str]:
     )
     for rule, kinds, otherwise in takes:
         target = getattr(port, rule, None)
-        if not isinstance(target, str):
+        if target is None or (rule == "lights" and callable(target)) or isinstance(port, Views):
             continue
-        if target not in ports:
+        if not isinstance(target, str):
+            yield f"port '{name}' has {rule}={target!r}; it is the name of another port"
+        elif target not in ports:
             yield f"port '{name}' is {rule} '{target}', which is no port{_near(target, ports)}"
         elif not isinstance(ports[target], kinds):
             yield f"port '{name}' is {rule} '{target}', which is {otherwise}"
-    for target in getattr(port, "needs", ()):
-        if target not in ports:
+    needs = getattr(port, "needs", ())
+    for target in needs if isinstance(needs, tuple | list) else (needs,):
+        if not isinstance(target, str) or isinstance(needs, str):
+            yield f"port '{name}' has needs={needs!r}; it is a tuple of inputs' names"
+        elif target not in ports:
             yield f"port '{name}' needs '{target}', which is no port{_near(target, ports)}"
         elif not isinstance(ports[target], Input | InOut):
             yield f"port '{name}' needs '{target}', which is no input"
-    for read in getattr(port, "reads", ()):
+    reads = getattr(port, "reads", ())
+    for read in reads if isinstance(reads, tuple | list) else ():
         target = read.port.name if isinstance(read, Part) else read
         if isinstance(target, str) and not isinstance(ports.get(target), Input | Made):
             yield f"port '{name}' reads '{target}', which is no port{_near(target, ports)}"
