@@ -20,22 +20,34 @@
 uniform float bias;           // texels towards the light
 uniform float normal_offset;  // factor on what the slope asks for
 
-// The place of a moved point in one layer; false where the layer does not see it.
-bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out vec3 place) {
-    View view = MAP_VIEWS[layer];
-    vec2 sides = view.viewport.zw * vec2(view.inverse_projection[0][0], view.inverse_projection[1][1]);
-    float texel = 2.0 * max(sides.x, sides.y);  // metres across at this distance
-#ifndef MAP_PARALLEL
-    texel *= (view.view_projection * vec4(position, 1.0)).w;
-#endif
-    float cosine = dot(normal, to_light);
-    vec3 lean = abs(mat3(view.view) * (normal - to_light * cosine));
-    float offset = normal_offset * MAP_HALF_WIDTH * (lean.x + lean.y + lean.z);
-    vec3 moved = position + texel * (normal * offset + to_light * bias);
-    vec4 clip = view.view_projection * vec4(moved, 1.0);
+// Where a moved point lies in one layer, in clip space; `half_sides` are half the map's sides, in metres at w = 1.
 #ifdef MAP_PARALLEL
-    clip.w = 1.0;
+// The light lies along the view's z axis: what a normal has across it is its lean, and the point is moved in clip space.
+vec4 moved_in_layer(View view, vec3 position, vec3 normal, vec2 half_sides, float texel) {
+    mat3 turned = mat3(view.view_projection);
+    vec3 along = turned * normal;
+    float lean = dot(abs(along.xy), half_sides);
+    vec3 clip = turned * position + view.view_projection[3].xyz + along * (texel * normal_offset * MAP_HALF_WIDTH * lean);
+    clip.z += texel * bias * view.projection[2][2];
+    return vec4(clip, 1.0);
+}
+#else
+vec4 moved_in_layer(View view, vec3 position, vec3 normal, vec2 half_sides, float texel) {
+    vec3 to_light = to_viewer(view, position);
+    texel *= (view.view_projection * vec4(position, 1.0)).w;
+    vec3 lean = abs(mat3(view.view) * (normal - to_light * dot(normal, to_light)));
+    float offset = normal_offset * MAP_HALF_WIDTH * (lean.x + lean.y + lean.z);
+    return view.view_projection * vec4(position + texel * (normal * offset + to_light * bias), 1.0);
+}
 #endif
+
+// The place of a moved point in one layer; false where the layer does not see it.
+bool place_in_layer(int layer, vec3 position, vec3 normal, out vec3 place) {
+    View view = MAP_VIEWS[layer];
+    vec2 half_sides = vec2(view.inverse_projection[0][0], view.inverse_projection[1][1]);
+    vec2 sides = view.viewport.zw * half_sides;
+    float texel = 2.0 * max(sides.x, sides.y);  // metres across at w = 1
+    vec4 clip = moved_in_layer(view, position, normal, half_sides, texel);
     place = clip.xyz / clip.w * 0.5 + 0.5;
     place.z = min(place.z, 1.0);
     return clip.w > 0.0 && all(greaterThanEqual(place, vec3(0.0))) && all(lessThanEqual(place.xy, vec2(1.0)));
@@ -43,15 +55,15 @@ bool place_in_layer(int layer, vec3 position, vec3 normal, vec3 to_light, out ve
 
 // 1 where the light reaches the point; the first layer of the light that sees the point decides.
 float shadow(int light, vec3 position, vec3 normal) {
-    for (int layer = 0; layer < MAP_LAYERS; ++layer) {
-        if (MAP_LIGHTS[layer] != light) continue;
-#ifdef MAP_PARALLEL
-        vec3 to_light = MAP_VIEWS[layer].eye.xyz;
+    vec3 place;
+#if MAP_LAYERS == 1  // some compilers index by the counter even of a loop that has one turn
+    if (MAP_LIGHTS[0] == light && place_in_layer(0, position, normal, place)) return map_visibility(0, place);
 #else
-        vec3 to_light = to_viewer(MAP_VIEWS[layer], position);
-#endif
-        vec3 place;
-        if (place_in_layer(layer, position, normal, to_light, place)) return map_visibility(layer, place);
+    for (int layer = 0; layer < MAP_LAYERS; ++layer) {
+        if (MAP_LIGHTS[layer] == light && place_in_layer(layer, position, normal, place)) {
+            return map_visibility(layer, place);
+        }
     }
+#endif
     return 1.0;
 }

@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -242,7 +243,7 @@ def test_hemispheres_in_numpy(show: Show) -> None:
     assert np.mean(np.abs(found - expected) > 1e-3) < 0.01
 
 
-def gradient_noise(x: Floats, y: Floats) -> Floats:
+def gradient_noise(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> Floats:
     """In float32, as the shader has it: the outer factor magnifies every rounding."""
     inner = np.float32(x) * np.float32(0.06711056) + np.float32(y) * np.float32(0.00583715)
     return np.asarray((np.float32(52.9829189) * (inner % np.float32(1))) % np.float32(1), np.float64)
@@ -271,7 +272,7 @@ def mean_of_four(blocked: Floats, surfaces: Floats, where: Floats) -> Floats:
         seen = surfaces[there]
         weight = same_surface(where[there] - where, surfaces[..., :3], seen[..., :3]) * inside * (seen[..., 3] > 0)
         total, weighted = total + weight, weighted + weight * blocked[there]
-    return weighted / total
+    return np.asarray(weighted / total)
 
 
 def test_discs_in_numpy(show: Show) -> None:
