@@ -58,8 +58,8 @@ class FakePipeline:
         self.calls: dict[str, Any] = {}
         self.fail: BaseException | None = None
 
-    def wanted(self, outputs: list[str], taps: list[str]) -> None:
-        pass
+    def wanted(self, outputs: list[str], taps: list[str]) -> dict[str, Any]:
+        return {}
 
     def render(self, *, frames: range, outputs: list[str], taps: list[str], on_frame: Any, **rest: Any) -> Any:
         self.calls = {"frames": frames, "outputs": outputs, "taps": taps, **rest}
