@@ -83,8 +83,9 @@ class Surrounded:
 
     @property
     def fed(self) -> list[str]:
-        """The inputs that are fed a texture."""
-        return [name for name in self.sources if self.checked.cls.inputs()[name].kind in TEXTURE_KINDS]
+        """The inputs that are fed a texture which can be read back."""
+        ports = self.checked.cls.inputs()
+        return [name for name in self.sources if ports[name].kind in TEXTURE_KINDS and ports[name].samples != "multi"]
 
     def _added(self, word: str, name: str, cls: type[Node]) -> NodeType:
         return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
@@ -162,8 +163,9 @@ def _source(name: str, port: Input | InOut, folder: Path) -> type[Node] | None:
             steps.fullscreen(shader, out={"made": target}, state=_ALWAYS)
 
     made = Output(
-        meaning, kind=port.kind, format=format, layers=None if port.kind != "texture2d_array" else layers,
-        samples=samples, view="views", lights=_first_light if _has_lights(meaning) else None, doc="A pattern.",
+        meaning, kind=port.kind, format=format, layers=layers if port.kind == "texture2d_array" else None,
+        size=(24, 24) if port.kind == "texture_cube" else None, samples=samples, view="views",
+        lights=_first_light if _has_lights(meaning) else None, doc="A pattern.",
     )  # fmt: skip
     views = Views(count=layers, public=False, doc="The camera's view for each layer.")
     return _node("Pattern", made=made, views=views, record=record, update=_camera("views", layers))
@@ -220,6 +222,13 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
         seen = Input(View, kind="view", doc="What is drawn with.")
         depth = Output(Depth, format="depth32f", clear=1.0, doc="The scene's depth.")
         return _node("Drawer", read=seen, made=depth, record=_draw)
+    samples = getattr(port, "samples", 1)
+    if isinstance(samples, int) and samples > 1:
+        text = "uniform sampler2DMS read;\nout vec4 made;\n"
+        text += "void main() { made = texelFetch(read, ivec2(gl_FragCoord.xy), 0); }\n"
+        (folder / "use_samples.frag").write_text(text, encoding="utf-8")
+        read = Input(AnyTexel, samples="multi", doc="What is read.")
+        return _node("OneSample", read=read, made=value, shader="use_samples.frag")
     if getattr(port, "kind", "") == "buffer":
         (folder / "use_buffer.frag").write_text(
             "layout(std430) readonly buffer read { uint words[]; };\nout vec4 made;\n"

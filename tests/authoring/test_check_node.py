@@ -268,6 +268,12 @@ def test_an_input_that_nothing_can_be_made_up_for_is_a_warning(check: Check) -> 
     ]
 
 
+def test_every_kind_of_port_is_fed_and_read() -> None:
+    report = check_node(Path(__file__).parent / "zoo" / "zoo.py")
+    assert report.problems == ()
+    assert {"without many", "without weights", "without marks", "numbers alone", "seen alone"} <= set(report.variants)
+
+
 def test_values_that_are_not_finite_are_a_warning(check: Check) -> None:
     answer = check(shader=SHADER.replace("gain *", "log(-gain) *"))
     assert answer.code == 0
