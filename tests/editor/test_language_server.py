@@ -108,16 +108,12 @@ class Editor:
 
     def marks(self, folder: Path, text: str) -> list[tuple[int, str]]:
         """What is underlined in a file of this text: lines, from 1, and messages, in order."""
-        uri = self._open(folder, text)
-        while True:
-            found = self._hear()
-            if found.get("method") == "textDocument/publishDiagnostics" and found["params"]["uri"] == uri:
-                return sorted((m["range"]["start"]["line"] + 1, m["message"]) for m in found["params"]["diagnostics"])
+        return self._open(folder, text)[1]
 
     def offers(self, folder: Path, text: str) -> dict[str, str]:
         """What is offered where `|` stands in the text, with its explanation."""
         clean, place = _cursor(text)
-        found = self._ask("textDocument/completion", textDocument={"uri": self._open(folder, clean)}, position=place)
+        found = self._ask("textDocument/completion", textDocument={"uri": self._open(folder, clean)[0]}, position=place)
         items = found["items"] if isinstance(found, dict) else found
         return {item["label"]: _words(item.get("documentation", "")) for item in items}
 
@@ -125,17 +121,25 @@ class Editor:
         """What is shown over the letter after `|`."""
         clean, place = _cursor(text)
         place["character"] += 1
-        found = self._ask("textDocument/hover", textDocument={"uri": self._open(folder, clean)}, position=place)
+        found = self._ask("textDocument/hover", textDocument={"uri": self._open(folder, clean)[0]}, position=place)
         return str(found["contents"]["value"]) if found else ""
 
-    def _open(self, folder: Path, text: str) -> str:
-        """A new file each time, so that no answer about an older text is taken for one about this."""
+    def _open(self, folder: Path, text: str) -> tuple[str, list[tuple[int, str]]]:
+        """A new file each time, so that no answer about an older text is taken for one about this.
+
+        Returns:
+            Its URI and its marks, which come once the server has read the file and its schema.
+        """
         self._opened += 1
         file = folder / f"pipeline-{self._opened}.yaml"
         file.write_text(text, encoding="utf-8")
-        document = {"uri": file.as_uri(), "languageId": "yaml", "version": 1, "text": text}
-        self._tell("textDocument/didOpen", textDocument=document)
-        return file.as_uri()
+        uri = file.as_uri()
+        self._tell("textDocument/didOpen", textDocument={"uri": uri, "languageId": "yaml", "version": 1, "text": text})
+        while True:
+            found = self._hear()
+            if found.get("method") == "textDocument/publishDiagnostics" and found["params"]["uri"] == uri:
+                marks = found["params"]["diagnostics"]
+                return uri, sorted((mark["range"]["start"]["line"] + 1, mark["message"]) for mark in marks)
 
     # --- JSON-RPC -----------------------------------------------------------------------------------------------------
 
