@@ -29,7 +29,7 @@ def check_plan(device: Device, plan: ResourcePlan, views: Mapping[str, ViewTable
     if fixed_blocks + len(views) > bindings:
         texts.append(f"there are {len(views)} view tables; this device binds {bindings - fixed_blocks} at once")
     problems = [Problem("RG435", text) for text in texts]
-    problems += [problem for step in plan.schedule.steps for problem in _step(step, limits)]
+    problems += [problem for step in plan.schedule.steps for problem in _step(step, limits, fixed_blocks)]
     if problems:
         raise RenderError(problems)
 
@@ -50,11 +50,13 @@ def _texture(name: str, desc: object, limits: Mapping[str, int]) -> list[str]:
     return found
 
 
-def _step(step: Step, limits: Mapping[str, int]) -> list[Problem]:
+def _step(step: Step, limits: Mapping[str, int], fixed_blocks: int) -> list[Problem]:
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
+    buffers = {use.name for use in (*step.all_reads, *uses) if use.use == "buffer"}
     found = []
     for words, value, most in (
         ("colour targets", sum(write.use == "color" for write in step.writes), limits["color_targets"]),
+        ("buffers", len(buffers), limits["storage_bindings"] - fixed_blocks),
         ("images", sum(use.use == "image" for use in uses) if step.kind == "compute" else 0, limits["images"]),
     ):
         if value > most:

@@ -201,6 +201,7 @@ def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "integer_samples": raw.integer(0x9110),
         "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
         "images": raw.integer(0x8F38),
+        "storage_bindings": raw.integer(0x90DD),
         **{f"groups_{axis}": raw.integer_at(0x91BE, number) for number, axis in enumerate("xyz")},
     }
     return Device(ctx, raw, owned, limits)

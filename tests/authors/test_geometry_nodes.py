@@ -195,3 +195,21 @@ def test_more_targets_than_the_device_takes(author: Any, gl: rg.Session) -> None
     assert (
         said == f"test.yaml:4:3: RG435 node 'a' (wrong): it has {count + 1} colour targets; this device takes {count}"
     )
+
+
+def test_more_tables_and_buffers_than_the_device_binds(
+    author: Any, gl: rg.Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(gl.device.limits, "uniform_bindings", 6)
+    monkeypatch.setitem(gl.device.limits, "storage_bindings", 6)
+    author.node(
+        'color = Output(Radiance, doc="Colour.")\nviews = Views(doc="One.")\none = Internal(kind="buffer", bytes=8)\n'
+        'two = Internal(kind="buffer", bytes=8)\n\ndef record(self, steps):\n'
+        '    steps.fullscreen("wrong.frag", one=self.one, two=self.two)\n\n'
+        "def update(self, frame):\n    frame.set_views(self.views, [frame.camera])"
+    )
+    said = author.said(lambda: gl.render(author.pipeline()))
+    assert said == [
+        "RG435 there are 2 view tables; this device binds 1 at once",
+        f"test.yaml:4:3: RG435 node 'a' (wrong): wrong.py:{author.line('steps.full')}: it has 2 buffers; this device takes 1",
+    ]

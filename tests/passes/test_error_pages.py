@@ -212,8 +212,26 @@ class Mixed(Node):
 def test_targets_that_no_driver_draws_together(bench: Any) -> None:
     shaders = {"mixed.frag": "out float color; out float layers; void main() { color = layers = 1.0; }"}
     text = "nodes: {m: {type: mixed}}\noutputs: {image: m.color, two: m.layers}"
-    with pytest.raises(InputError, match=r"RG425 .*'m.color' is a plain 2D target, but 'm.layers' is 2 layers; the tar"):
+    with pytest.raises(
+        InputError, match=r"RG425 .*'m.color' is a plain 2D target, but 'm.layers' is 2 layers; the tar"
+    ):
         bench.pipeline(text, Mixed, shaders=shaders).check()
+
+
+class Signed(Node):
+    """A format that some drivers do not draw to."""
+
+    color = Output(AnyTexel, format="rgba16_snorm", doc="From -1 to 1.")
+
+
+def test_targets_that_the_driver_does_not_take(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = bench.session.device.raw
+    assert raw.glCheckNamedFramebufferStatus  # asked for once, so that the patch has something to put back
+    monkeypatch.setattr(raw, "glCheckNamedFramebufferStatus", lambda *_: 0x8CDD)
+    shaders = {"signed.frag": "out vec4 color; void main() { color = vec4(1.0); }"}
+    with pytest.raises(RendergraphError, match="RG617") as caught:
+        bench.draw("nodes: {s: {type: signed}}\noutputs: {image: s.color}", Signed, shaders=shaders)
+    assert said(caught.value) == page("RG617")["message"]
 
 
 def test_every_code_that_is_raised_has_one_page_and_every_page_a_code() -> None:
