@@ -68,6 +68,18 @@ class Fog(Node):
     density: float = param(default=0.05, unit="1/m", min=0, max=10, doc="Part of the light lost in a metre.")
 '''
 
+SHADER = """/*---
+doc: Less light.
+inputs: {radiance: {semantic: radiance, doc: All of it.}}
+outputs: {dimmed: {like: radiance, doc: Some of it.}}
+params: {share: {default: 0.5, min: 0, max: 1, doc: What is left.}}
+---*/
+uniform sampler2D radiance;
+uniform float share;
+out vec4 dimmed;
+void main() { dimmed = share * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0); }
+"""
+
 
 def _command() -> list[str] | None:
     """The language server: named in the environment, on the path, or in the project's own `node_modules`."""
@@ -205,12 +217,13 @@ def editor() -> Iterator[Editor]:
 
 @pytest.fixture(scope="session")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the schema of the standard nodes and of a plugin."""
+    """A folder with the schema of the standard nodes, and one with plugins: a Python file and a shader."""
     folder = tmp_path_factory.mktemp("desk")
-    plugin = folder / "fog.py"
-    plugin.write_text(PLUGIN, encoding="utf-8")
-    for words in (["rendergraph.schema.json"], ["with-fog.schema.json", "--plugin", str(plugin)]):
-        assert main(["schema", "-o", str(folder / words[0]), *words[1:]]) == 0
+    (folder / "fog.py").write_text(PLUGIN, encoding="utf-8")
+    (folder / "dim.frag").write_text(SHADER, encoding="utf-8")
+    plugins = ["--plugin", str(folder / "fog.py"), "--plugin", str(folder / "dim.frag")]
+    assert main(["schema", "-o", str(folder / "rendergraph.schema.json")]) == 0
+    assert main(["schema", "-o", str(folder / "plugins.schema.json"), *plugins]) == 0
     return folder
 
 
@@ -310,7 +323,7 @@ def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path)
     fog = "  fog: {type: fog, inputs: {radiance: light.radiance}, params: {density: 0.1}}\n"
     without = PIPELINE.replace("  display:", fog + "  display:")
     assert [line for line, _ in editor.marks(desk, without)] == [line_of("  display:")]
-    text = without.replace("rendergraph.schema", "with-fog.schema")
+    text = without.replace("rendergraph.schema", "plugins.schema")
     assert editor.marks(desk, text) == []
     ((line, message),) = editor.marks(desk, text.replace("density: 0.1", "density: 11"))
     assert (line, message) == (line_of("  display:"), "Value is above the maximum of 10.")
@@ -320,3 +333,14 @@ def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path)
     assert editor.offers(desk, text.replace("light.radiance}, params", "light.radiance, de|}, params")).keys() == {
         "depth"
     }
+
+
+def test_a_shader_file_is_known_by_its_header_and_by_its_path(editor: Editor, desk: Path) -> None:
+    dim = "  dim: {type: dim, inputs: {radiance: light.radiance}, params: {share: 0.1}}\n"
+    text = PIPELINE.replace("  display:", dim + "  display:").replace("rendergraph.schema", "plugins.schema")
+    assert editor.marks(desk, text) == []
+    ((line, message),) = editor.marks(desk, text.replace("share: 0.1", "share: 2"))
+    assert (line, message) == (line_of("  display:"), "Value is above the maximum of 1.")
+    assert editor.hover(desk, text.replace("share", "|share")).startswith("What is left.\n\nDefault 0.5, 0 to 1. ")
+    assert "- `dimmed`: Some of it." in editor.hover(desk, text.replace("type: dim", "type: |dim"))
+    assert editor.marks(desk, text.replace("type: dim", "type: ./dim.frag").replace("plugins.s", "rendergraph.s")) == []
