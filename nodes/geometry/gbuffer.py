@@ -62,9 +62,9 @@ class GBuffer(Node):
         Any, format=_format("rgba16_snorm"), clear=0.0,
         doc="For the anisotropic model: unit direction of the grain, world space, and its strength in alpha.",
     )  # fmt: skip
-    phong_diffuse = Output(Any, format=_format("srgb8_a8"), clear=0.0, doc="kd of the empirical models.")
-    phong_specular = Output(Any, format=_format("srgb8_a8"), clear=0.0, doc="ks of the empirical models.")
-    phong_ambient = Output(Any, format=_format("srgb8_a8"), clear=0.0, doc="ka of the empirical models.")
+    phong_diffuse = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of kd of the empirical models.")
+    phong_specular = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of ks of the empirical models.")
+    phong_ambient = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of ka of the empirical models.")
 
     precision: Literal["compact", "full"] = structural(
         default="compact", doc="Small formats, or float32 in every channel."

@@ -21,7 +21,7 @@ out vec4 specular;  // of what is not metal: root of f0, for 0.04 is then a whol
 out vec4 grain;  // direction, world space; strength
 #endif
 #ifdef WRITES_PHONG_DIFFUSE
-out vec4 phong_diffuse;
+out vec4 phong_diffuse;  // this and the next two: roots, for dark ones are multiplied by a light as bright as any
 #endif
 #ifdef WRITES_PHONG_SPECULAR
 out vec4 phong_specular;
@@ -52,12 +52,12 @@ void main() {
 #endif
     empirical_reflectance(s, materials[MATERIAL_INDEX(v_material)]);
 #ifdef WRITES_PHONG_DIFFUSE
-    phong_diffuse = vec4(s.diffuse, 1.0);
+    phong_diffuse = vec4(sqrt(s.diffuse), 1.0);
 #endif
 #ifdef WRITES_PHONG_SPECULAR
-    phong_specular = vec4(s.f0, 1.0);
+    phong_specular = vec4(sqrt(s.f0), 1.0);
 #endif
 #ifdef WRITES_PHONG_AMBIENT
-    phong_ambient = vec4(s.ambient, 1.0);
+    phong_ambient = vec4(sqrt(s.ambient), 1.0);
 #endif
 }

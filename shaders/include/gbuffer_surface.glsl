@@ -65,12 +65,15 @@ bool surface_at(ivec2 texel, out Surface s) {
     s.exponent = phong_exponent(s.roughness);
 #ifdef HAS_PHONG_DIFFUSE
     s.diffuse = texelFetch(phong_diffuse, texel, 0).rgb;
+    s.diffuse *= s.diffuse;
 #endif
 #ifdef HAS_PHONG_SPECULAR
     s.f0 = texelFetch(phong_specular, texel, 0).rgb;
+    s.f0 *= s.f0;
 #endif
 #ifdef HAS_PHONG_AMBIENT
     s.ambient = texelFetch(phong_ambient, texel, 0).rgb;
+    s.ambient *= s.ambient;
 #endif
 #endif
 #ifdef NEEDS_GRAIN
