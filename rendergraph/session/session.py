@@ -158,7 +158,7 @@ class Session:
         """Compile a pipeline without drawing it; one that is kept is taken again where only uniforms differ.
 
         The runner's `run` is the bare frame: what `render` does before and after it (warming up, reading back) is the
-        caller's. The session's context must be current.
+        caller's. To be called, and its runner run, inside `with session.device.current()`.
         """
         self._check_thread()
         from rendergraph.allocate import allocate

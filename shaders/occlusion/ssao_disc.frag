@@ -81,7 +81,9 @@ void main() {
     float blocked = here.w == 0.0 ? 0.0 : blocked_at(v, texel, middle, position, here);
     // Derivatives are differences within the four pixels that are computed together: what leads to the other one.
     vec2 to_other = vec2(1 - 2 * (texel & 1));
-    share(blocked, to_other.x * dFdxFine(blocked), here, here + to_other.x * dFdxFine(here), to_other.x * dFdxFine(position), v);
-    share(blocked, to_other.y * dFdyFine(blocked), here, here + to_other.y * dFdyFine(here), to_other.y * dFdyFine(position), v);
+    share(blocked, to_other.x * dFdxFine(blocked), here, here + to_other.x * dFdxFine(here),
+          to_other.x * dFdxFine(position), v);
+    share(blocked, to_other.y * dFdyFine(blocked), here, here + to_other.y * dFdyFine(here),
+          to_other.y * dFdyFine(position), v);
     rough = blocked / MOST_KEPT;
 }
