@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
@@ -19,7 +19,6 @@ from rendergraph.gl import textures
 from rendergraph.gl.surroundings import settle
 from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
-from rendergraph.records import dataclass
 from rendergraph.scene.animate import bounds
 from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
 from rendergraph.steps import ViewMatrices

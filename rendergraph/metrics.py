@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -26,7 +26,6 @@ from rendergraph.declare import Added
 from rendergraph.declare.extension import Metric
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.images import from_srgb, to_srgb
-from rendergraph.records import dataclass
 
 Pixels: TypeAlias = npt.NDArray[Any]
 Floats: TypeAlias = npt.NDArray[np.float64]

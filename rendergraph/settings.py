@@ -8,6 +8,7 @@ is believed only where the user stands in that project, so that a downloaded fol
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
@@ -15,7 +16,6 @@ from typing import Any
 
 from rendergraph.document import read_bytes, shown
 from rendergraph.errors import InputError, Place, Problem, suggestion
-from rendergraph.records import dataclass
 from rendergraph.stamps import look
 
 FILE_NAME = "rendergraph.toml"

@@ -5,10 +5,8 @@ Nothing here touches GL: a format knows its GL enum as a number so that `gl` nee
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
-
-from rendergraph.records import dataclass
 
 Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "scene", "function"]
 TEXTURE_KINDS: frozenset[str] = frozenset({"texture2d", "texture2d_array", "texture_cube"})

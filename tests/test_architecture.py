@@ -42,10 +42,3 @@ def test_everything_before_compile_works_without_gl(verb: str, tmp_path: Path) -
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-
-
-def test_the_framework_takes_the_dataclasses_that_are_made_quickly() -> None:
-    for file in (ROOT / "rendergraph").rglob("*.py"):
-        for statement in ast.walk(ast.parse(file.read_text())):
-            if isinstance(statement, ast.ImportFrom) and statement.module == "dataclasses" and file.stem != "records":
-                assert "dataclass" not in {name.name for name in statement.names}, f"{file}: rendergraph.records has it"

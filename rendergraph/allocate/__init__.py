@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import Literal, TypeAlias
 
 from rendergraph.allocate.heap import heap_bytes
-from rendergraph.records import dataclass
 from rendergraph.schedule import Schedule, step_names
 from rendergraph.schedule.dependencies import touched_ids
 from rendergraph.schedule.model import storage_class

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import types
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,6 @@ from rendergraph.api import (
 )
 from rendergraph.authoring.variants import Variant
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.records import dataclass
 from rendergraph.textures import FORMATS, TEXTURE_KINDS
 
 SIZE = (37, 23)

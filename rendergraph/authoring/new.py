@@ -10,13 +10,13 @@ import json
 import re
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
 from rendergraph.authoring.names import check_name, class_name
 from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError, Place, Problem, RenderError
-from rendergraph.records import dataclass
 from rendergraph.resources import folder
 from rendergraph.schema import schema
 

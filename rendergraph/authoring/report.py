@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from rendergraph.errors import Problem
-from rendergraph.records import dataclass
 
 
 @dataclass(frozen=True)

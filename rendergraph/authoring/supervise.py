@@ -20,14 +20,13 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
 from rendergraph.authoring.report import Report
 from rendergraph.catalog.types import SHADERS
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, shown_file
-from rendergraph.records import dataclass
 
 _ERRORS = {1: RenderError, 3: InputError, 5: DeviceError}
 _OVERHEAD = 20.0

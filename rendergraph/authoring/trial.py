@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
 from rendergraph.gl.textures import Clear
 from rendergraph.program import prefix
-from rendergraph.records import dataclass
 from rendergraph.resources import folder
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.session import Pipeline, Session, load

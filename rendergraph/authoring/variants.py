@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
 from rendergraph.declare import InOut, Input, Node
-from rendergraph.records import dataclass
 
 MOST = 200
 """Variants of one node; what has more is tried in the first of them."""

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias, get_args
 
 from rendergraph.document import BROKEN, Value, parse, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.records import dataclass
 from rendergraph.textures import FORMATS, Filter, Wrap
 
 BEGIN, END = "/*---", "---*/"

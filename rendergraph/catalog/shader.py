@@ -6,6 +6,7 @@ The class is like any author's: checking, schema, docs and expansion see no diff
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from types import new_class
 from typing import Any
@@ -20,7 +21,6 @@ from rendergraph.declare import Extensions, Node, declaration_mistakes
 from rendergraph.errors import InputError, Problem, shown_file
 from rendergraph.glsl import Includes, SourceText
 from rendergraph.glsl.source import read_text
-from rendergraph.records import dataclass
 from rendergraph.resources import folder
 from rendergraph.textures import SEMANTICS, SIGNATURES
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from rendergraph.errors import Place, shown_file
-from rendergraph.records import dataclass
 from rendergraph.settings import nearest
 
 VARIABLE = "RENDERGRAPH_PATH"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 
 from rendergraph.declare import Node
 from rendergraph.errors import Problem
-from rendergraph.records import dataclass
 
 SHADERS = (".frag", ".comp")
 """Endings of shader files that are nodes by themselves: full-screen and compute."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,6 @@ from rendergraph.cli import options
 from rendergraph.cli.output import Bar, emit, emit_json, megabytes, say, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import Problem, UsageError, suggestion
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     import rendergraph as rg

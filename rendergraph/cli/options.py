@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     import rendergraph as rg

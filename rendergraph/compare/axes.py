@@ -6,13 +6,12 @@ import itertools
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.document import Value, load
 from rendergraph.errors import InputError, Place, Problem, suggestion
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline

@@ -6,12 +6,12 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.images.files import flush
-from rendergraph.records import dataclass
 
 CHECKSUM = "sha256"
 

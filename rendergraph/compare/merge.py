@@ -12,13 +12,12 @@ drawn as in the graph it came from.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
 from rendergraph.declare import InOut, TextureInfo
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.records import dataclass
 from rendergraph.session import Pipeline
 
 Key: TypeAlias = "tuple[int, str]"

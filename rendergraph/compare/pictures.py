@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,6 @@ from rendergraph.compare.reference import compared_output, on_one_stage, read_pi
 from rendergraph.compare.timing import Times, times_of
 from rendergraph.compare.values import Comparison, Difference, Pixels, Reference, Result
 from rendergraph.diff import diff
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,6 @@ from rendergraph.compare.sources import file_digest
 from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result
 from rendergraph.metrics import Encoding
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline, Session

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,6 @@ from rendergraph.compare.timing import Times
 from rendergraph.compare.values import Pixels, Result, machine
 from rendergraph.errors import InputError, Place, Problem, RenderError
 from rendergraph.metrics import Encoding, Metrics
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline

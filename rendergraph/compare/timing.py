@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
-
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes, StepTime

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from rendergraph.compare.divergence import passes
@@ -11,7 +11,6 @@ from rendergraph.compare.merge import Merged, MergedPipeline, merge
 from rendergraph.compare.timing import Times, times_within
 from rendergraph.compare.values import Pixels
 from rendergraph.errors import InputError
-from rendergraph.records import dataclass
 from rendergraph.session import Pipeline
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,7 +14,6 @@ from rendergraph.compare.timing import Times
 from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Problem
 from rendergraph.metrics import Encoding, Metrics, description
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan

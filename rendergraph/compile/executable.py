@@ -7,13 +7,12 @@ written by each draw. A changed parameter assembles the lists anew: no GL object
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
-from rendergraph.records import dataclass
 from rendergraph.steps import Step
 
 if TYPE_CHECKING:

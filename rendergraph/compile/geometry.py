@@ -7,7 +7,7 @@ must be told apart depends on what the step's shader looks at: a depth pass puts
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -21,7 +21,6 @@ from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
 from rendergraph.errors import InputError, suggestion
 from rendergraph.expand import CAMERA
-from rendergraph.records import dataclass
 from rendergraph.scene.model import Material, Mesh, Scene, Texture
 from rendergraph.scene.selection import selected
 from rendergraph.steps import Step, ViewMatrices

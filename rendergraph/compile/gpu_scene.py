@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import moderngl
@@ -16,7 +16,6 @@ from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
-from rendergraph.records import dataclass
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, Material, Scene, Texture
 from rendergraph.scene.pack import PackedScene

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import moderngl
@@ -14,7 +14,6 @@ from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.textures import GpuTexture, texel
-from rendergraph.records import dataclass
 from rendergraph.steps import Read, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 

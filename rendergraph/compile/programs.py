@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from rendergraph.catalog import NodeType
@@ -14,7 +14,6 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.glsl.expansion import check_expansion
 from rendergraph.program import compile_problems, link_problems, stage_texts
-from rendergraph.records import dataclass
 from rendergraph.resources import folder
 from rendergraph.steps import Resource, Step
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -35,7 +36,6 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
 from rendergraph.program import prefix, stage_texts
-from rendergraph.records import dataclass
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import TextureDesc
 

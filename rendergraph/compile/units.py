@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 from rendergraph.gl.device import Device
-from rendergraph.records import dataclass
 
 SHARED_UNITS = 24
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from rendergraph.errors import Misuse
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl.device import Device
-from rendergraph.records import dataclass
 from rendergraph.scene.pack import VIEW, pack_view
 from rendergraph.steps import ViewMatrices
 

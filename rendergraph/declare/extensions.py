@@ -5,14 +5,13 @@ from __future__ import annotations
 import inspect
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from rendergraph.declare.extension import Choice, Extension, ImageLoader, MeshLoader, Metric
 from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.records import dataclass
 from rendergraph.stamps import Stamp, again, looking
 from rendergraph.textures import SEMANTICS, Semantic
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Literal
 
-from rendergraph.records import dataclass
 from rendergraph.textures import Semantic, TextureDesc
 
 

@@ -6,11 +6,10 @@ Sizes, formats and counts may be constants or functions `(node, facts)`; `Facts`
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 from rendergraph.declare.facts import Facts
-from rendergraph.records import dataclass
 from rendergraph.errors import Misuse, suggestion
 from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wrap
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan

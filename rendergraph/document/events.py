@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Broken, Document, Scalar, Source, Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.records import dataclass
 
 
 @dataclass(frozen=True)

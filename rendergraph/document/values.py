@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from rendergraph.errors import Place, Problem
-from rendergraph.records import dataclass
 
 Scalar: TypeAlias = "str | int | float | bool | None"
 Key: TypeAlias = "str | int | float"

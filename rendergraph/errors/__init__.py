@@ -8,11 +8,10 @@ docs and `rendergraph explain RG103` read it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar, Literal
-
-from rendergraph.records import dataclass
 
 
 @dataclass(frozen=True, order=True)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from rendergraph.declare import TextureInfo
 from rendergraph.link.infer import CAMERA
-from rendergraph.records import dataclass
 from rendergraph.steps import Resource, Step
 
 

@@ -6,7 +6,7 @@ import ctypes
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -15,7 +15,6 @@ import moderngl
 from rendergraph.errors import DeviceError, Problem
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.surroundings import Surroundings, settle
-from rendergraph.records import dataclass
 
 REQUIRED_VERSION = 450
 TIME_ELAPSED = 0x88BF

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ import moderngl
 import numpy as np
 
 from rendergraph.gl.device import Device
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.steps import UniformValue

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.errors import Problem, RenderError
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.gl.device import Device

@@ -7,6 +7,7 @@ differ and aliased textures would otherwise share filter state.
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ import numpy.typing as npt
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device
-from rendergraph.records import dataclass
 from rendergraph.textures import FORMATS, Sampler, TextureDesc
 
 _TARGETS = {"texture2d": 0x0DE1, "texture2d_array": 0x8C1A, "texture_cube": 0x8513}

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 
 from rendergraph.gl.device import TIME_ELAPSED, Device
-from rendergraph.records import dataclass
 
 _QUERY_RESULT = 0x8866
 _NO_ANSWER = 1 << 40

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.glsl.source import Origin, SourceText
-from rendergraph.records import dataclass
 
 MOST_TOKENS = 1_000_000
 """Words and signs that macros may make of one stage, steps on the way included."""

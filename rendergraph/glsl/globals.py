@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Literal
 
 from rendergraph.glsl.constants import Constant, constant
 from rendergraph.glsl.names import statements, without_directives
-from rendergraph.records import dataclass
 
 Storage = Literal["uniform", "in", "out", "buffer"]
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Literal
-
-from rendergraph.records import dataclass
 
 Role = Literal["uniform", "in", "out", "buffer", "block", "function", "struct", "variable", "macro"]
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.records import dataclass
 from rendergraph.stamps import Stamp, look, stamp
 
 MAX_BYTES = 1_000_000

@@ -11,6 +11,7 @@ import os
 import stat
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -20,7 +21,6 @@ from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
 from rendergraph.images.pixels import Limits, Pixels, as_rgba, finite, name_of
 from rendergraph.images.plugin_image import decode_by_plugin
-from rendergraph.records import dataclass
 from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, kind_of
 from rendergraph.scene.model import ImageSource
 

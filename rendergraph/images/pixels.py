@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy.typing as npt
 
 from rendergraph.errors import Place, Problem
 from rendergraph.images.encode import HALF_MAX
-from rendergraph.records import dataclass
 from rendergraph.scene.model import ImageSource
 
 Pixels: TypeAlias = npt.NDArray[Any]

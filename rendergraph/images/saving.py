@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -14,7 +15,6 @@ import numpy.typing as npt
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
 from rendergraph.images.encode import EXTENSIONS, Job, write_all
 from rendergraph.images.view import viewable
-from rendergraph.records import dataclass
 from rendergraph.textures import FORMATS
 
 Pixels: TypeAlias = npt.NDArray[Any]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Choice, LightFacts, Node, TextureInfo
 from rendergraph.errors import Place, Problem
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Choice, InOut, Input, Node, Port
@@ -12,7 +12,6 @@ from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
 from rendergraph.read import NAME, word
-from rendergraph.records import dataclass
 from rendergraph.resolve import NodeSpec, PipelineSpec
 
 _ID = NAME.pattern.removesuffix(r"\Z")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rendergraph.catalog import NodeType
@@ -14,7 +14,6 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
 from rendergraph.program.images import with_formats
-from rendergraph.records import dataclass
 from rendergraph.resources import folder
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc

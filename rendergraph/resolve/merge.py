@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.document import Value
 from rendergraph.errors import Problem
 from rendergraph.read import entries, word
-from rendergraph.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.document import Source, Value, parse, shown
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
 from rendergraph.read import entries
-from rendergraph.records import dataclass
 from rendergraph.resolve.merge import NamesOf, TypeNames
 
 _ID = "[A-Za-z_][A-Za-z0-9_-]*"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.records import dataclass
 from rendergraph.settings import Roots
 
 DEFAULT_SIZE = (1280, 720)

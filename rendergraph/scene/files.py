@@ -9,14 +9,13 @@ from __future__ import annotations
 import re
 import stat
 from collections.abc import Callable, Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.records import dataclass
 from rendergraph.scene import image_header
 from rendergraph.scene.model import ImageSource
 from rendergraph.stamps import look

@@ -9,12 +9,12 @@ Skins, morph targets and animations are left out with a warning: the mesh is dra
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from rendergraph.document import shown
-from rendergraph.records import dataclass
 from rendergraph.scene.files import Names, Reading
 from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, unit, vec3
 from rendergraph.scene.gltf_buffers import Buffers, split_glb

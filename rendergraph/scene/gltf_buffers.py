@@ -6,6 +6,7 @@ import base64
 import binascii
 import struct
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
 
@@ -13,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.document import shown
-from rendergraph.records import dataclass
 from rendergraph.scene.files import Reading
 from rendergraph.scene.gltf_json import Part
 

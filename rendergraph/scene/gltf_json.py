@@ -8,11 +8,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.document import shown
 from rendergraph.errors import InputError
-from rendergraph.records import dataclass
 
 Fail = Callable[[str], InputError]
 """Makes the error for a text, with the file's name."""

@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Sequence
-
-from rendergraph.records import dataclass
+from dataclasses import dataclass
 
 HEAD_BYTES = 1 << 20
 READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"

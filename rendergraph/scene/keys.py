@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
-
-from rendergraph.records import dataclass
 
 Kind: TypeAlias = Literal[
     "number", "integer", "flag", "text", "choice", "vector", "scale", "color", "file", "link", "map"

@@ -7,7 +7,7 @@ the origin at the image's top left.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from rendergraph.declare import Added
 from rendergraph.declare.extension import ImageLoader
-from rendergraph.records import dataclass
 from rendergraph.stamps import Stamp
 
 Floats: TypeAlias = npt.NDArray[np.float32]

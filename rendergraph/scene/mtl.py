@@ -7,13 +7,12 @@ with Pr or Pm is metallic-roughness from the start (design.md §8).
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rendergraph.document import shown
 from rendergraph.errors import InputError
-from rendergraph.records import dataclass
 from rendergraph.scene.files import Reading, file_kind, named
 from rendergraph.scene.model import Material, Texture, Vec3
 from rendergraph.scene.obj_block import text_of

@@ -9,13 +9,12 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from rendergraph.document import shown
-from rendergraph.records import dataclass
 from rendergraph.scene.files import Reading
 
 Doubles = npt.NDArray[np.float64]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from rendergraph.records import dataclass
 from rendergraph.scene.files import Reading
 from rendergraph.scene.obj_block import Block, Doubles, Growing, Ints
 

@@ -7,13 +7,12 @@ Layouts are those of the GLSL structs in `shaders/include/` (std140: everything 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.records import dataclass
 from rendergraph.scene.model import Floats, Light, Material, Mesh, Scene
 from rendergraph.scene.pack_order import first_use, ordered
 from rendergraph.scene.phong import dielectric_f0, phong_of

@@ -6,13 +6,12 @@ All mistakes of a file are found before it stops, each with line, column and the
 from __future__ import annotations
 
 import math
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.records import dataclass
 from rendergraph.scene import scene_build, scene_keys
 from rendergraph.scene.files import Reading
 from rendergraph.scene.geometry import rigid

@@ -8,12 +8,12 @@ bit.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.records import dataclass
 from rendergraph.scene.geometry import translation, unit
 from rendergraph.scene.keys import Key, positive, whole
 from rendergraph.scene.model import Matrix, Mesh

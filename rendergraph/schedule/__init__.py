@@ -8,13 +8,12 @@ as what a heap of bytes could reach. So an order above that peak is taken only w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
-from rendergraph.records import dataclass
 from rendergraph.schedule.dependencies import StepKey, Versions, Waits, contributing, dependencies, touched_ids
 from rendergraph.schedule.improve import improve
 from rendergraph.schedule.model import Model, alive_all_frame

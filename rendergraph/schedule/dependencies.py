@@ -5,12 +5,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import TypeAlias
 
 from rendergraph.errors import InputError, Problem
-from rendergraph.records import dataclass
 from rendergraph.steps import Resource, Step, Write
 from rendergraph.textures import TextureDesc
 

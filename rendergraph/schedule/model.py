@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
-from rendergraph.records import dataclass
 from rendergraph.schedule.dependencies import StepKey, Versions, Waits, is_filled_by_update, touched_ids
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes

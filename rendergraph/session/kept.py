@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rendergraph.compile import Executable
 from rendergraph.gl.programs import Program
-from rendergraph.records import dataclass
 from rendergraph.stamps import Stamp, again, changed
 
 MOST = 4

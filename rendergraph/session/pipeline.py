@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,6 @@ from weakref import WeakValueDictionary
 from rendergraph import stamps
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
 from rendergraph.link import Endpoint, Graph, endpoint
-from rendergraph.records import dataclass
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan

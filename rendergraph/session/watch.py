@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
 from rendergraph.errors import RendergraphError
-from rendergraph.records import dataclass
 from rendergraph.session.session import Session
 from rendergraph.stamps import Stamp, changed, looking, stamp
 

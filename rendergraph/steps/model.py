@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 from rendergraph.errors import Place, Problem, shown_file
-from rendergraph.records import dataclass
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 

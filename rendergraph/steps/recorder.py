@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, TypeAlias
 
 from rendergraph.declare import Facts, InOut, Input, LightFacts, Node, Output, Part, Port, Views
 from rendergraph.declare.blame import is_framework
 from rendergraph.errors import Misuse
-from rendergraph.records import dataclass
 from rendergraph.steps import checks
 from rendergraph.steps.model import DRAW_ORDERS, MATERIAL_LEVELS, TOPOLOGIES, UniformValue
 from rendergraph.steps.state import State

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from rendergraph.errors import Misuse, suggestion
-from rendergraph.records import dataclass
 
 Compare = Literal["never", "less", "equal", "lequal", "greater", "notequal", "gequal", "always"]
 StencilOp = Literal["keep", "zero", "replace", "incr", "incr_wrap", "decr", "decr_wrap", "invert"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import groupby
 
 from rendergraph.declare import Function, InOut, Input, Port, TextureInfo, Views
 from rendergraph.link import Endpoint, Graph
-from rendergraph.records import dataclass
 from rendergraph.textures import TextureDesc
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from html import escape
 
 from rendergraph.link import Graph
-from rendergraph.records import dataclass
 from rendergraph.views.cards import Card, Link, Socket, cards, generations, links
 from rendergraph.views.layout import LANE, Box, layers_of, place, tie
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from rendergraph.records import dataclass
 from rendergraph.views.cards import Link
 
 SWEEPS = 8
