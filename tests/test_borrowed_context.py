@@ -92,6 +92,7 @@ class Owner:
         )
         self.array = ctx.vertex_array(self.program, [])
         self.feedback = self.name("glCreateTransformFeedbacks")
+        self.pipeline = self.name("glCreateProgramPipelines")
 
     def call(self, name: str, *arguments: Any) -> None:
         """Call a GL function; Python floats are floats, anything else a number of 32 bits."""
@@ -207,6 +208,7 @@ class Owner:
                 raw.glBindImageTexture(unit, self.textures[0x0DE1], level, 0, 0, rng.choice((0x88B8, 0x88BA)), 0x8058)
         raw.glBindFramebuffer(0x8CA8, self.framebuffers[1].glo)
         raw.glBindRenderbuffer(0x8D41, self.ctx.renderbuffer((4, 4)).glo)
+        self.call("glBindProgramPipeline", rng.choice((0, self.pipeline)))
         raw.glUseProgram(self.program.glo)
         raw.glBindVertexArray(self.array.glo)
         raw.glBindTransformFeedback(0x8E22, self.feedback)

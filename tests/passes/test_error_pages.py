@@ -183,6 +183,10 @@ def test_outputs_and_taps(gl: rg.Session, tmp_path: Path) -> None:
 def test_devices_memory_and_threads(gl: rg.Session, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(RendergraphError, match="RG611"):
         rg.Session(device=7)
+    monkeypatch.setenv("RENDERGRAPH_DEVICE", "gpu0")
+    with pytest.raises(RendergraphError, match="RG611 RENDERGRAPH_DEVICE is 'gpu0', not the number of a device"):
+        rg.Session()
+    monkeypatch.delenv("RENDERGRAPH_DEVICE")
     monkeypatch.setenv("RENDERGRAPH_MEMORY_LIMIT", "1")
     with pytest.raises(RendergraphError, match="RG616") as caught:
         gl.render(rg.load("forward", size=(32, 32)))
