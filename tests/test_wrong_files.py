@@ -5,6 +5,7 @@ A file starts with its messages, `#: line:column: code text`, and may have setti
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -32,7 +33,7 @@ def problems_of(path: Path, sets: list[str], catalog: Catalog) -> tuple[Problem,
 def message(problem: Problem, path: Path) -> str:
     place = f"{problem.place}: " if problem.place else ""
     text = f"{place}{problem.code} {problem.text}".removeprefix(f"{path}:")
-    return text.replace(f"{FOLDER}/", "")
+    return re.sub(r"[^\s:]*toys\.py:\d+", "toys.py:LINE", text.replace(f"{FOLDER}/", ""))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
