@@ -52,7 +52,8 @@ def check_expansion(source: SourceText, trusted: Iterable[Path] = ()) -> None:
         InputError: they make more than `MOST_TOKENS`, or depend on more than `MOST_UNKNOWN` names of the driver.
     """
     folders = tuple(trusted)
-    if not any(o.file is not None and not any(o.file.is_relative_to(f) for f in folders) for o in source.origins):
+    files = {origin.file for origin in source.origins} - {None}
+    if all(any(file.is_relative_to(folder) for folder in folders) for file in files if file is not None):
         return
     lines = list(_joined(source))
     unknown = sorted({name for text, _ in lines if _conditional(text) for name in _UNKNOWN.findall(text)} - {*_KNOWN})
