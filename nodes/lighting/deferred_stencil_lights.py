@@ -40,8 +40,7 @@ class DeferredStencilLights(ImageLighting):
 
     def _add_lights(self, steps: Steps, local: list[int], surface: dict[str, Any], shadows: dict[str, Any]) -> None:
         # The stencil needs a depth of its own: a texture must not be attached and sampled at once.
-        copied = State(depth_test=True, depth_func="always")
-        steps.fullscreen("copy_depth.frag", out=self.marks, state=copied, depth=self.depth)
+        steps.fullscreen("copy_depth.frag", out=self.marks, depth=self.depth)
         marking = State(
             cull="none", depth_write=False, depth_clamp=True,
             stencil=Stencil(StencilFace(depth_fail="decr_wrap"), StencilFace(depth_fail="incr_wrap")),

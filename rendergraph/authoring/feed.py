@@ -26,7 +26,6 @@ from rendergraph.api import (
     Radiance,
     Semantic,
     Signature,
-    State,
     Steps,
     View,
     Views,
@@ -47,7 +46,6 @@ _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 
 _ANY_VALUE = "vec4(at, wave, 1.0)"
 _DEPTHS = ("depth", "shadow_map")
 _BUFFER_BYTES = 65_536
-_ALWAYS = State(depth_test=True, depth_func="always")  # depth is written where it is tested
 
 
 @dataclass
@@ -159,7 +157,7 @@ def _source(name: str, port: Input | InOut, folder: Path) -> type[Node] | None:
     def record(self: Any, steps: Steps) -> None:
         targets = [self.made] if port.kind == "texture2d" else [self.made.layer(layer) for layer in range(layers)]
         for target in targets:
-            steps.fullscreen(shader, out={"made": target}, state=_ALWAYS)
+            steps.fullscreen(shader, out={"made": target})
 
     made = Output(
         meaning, kind=port.kind, format=format, layers=layers if port.kind == "texture2d_array" else None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -307,14 +307,17 @@ class _Compiler:
     def _state(
         self, step: Step, *, depth_default: bool, cull: str | None = None, clockwise: bool = False
     ) -> gl_state.Pieces:
-        has_depth = any(write.use == "depth" for write in step.writes) or any(
-            read.use == "depth_test" for read in step.reads
-        )
-        depth_test = has_depth and depth_default if step.state.depth_test is None else step.state.depth_test
-        resolved = cull or ("none" if step.state.cull == "material" else step.state.cull)
+        state = step.state
+        writes_depth = any(write.use == "depth" for write in step.writes)
+        has_depth = writes_depth or any(read.use == "depth_test" for read in step.reads)
+        depth_test = has_depth and depth_default if state.depth_test is None else state.depth_test
+        if not depth_test and writes_depth and state.depth_write is not False:
+            # OpenGL writes no depth where the test is off.
+            depth_test, state = True, replace(state, depth_func="always")
+        resolved = cull or ("none" if state.cull == "material" else state.cull)
         targets = sum(write.use == "color" for write in step.writes)
         return gl_state.pieces(
-            self.device.raw, step.state, depth_test=depth_test, cull=resolved, clockwise=clockwise, targets=targets
+            self.device.raw, state, depth_test=depth_test, cull=resolved, clockwise=clockwise, targets=targets
         )
 
     def _poison(self, position: int, parity: int) -> list[Call]:

@@ -101,7 +101,7 @@ class State:
 
     Attributes:
         depth_test: compare with the attached depth; None: yes where a depth texture is attached to a geometry or draw
-            step.
+            step. Without the test every fragment's depth is written.
         depth_func: the comparison.
         depth_write: write depth; None: yes where depth is written by the step.
         blend: one `Blend` for all targets, one a target, or None.

@@ -19,6 +19,7 @@ from rendergraph.api import (
     Stencil,
     StencilFace,
     Steps,
+    define,
     full_mip_count,
 )
 
@@ -351,3 +352,24 @@ def test_a_clear_fills_missing_channels_with_zero_and_stays_in_range(draw: Draw)
     frame = draw("nodes: {f: {type: filled}}\noutputs: {image: f.color, ids: f.ids}", Filled)
     np.testing.assert_array_equal(frame["image"][0, 0], [1, 2, 3, 0])
     assert frame["ids"].max() == 0
+
+
+class Slope(Node):
+    """Depth that a shader computes, nearer to the right."""
+
+    slope = Output(Depth, format="depth32f", clear=0.25, doc="Depth.")
+
+    tested: bool = define(default=False, doc="Whether the depth that is there counts.")
+
+    def record(self, steps: Steps) -> None:
+        state = State(depth_test=True) if self.tested else State()
+        steps.fullscreen("slope.frag", out=self.slope, state=state)
+
+
+def test_a_fullscreen_step_writes_the_depth_it_computes(draw: Draw) -> None:
+    shaders = {"slope.frag": "void main() { gl_FragDepth = 1.0 - gl_FragCoord.x / 16.0; }"}
+    expected = np.broadcast_to(1 - (np.arange(16, dtype=np.float32) + 0.5) / 16, (8, 16))
+    text = "nodes: {s: {type: slope, params: {tested: %s}}}\noutputs: {depth: s.slope}\n"
+    np.testing.assert_array_equal(draw(text % "false", Slope, shaders=shaders)["depth"][..., 0], expected)
+    kept = np.minimum(expected, 0.25)
+    np.testing.assert_array_equal(draw(text % "true", Slope, shaders=shaders)["depth"][..., 0], kept)
