@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 import yaml
 
+import rendergraph as rg
 from rendergraph.cli.app import VERBS, main
 
 ROOT = Path(__file__).parents[1]
@@ -110,6 +111,24 @@ def _run_console(text: str, where: str, capsys: pytest.CaptureFixture[str]) -> N
             pattern = ".*".join(re.escape(part) for part in re.split(r"\s*…\s*", expected))
             printed = (err if fails else out).strip()
             assert re.fullmatch(pattern, printed, re.DOTALL), f"{where}: {command}\n{printed}"
+
+
+@pytest.mark.parametrize("scene", ["spheres", "stairs"])
+def test_lines_of_the_geometry_guide_are_hidden_nowhere_in_sight(
+    scene: str, gl: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for block in blocks(DOCS / "guide" / "geometry-node.md"):
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
+    solid = "out vec4 radiance;\nvoid main() { radiance = vec4(123.0, 0.0, 0.0, 1.0); }\n"
+    (tmp_path / "wireframe.frag").write_text(solid, encoding="utf-8")
+    pipeline = rg.load(tmp_path / "wireframe.yaml", plugins=[tmp_path / "wireframe.py"], scene=scene, size=(320, 180))
+    frame = pipeline.render(outputs=["radiance"], taps=["light.surface_depth"])
+    drawn = frame["radiance"][..., 0] > 100  # of the output: that has the lines in it, too
+    seen = frame["light.surface_depth"][..., 0] < 1
+    assert seen.sum() > 1000
+    assert (seen & ~drawn).sum() == 0
+    assert (drawn & ~seen).sum() == 0
 
 
 # --- what is generated -----------------------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ class State:
         cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`.
         stencil: stencil state, None for off.
         scissor: x, y, width, height in texels from the bottom left.
-        polygon_offset: factor and units.
+        polygon_offset: factor and units of filled triangles' depth, negative for nearer; not of `wireframe`'s lines.
         depth_clamp: clamp instead of clipping at the near and far plane.
         wireframe: draw lines instead of filled triangles.
     """
