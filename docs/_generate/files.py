@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rendergraph import document
+from rendergraph.catalog import entries, find
 from rendergraph.cli.explain import file_keys
 from rendergraph.compare.axes import MOST_RUNS
 from rendergraph.glsl import expansion, source
@@ -68,6 +69,8 @@ def _limits() -> str:
         ("a shader", "includes inside each other", source.MAX_DEPTH, ""),
         ("a shader", "words that its macros make", expansion.MOST_TOKENS, ""),
         ("a shader", "names of extensions that its conditions ask for", expansion.MOST_UNKNOWN, ""),
+        ("a shader node", "ports and parameters", entries.MOST_NAMES, ""),
+        ("a folder of shader nodes that a pipeline names", "files", find.MOST_FILES, ""),
         ("a sweep", "runs", MOST_RUNS, ""),
     ]
     shown = [(of, prose(what), f"{most:,}", code(name) if name else "") for of, what, most, name in rows]

@@ -29,6 +29,8 @@ _KINDS: dict[str, str] = {
 _INTEGER_FORMATS = {"uint": "r32ui", "uvec2": "rg32ui", "uvec3": "rgba32ui", "uvec4": "rgba32ui", "int": "r32i"}
 _GIVEN = ("v_uv",)
 """Varyings of the full-screen vertex shader."""
+MOST_NAMES = 256
+"""Ports and parameters of a shader file."""
 
 
 class Entries:
@@ -94,6 +96,11 @@ class Entries:
 
     def collect(self) -> None:
         """Fill `ports` and `fields`."""
+        count = len(self.declared.keys() | self.header.names.keys())
+        if count > MOST_NAMES:
+            text = f"the shader has {count:,} ports and parameters, {MOST_NAMES} are the limit; a texture holds tables"
+            self.say("RG441", text, None)
+            return
         self._match_single_output()
         for name, entry in self.header.inputs.items():
             self._input(name, entry)

@@ -14,7 +14,7 @@ _BEGUN = re.compile(r"(?!0[xX])[\d.]+[eE]\Z")
 _VECTOR = re.compile(r"([iub]?)vec([234])\Z")
 _DEEPEST = 100
 _MOST_WORDS = 1000
-_LARGEST = 1e38  # what 32 bits hold
+_LARGEST = 3.4028235e38  # what 32 bits hold
 
 
 def constant(words: Sequence[str], known: Mapping[str, Constant] = {}) -> Constant:
@@ -129,10 +129,17 @@ def _number(word: str) -> int | float:
     if len(word) > 100:
         raise ValueError("it is too long")
     if plain.startswith("0x"):
-        return int(plain.rstrip("u"), 16)
+        return _bounded(int(plain.rstrip("u"), 16))
     if plain.rstrip("u").isdigit():
-        return int(plain.rstrip("u"))
-    return float(plain.rstrip("lf"))
+        return _bounded(int(plain.rstrip("u")))
+    return _bounded(float(plain.rstrip("lf")))
+
+
+def _bounded(value: float) -> int | float:
+    """The same; whole numbers would grow without end, and no parameter is infinite."""
+    if abs(value) > _LARGEST:
+        raise ValueError("it is too large")
+    return value
 
 
 def _vector(parts: list[float], kind: str, count: int) -> tuple[float, ...]:
@@ -167,11 +174,8 @@ def _combined(sign: str, a: Constant, b: Constant) -> Constant:
             raise ValueError("division by 0")
         if isinstance(a, int) and isinstance(b, int):
             return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
-        return a / b
-    value = a * b if sign == "*" else a + b if sign == "+" else a - b
-    if abs(value) > _LARGEST:  # whole numbers would grow without end
-        raise ValueError("it is too large")
-    return value
+        return _bounded(a / b)
+    return _bounded(a * b if sign == "*" else a + b if sign == "+" else a - b)
 
 
 def _number_of(value: Constant) -> float:

@@ -18,7 +18,7 @@ Storage = Literal["uniform", "in", "out", "buffer"]
 
 _TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|[^\s\w]")
 _WORD = re.compile(r"[A-Za-z_]\w*\Z")
-_MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\S.*?)[ \t]*$", re.MULTILINE)
+_MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\S.*)$", re.MULTILINE)
 _STORAGE: tuple[Storage, ...] = ("uniform", "in", "out", "buffer")
 _WORDS_BEFORE = frozenset(
     """

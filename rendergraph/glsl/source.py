@@ -73,15 +73,22 @@ def generated(lines: Iterable[str], made: str = "") -> SourceText:
     return SourceText(rows, (Origin(made=made),) * len(rows))
 
 
-_COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?\*/", re.DOTALL)
+_COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?(?:\*/|(?P<open>\Z))", re.DOTALL)
 
 
 def strip_comments(text: str) -> str:
-    """The text with comments replaced by as many blanks: lines and columns stay where they are."""
-    return _COMMENT.sub(lambda match: re.sub(r"[^\n]", " ", match.group()), text)
+    """The text with comments replaced by as many blanks: lines and columns stay where they are.
+
+    One that has no end is left as it is, for the driver to say so.
+    """
+
+    def blanks(match: re.Match[str]) -> str:
+        return match.group() if match["open"] is not None else re.sub(r"[^\n]", " ", match.group())
+
+    return _COMMENT.sub(blanks, text)
 
 
-_INCLUDE = re.compile(r"\s*#\s*include\b\s*(.*?)\s*\Z")
+_INCLUDE = re.compile(r"\s*#\s*include\b(.*)\Z", re.DOTALL)
 _PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")
 _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 _OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
@@ -160,7 +167,8 @@ class Includes:
                 depth[0] += bool(_OPENS.match(line)) - bool(_CLOSES.match(line))
                 self._take(line, origin, raw, lines, origins)
                 continue
-            parameter = _PARAMETER.match(include[1])
+            written = include[1].strip()
+            parameter = _PARAMETER.match(written)
             if parameter is not None and parameter[1] not in self._plugged:
                 lines.append("")
                 origins.append(origin)
@@ -168,8 +176,8 @@ class Includes:
             if parameter is not None:
                 target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
             else:
-                target, shared = self._find(include[1], file, root, origin, raw, base.shared)
-                home = root if '"' in include[1] else self.include_folder
+                target, shared = self._find(written, file, root, origin, raw, base.shared)
+                home = root if '"' in written else self.include_folder
             if self._resolve(target) in stack:
                 chain = " includes ".join(path.name for path in [*stack, target])
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
@@ -222,7 +230,7 @@ class Includes:
         """The file an include names, and whether it is a shared one."""
         match = _INCLUDE_NAME.match(written)
         if match is None:
-            text = f"'#include {written}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
+            text = f"'#include {written[:60]}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
             raise _error("RG405", text, origin, raw)
         name = match[1] or match[2]
         beside = match[1] is not None

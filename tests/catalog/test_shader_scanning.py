@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +55,12 @@ def test_constant_expressions(text: str, value: object) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "unknown", "1.0 /", "1 / 0", "vec3(1, 2)", "(1", "1 2", "sin(1.0)", "true + 1", "vec2(1) + vec3(1)"]
-)
+    "text",
+    [
+        "", "unknown", "1.0 /", "1 / 0", "vec3(1, 2)", "(1", "1 2", "sin(1.0)", "true + 1", "vec2(1) + vec3(1)", "1e39",
+        "int(1e999)", "ivec2(1e999)", "1e38 / 1e-9", "1e30 * 1e30", "0x" + 40 * "f", 40 * "9",
+    ],
+)  # fmt: skip
 def test_what_is_no_constant_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         constant(tokens(text))
@@ -184,6 +190,37 @@ def test_what_is_written_is_what_is_read(tmp_path_factory: pytest.TempPathFactor
 @given(st.text(alphabet='uniform floatvec3(){}[];=,.#\n/*01ab"<>', max_size=200))
 def test_any_text_is_scanned_to_an_end(text: str) -> None:
     globals_of(text)
+
+
+SIZE = 300_000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/* " * (SIZE // 3), "#define A 1" + SIZE * " " + "b", "#define A 1" + SIZE * "\t" + "b", SIZE // 4 * "in a{}b[",
+        "uniform float a = " + SIZE * "(", SIZE * "{", SIZE * "}", SIZE // 2 * "\\\n", SIZE * " ", SIZE // 6 * "x = y[",
+    ],
+    ids=lambda text: text[:8],
+)  # fmt: skip
+def test_text_that_repeats_itself_is_read_in_time(tmp_path: Path, text: str) -> None:
+    start = time.monotonic()
+    load(tmp_path, f"out vec4 c;\nvoid main() {{ c = vec4(1.0); }}\n{text}\n")
+    assert time.monotonic() - start < 20  # it takes one; in quadratic time it would take an hour
+
+
+def test_an_include_of_blanks_is_read_in_time(tmp_path: Path) -> None:
+    start = time.monotonic()
+    [message] = mistakes(tmp_path, f"out vec4 c;\n#include a{SIZE * ' '}b\n")
+    assert re.match(r"2:1: RG405 .* is not '#include <name.glsl>'", message)
+    assert time.monotonic() - start < 20
+
+
+def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
+    text = "out vec4 c;\n" + "".join(f"uniform float a{number};\n" for number in range(255))
+    assert len(load(tmp_path, text).cls.parameters()) == 255
+    said = ["1:1: RG441 the shader has 257 ports and parameters, 256 are the limit; a texture holds tables"]
+    assert mistakes(tmp_path, f"{text}uniform float more;\n") == said
 
 
 # --- mistakes --------------------------------------------------------------------------------------------------------
