@@ -138,8 +138,8 @@ class _Child:
                 return Report(found["node"], tuple(found["variants"]), problems)
             elif "mistake" in event:
                 raise RuntimeError(event["mistake"])  # ours
-            else:
-                raise _ERRORS[event["exit_code"]]([_problem(entry) for entry in event["failed"]])
+            elif "failed" in event:
+                raise _ERRORS.get(event["exit_code"], RenderError)([_problem(entry) for entry in event["failed"]])
         raise InputError(self._ended())
 
     def _heard(self) -> Iterator[dict[str, Any]]:
@@ -158,7 +158,7 @@ class _Child:
                     return
                 *lines, rest = (rest + chunk).split(b"\n")
                 for line in lines:
-                    yield json.loads(line)
+                    yield _event(line)
                     end = time.monotonic() + self._seconds()
             elif time.monotonic() >= end:
                 raise InputError(self._too_slow())
@@ -182,7 +182,10 @@ class _Child:
         return Problem("RG452", text, self._place())
 
     def _ended(self) -> Problem:
-        status = self._process.wait()
+        try:
+            status = self._process.wait(self._seconds())
+        except subprocess.TimeoutExpired:  # it has closed what it would report through, and goes on
+            return self._too_slow()
         self._reader.join(1)
         words = f"; its last words: {self._last[-1][:200]}" if self._last else ""
         if status >= 0:
@@ -198,6 +201,15 @@ class _Child:
         file = self.asked["file"]
         found = re.search(rf'File "{re.escape(file)}", line (\d+)', trace)
         return Place(shown_file(file), int(found[1]) if found else 0, 1 if found else 0)
+
+
+def _event(line: bytes) -> dict[str, Any]:
+    """What the child says; what a node writes into the pipe itself says nothing."""
+    try:
+        event = json.loads(line)
+    except ValueError:
+        return {}
+    return event if isinstance(event, dict) else {}
 
 
 def _problem(entry: Mapping[str, Any]) -> Problem:

@@ -109,6 +109,9 @@ HOSTILE = {
     "nothing": ("x = 1\n", r"glow.py: RG492 the module of node type 'glow' must define one Node class, it has none"),
     "children": ("import os, time\nif os.fork() == 0:\n    time.sleep(30)\nos._exit(4)\n", r"glow.py:4:1: RG450 .* status 4"),
     "closes": ("import os\nos.closerange(3, 100)\nos._exit(0)\n", r"glow.py.* RG450 it ends the process"),
+    "closes and sleeps": ("import os, time\nos.closerange(3, 100)\ntime.sleep(60)\n", r"glow.py.* RG452 it takes longer"),
+    "chats": ("import os\nfor n in range(3, 20):\n    try: os.write(n, b'{}\\nx\\n[1]\\n')\n    except OSError: pass\n1 / 0\n",
+              r"glow.py:5:1: RG491 .* ZeroDivisionError"),
     "interrupts": ("raise KeyboardInterrupt\n", r"glow.py:1:1: RG4\d\d .*KeyboardInterrupt"),
 }  # fmt: skip
 
