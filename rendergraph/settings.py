@@ -79,7 +79,7 @@ def load(file: Path) -> Settings:
         elif not isinstance(value, list) or not all(isinstance(item, str) and "\0" not in item for item in value):
             problems.append(Problem("RG017", f"'{key}' is a list of paths, as in {key} = [\"../assets\"]", place))
         else:
-            paths[key] = tuple(file.parent / Path(item).expanduser() for item in value)
+            paths[key] = tuple(file.parent / at_home(item) for item in value)
     if problems:
         raise InputError(problems)
     return Settings(file, **paths)
@@ -165,6 +165,15 @@ class Roots:
         except (OSError, ValueError, RuntimeError):
             return "RG011", f"'{name}' cannot be a file's path"
         return "RG011", f"there is no {'folder' if folder else 'file'} '{name}'{_neighbour(resolved)}"
+
+
+def at_home(text: str) -> Path:
+    """A path with `~` replaced by the user's home; as it is where nobody knows that."""
+    path = Path(text)
+    try:
+        return path.expanduser()
+    except RuntimeError:  # there is no such user
+        return path
 
 
 def _neighbour(path: Path) -> str:

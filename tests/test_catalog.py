@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -77,6 +78,13 @@ def test_unknown_names_and_paths(plugin: Path) -> None:
         catalog.get("goood")
     with pytest.raises(InputError, match="RG011 there is no plugin"):
         Catalog.discover([plugin / "nowhere"], installed=False)
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "tone.vert", "my.node.py", "pipe.py"])
+def test_files_that_are_no_plugins(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name) if name == "pipe.py" else (tmp_path / name).touch()
+    with pytest.raises(InputError, match=r"RG011 there is no plugin in '.*'; one is a folder, a Python module"):
+        Catalog.discover([tmp_path / name], installed=False)
 
 
 def test_tests_beside_nodes_are_no_nodes(tmp_path: Path) -> None:
@@ -161,5 +169,5 @@ def test_text_with_a_comma_within_braces_is_told_from_a_key(tmp_path: Path) -> N
     file = tmp_path / "dim.frag"
     outputs = "outputs: {dimmed: {doc: The same, but darker.}}"
     file.write_text(f"/*---\n{outputs}\n---*/\nout vec4 dimmed;\nvoid main() {{ dimmed = vec4(0.0); }}\n")
-    with pytest.raises(InputError, match="dim.frag:2:35: RG440 'but darker.' reads as a key: text with a comma stands"):
+    with pytest.raises(InputError, match=r"dim\.frag:2:35: RG440 'but darker.' reads as a key: text with a comma stands"):
         Catalog.discover([file], installed=False).get("dim")

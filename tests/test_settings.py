@@ -45,6 +45,11 @@ def test_wrong_settings(tmp_path: Path, text: str, message: str) -> None:
         load(tmp_path / "rendergraph.toml")
 
 
+def test_the_home_of_nobody_is_a_path_like_any(tmp_path: Path) -> None:
+    (tmp_path / "rendergraph.toml").write_text('plugins = ["~/nodes", "~of_nobody/nodes"]\n')
+    assert load(tmp_path / "rendergraph.toml").plugins == (Path.home() / "nodes", tmp_path / "~of_nobody/nodes")
+
+
 def test_roots_say_where_a_path_stands(tmp_path: Path) -> None:
     roots = Roots.around(tmp_path / "pipeline.yaml")
     (tmp_path / "texture.png").touch()

@@ -147,6 +147,9 @@ def loose(path: Path, place: Place | None = None, where: str = "") -> Iterator[t
     if path.suffix in SHADERS:
         yield path.stem, shader(path)
         return
+    if not path.is_dir() and (path.suffix != ".py" or "." in path.stem or not path.is_file()):
+        kinds = f"a folder, a Python module (a name without dots, then .py) or a shader file ({', '.join(SHADERS)})"
+        raise InputError(Problem("RG011", f"there is no plugin in '{path}'{where}; one is {kinds}", place))
     package = package_of(path)
     fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem

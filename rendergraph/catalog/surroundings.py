@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rendergraph.errors import Place, shown_file
-from rendergraph.settings import nearest
+from rendergraph.settings import at_home, nearest
 
 VARIABLE = "RENDERGRAPH_PATH"
 """Folders and files with nodes, separated as in PATH."""
@@ -40,4 +40,4 @@ def surroundings() -> Iterator[Named]:
         yield Named(path, Place(shown_file(project.file)) if project is not None else None)
     for text in os.environ.get(VARIABLE, "").split(os.pathsep):
         if text.strip():
-            yield Named(Path(text.strip()).expanduser(), where=f", which {VARIABLE} names")
+            yield Named(at_home(text.strip()), where=f", which {VARIABLE} names")

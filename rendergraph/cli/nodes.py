@@ -35,7 +35,7 @@ def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> Non
     catalog = Catalog.discover(plugins)
     families = catalog.families()
     if family is not None and family not in families:
-        text = f"there is no family of nodes '{family}'{suggestion(family, families)}"
+        text = f"there is no family of nodes '{family}'{suggestion(family, filter(None, families))}"
         raise InputError(Problem("RG511", text))
     found: list[NodeType] = []
     problems: list[Problem] = []
