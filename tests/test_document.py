@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rendergraph.document import Document, Limits, load, parse
 from rendergraph.document import events as events_module
-from rendergraph.errors import InputError, Place
+from rendergraph.errors import InputError, Place, Problem
 
 TEXT = """\
 a: 1
@@ -52,6 +52,14 @@ def test_a_missing_path_has_the_nearest_place() -> None:
     document = parse(TEXT, "f.yaml")
     assert document.place(("list", 7, "deep"), key=True) == Place("f.yaml", 2, 7)
     assert document.problem("RG999", "text", ("list", 0)).line_text == "list: [x, {deep: no}]"
+
+
+def test_of_a_long_line_a_message_shows_what_is_around_the_place() -> None:
+    line = 5000 * "a" + "b" + 5000 * "c"
+    head, shown, caret = str(Problem("RG999", "text", Place("x.yaml", 1, 5001), line)).split("\n")
+    assert head == "x.yaml:1:5001: RG999 text"
+    assert len(shown) < 250
+    assert shown[caret.index("^")] == "b"
 
 
 @pytest.mark.usefixtures("_parser")

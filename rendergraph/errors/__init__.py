@@ -13,6 +13,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar, Literal
 
+_WIDEST = 200
+"""Characters of a file's line that a message shows, those around the place."""
+
 
 @dataclass(frozen=True, order=True)
 class Place:
@@ -51,8 +54,9 @@ class Problem:
         word = "warning: " if self.severity == "warning" else ""
         text = f"{head}{word}{self.code} {self.text}"
         if self.line_text and self.place and self.place.line:
-            shown = self.line_text.expandtabs(1)
-            text += f"\n    {shown}\n    {' ' * (self.place.column - 1)}^"
+            start = max(0, self.place.column - _WIDEST // 2) if len(self.line_text) > _WIDEST else 0
+            shown = self.line_text.expandtabs(1)[start : start + _WIDEST]
+            text += f"\n    {shown}\n    {' ' * (self.place.column - 1 - start)}^"
         return text
 
     def as_json(self) -> dict[str, object]:
