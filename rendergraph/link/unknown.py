@@ -22,6 +22,8 @@ _LINK = re.compile(r"([^.@]+)(?:\.([^.@]+))?(?:@previous)?\Z")
 
 def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
     """That there is no such type, and the way out."""
+    if name in spec.unrun:
+        return f"node type '{name}' is Python, which no pipeline file runs; say --plugin {spec.unrun[name]}"
     text = f"there is no node type '{shown(name)}'"
     near = nearest(name, catalog.names())
     if near is not None:

@@ -94,6 +94,7 @@ def resolve(
         dropped=frozenset(files.dropped),
         catalog=files.catalog,
         missing=tuple(files.plugins.missing),
+        unrun=files.plugins.unrun,
     )
 
 

@@ -6,15 +6,19 @@ A pipeline file is data, so nothing here imports anything: shader files alone co
 from __future__ import annotations
 
 import os
+import re
+import shlex
 from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
 from rendergraph.catalog import SHADERS, Catalog, find
 from rendergraph.document import Value, shown
-from rendergraph.errors import Place, Problem
+from rendergraph.errors import Place, Problem, shown_file
 from rendergraph.resolve.words import is_bare
 from rendergraph.settings import Roots
+
+_PACKAGE = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9_-]{0,98}[A-Za-z0-9])?\Z")
 
 
 class Plugins:
@@ -23,6 +27,7 @@ class Plugins:
     Attributes:
         catalog: the node types so far.
         missing: packages that are needed and not installed.
+        unrun: types whose Python stands in a folder that only a pipeline file names, and what `--plugin` takes for it.
         written: what the resolved file has to name, by the text it has to use.
         notes: warnings.
     """
@@ -30,6 +35,7 @@ class Plugins:
     def __init__(self, catalog: Catalog, say: Callable[[Problem], None]) -> None:
         self.catalog = catalog
         self.missing: list[str] = []
+        self.unrun: dict[str, str] = {}
         self.written: dict[str, Value] = {}
         self.notes: list[Problem] = []
         self._say = say
@@ -84,6 +90,9 @@ class Plugins:
 
     def _package(self, value: Value, name: str) -> None:
         """A package that the pipeline needs; its node types come by its entry point."""
+        if not _PACKAGE.match(name):  # what is said is typed into a shell
+            self._say(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
+            return
         self.written.setdefault(name, value)
         try:
             metadata.distribution(name)
@@ -109,7 +118,9 @@ class Plugins:
         if strange:
             names = ", ".join(sorted(file.name for file in strange)[:3]) + (", …" if len(strange) > 3 else "")
             words = f"'{shown(text)}' has Python ({names}), which is not run because a pipeline file names it; "
-            problem = value.problem("RG152", words + f"where you trust it, say --plugin {shown(text)}")
+            named = shlex.quote(shown_file(folder))
+            self.unrun |= dict.fromkeys((file.stem for file in strange), named)
+            problem = value.problem("RG152", words + f"where you trust it, say --plugin {named}")
             self.notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
 
 

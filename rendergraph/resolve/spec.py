@@ -94,6 +94,7 @@ class PipelineSpec:
         dropped: paths of what was left out because of them.
         catalog: the node types, with the shader files that the pipeline brings along.
         missing: packages that it needs and that are not installed.
+        unrun: types whose Python stands in a folder that only a pipeline file names, and what `--plugin` takes for it.
     """
 
     name: str
@@ -112,6 +113,7 @@ class PipelineSpec:
     dropped: frozenset[tuple[str, ...]] = frozenset()
     catalog: Catalog | None = field(default=None, repr=False)
     missing: tuple[str, ...] = ()
+    unrun: Mapping[str, str] = field(default_factory=dict)
 
     def check(self) -> None:
         """Stop here if anything is wrong so far; for callers that do not go on to `link`.

@@ -291,13 +291,19 @@ def test_python_in_its_folder_is_never_imported(write: Write) -> None:
     assert (folder / "fx" / "evil.ran").exists()
 
 
-def test_python_that_is_not_run_is_a_warning(write: Write) -> None:
+def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = write({"fx/evil.py": PYTHON, "fx/times.frag": EFFECT, "p.yaml": pipeline("times", "plugins: [./fx]\n")})
+    monkeypatch.chdir(folder.parent)
     (note,) = spec_of(folder / "p.yaml").notes
     assert str(note).splitlines()[0] == (
         f"{folder}/p.yaml:2:11: warning: RG152 './fx' has Python (evil.py), which is not run because a pipeline file "
-        "names it; where you trust it, say --plugin ./fx"
+        f"names it; where you trust it, say --plugin {folder.name}/fx"
     )
+    (folder / "p.yaml").write_text(pipeline("evil", "plugins: [./fx]\n"))
+    said = rf"RG102 node type 'evil' is Python, which no pipeline file runs; say --plugin {folder.name}/fx"
+    with pytest.raises(InputError, match=said):
+        link(spec_of(folder / "p.yaml"), Catalog.discover())
+    (folder / "p.yaml").write_text(pipeline("times", "plugins: [./fx]\n"))
     named = resolve(folder / "p.yaml", catalog=Catalog.discover([folder / "fx"]))
     assert named.notes == ()
 
@@ -308,6 +314,7 @@ def test_python_that_is_not_run_is_a_warning(write: Write) -> None:
         ("[../fx]", "2:11: RG012 '../fx' lies outside"), ("[./none]", "2:11: RG011 there is no folder './none'"),
         ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file, a folder is needed"),
         ("./fx", "2:10: RG106 'plugins' takes a list as in [./effects, some-package], this is text"),
+        ("[-rlist]", "2:11: RG131 '-rlist' is neither a folder of plugins nor a package's name"),
         ("[3]", "2:11: RG106 'plugins' takes text, this is a number"),
         ("[/]", "2:11: RG012 '/' lies outside"),
     ],
