@@ -206,7 +206,7 @@ def _key(attachment: Attachment | None) -> tuple[object, ...] | None:
 
 
 class ClearTarget:
-    """Clears one attachment of a bound framebuffer, prepared once; only colour 0… or depth with stencil 0."""
+    """Clears one attachment of a bound framebuffer, colour or depth, prepared once."""
 
     def __init__(
         self, device: Device, framebuffer: moderngl.Framebuffer, index: int | None, format: str,
@@ -219,8 +219,6 @@ class ClearTarget:
         address = self._data.ctypes.data
         if family == "depth":
             self._call, self._args = raw.glClearNamedFramebufferfv, (glo, 0x1801, 0, address)
-        elif family == "depth_stencil":
-            self._call, self._args = raw.glClearNamedFramebufferfi, (glo, 0x84F9, 0, float(self._data[0]), 0)
         else:
             name = {"uint": "glClearNamedFramebufferuiv", "int": "glClearNamedFramebufferiv"}.get(
                 family, "glClearNamedFramebufferfv"

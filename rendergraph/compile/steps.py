@@ -37,7 +37,7 @@ from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
 from rendergraph.program import prefix, stage_texts
 from rendergraph.steps import Read, Step, Write
-from rendergraph.textures import TextureDesc
+from rendergraph.textures import FORMATS, TextureDesc
 
 _TOPOLOGY = {
     "points": moderngl.POINTS, "lines": moderngl.LINES, "line_strip": moderngl.LINE_STRIP,
@@ -289,20 +289,19 @@ class _Compiler:
         drawn = self.memory.framebuffer(
             attachments, at_depth, step.size, color_mask=state.color_mask, depth_mask=depth_mask, scissor=state.scissor
         )
-        clears: list[Call] = []
-        for number, write in enumerate(colors):
-            if write.load == "clear":
-                desc = self.plan.resources[write.resource].desc
-                assert isinstance(desc, TextureDesc)
-                clears.append(ClearTarget(self.device, whole, number, desc.format, write.clear))
-        if depth_write is not None and depth_write.load == "clear":
-            desc = self.plan.resources[depth_write.resource].desc
-            assert isinstance(desc, TextureDesc)
-            clears.append(ClearTarget(self.device, whole, None, desc.format, depth_write.clear))
+        numbered: list[tuple[int | None, Write]] = [*enumerate(colors), *([(None, depth_write)] if depth_write else [])]
+        clears = [self._clear(whole, number, write, parity) for number, write in numbered if write.load == "clear"]
         if clears:
             compiled.before += [whole.use, *clears]
         if not clears or drawn is not whole:
             compiled.before.append(drawn.use)
+
+    def _clear(self, target: moderngl.Framebuffer, number: int | None, write: Write, parity: int) -> Call:
+        texture = self.memory.texture(write.resource, parity)
+        if FORMATS[texture.desc.format].family == "depth_stencil":
+            # Through a framebuffer it would heed the stencil's write mask, which is whatever a step before has stated.
+            return Clear(self.device, texture, write.clear, mip=write.mip or 0, layer=write.layer)
+        return ClearTarget(self.device, target, number, texture.desc.format, write.clear)
 
     def _state(
         self, step: Step, *, depth_default: bool, cull: str | None = None, clockwise: bool = False

@@ -43,7 +43,6 @@ PROTOTYPES: dict[str, tuple[Any, ...]] = {  # name: result, then arguments
     "glNamedFramebufferTextureLayer": (None, _U, _U, _U, _I, _I),
     "glCheckNamedFramebufferStatus": (_U, _U, _U),
     "glClearNamedFramebufferfv": (None, _U, _U, _I, _P),
-    "glClearNamedFramebufferfi": (None, _U, _U, _I, _F, _I),
     "glClearNamedFramebufferuiv": (None, _U, _U, _I, _P),
     "glClearNamedFramebufferiv": (None, _U, _U, _I, _P),
     "glGetProgramResourceiv": (None, _U, _U, _U, _I, _P, _I, _P, _P),

@@ -221,6 +221,26 @@ def test_stencil_marks_where_the_next_step_draws(draw: Draw) -> None:
     assert set(np.unique(image)) == {1.0, 2.0}
 
 
+def test_stencil_is_cleared_whatever_mask_the_frame_before_has_left(draw: Draw) -> None:
+    class Guarded(Node):
+        """Counts up in the stencil, then draws where it counts one, with the stencil guarded against writing."""
+
+        color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 where the stencil is 1.")
+        marks = Internal(Depth, format="depth32f_stencil8", clear=1.0)
+
+        def record(self, steps: Steps) -> None:
+            count = State(stencil=Stencil(StencilFace(func="always", depth_pass="incr")), depth_write=False)
+            steps.draw(None, vertex="triangle.vert", vertices=3, out=self.marks, height=0.0, state=count)
+            once = State(stencil=Stencil(StencilFace(func="equal", reference=1, write_mask=0)))
+            steps.fullscreen("number.frag", out={"color": self.color, "marks": self.marks}, state=once, number=1.0)
+
+    shaders = NUMBER | {"triangle.vert": TRIANGLE}
+    text = "nodes: {m: {type: guarded}}\noutputs: {image: m.color}"
+    image = draw(text, Guarded, shaders=shaders, size=(8, 8), frames=range(1, 4))["image"]
+    assert image[-1, 0, 0] == 1.0
+    assert image[0, -1, 0] == 0.0
+
+
 def test_depth_of_another_node_is_tested_and_not_written(draw: Draw) -> None:
     class Near(Node):
         """A triangle at window depth 0.5."""
