@@ -12,7 +12,7 @@ from rendergraph.api import Function, Input, Node, Output, ShadowLookup, ShadowM
 from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import ViewTable
-from rendergraph.glsl import Includes, declared, expand, interface, strip_comments
+from rendergraph.glsl import Includes, declared, expand, strip_comments
 from rendergraph.glsl.names import calls, renamed
 from rendergraph.glsl.source import Origin, SourceText
 from rendergraph.program import StageText, compile_problems, link_problems, prefix, stage_texts
@@ -161,28 +161,14 @@ void main() { made = vec4(color, 1.0); }
 
 
 def test_declared_names() -> None:
-    names = {(name.name, name.role) for name in declared(TEXT)}
-    assert names == {
-        ("SCALE", "macro"), ("TWICE", "macro"), ("map", "uniform"), ("color", "uniform"), ("tints", "uniform"),
-        ("box_block", "block"), ("low", "variable"), ("high", "variable"), ("named_block", "block"),
-        ("named", "variable"),
-        ("target", "uniform"), ("list", "buffer"), ("entries", "variable"), ("Hit", "struct"), ("table", "variable"),
-        ("before", "variable"), ("after", "variable"), ("v_uv", "in"), ("v_material", "in"), ("made", "out"),
-        ("area", "function"), ("main", "function"),
+    assert declared(TEXT) == {
+        "SCALE", "TWICE", "map", "color", "tints", "box_block", "low", "high", "named_block", "named", "target", "list",
+        "entries", "Hit", "table", "before", "after", "v_uv", "v_material", "made", "area", "main",
     }  # fmt: skip
 
 
-def test_interface() -> None:
-    found = interface(TEXT)
-    assert found.uniforms == {"map": "sampler2D", "color": "vec3", "tints": "vec3", "target": "image2D"}
-    assert found.inputs == {"v_uv": "vec2", "v_material": "int"}
-    assert found.outputs == {"made": "vec4"}
-    assert found.blocks == {"box_block": ("low", "high"), "named_block": ("size",)}
-    assert found.buffers == {"list": ("entries",)}
-
-
 def test_renaming_leaves_members_alone() -> None:
-    names = {name.name for name in declared(TEXT)} | {"size"}
+    names = declared(TEXT) | {"size"}
     text = renamed(TEXT, lambda word: f"p_{word}" if word in names else word)
     assert "struct p_Hit { float size; vec3 color; };" in text
     assert "uniform p_named_block { float size; } p_named;" in text

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from rendergraph.glsl.names import Declared, Interface, declared, interface
+from rendergraph.glsl.names import declared
 from rendergraph.glsl.source import MAX_BYTES, MAX_DEPTH, Includes, Origin, SourceText, expand, strip_comments
 
 __all__ = [
-    "MAX_BYTES", "MAX_DEPTH", "Declared", "Includes", "Interface", "Origin", "SourceText", "declared", "expand",
-    "interface", "strip_comments",
+    "MAX_BYTES", "MAX_DEPTH", "Includes", "Origin", "SourceText", "declared", "expand", "strip_comments",
 ]  # fmt: skip

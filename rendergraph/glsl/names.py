@@ -3,64 +3,52 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
-Role = Literal["uniform", "in", "out", "buffer", "block", "function", "struct", "variable", "macro"]
+Storage: TypeAlias = Literal["uniform", "in", "out", "buffer"]
 
-_TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|[^\s\w]")
+TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|[^\s\w]")
+"""A word, a number or a sign."""
+
 _WORD = re.compile(r"[A-Za-z_]\w*\Z")
+_STORAGE: dict[str, Storage] = {"uniform": "uniform", "in": "in", "out": "out", "buffer": "buffer"}
 _QUALIFIERS = frozenset(
     [
-        "const", "in", "out", "inout", "uniform", "buffer", "shared", "flat", "smooth", "noperspective", "centroid",
-        "sample", "patch", "invariant", "precise", "coherent", "volatile", "restrict", "readonly", "writeonly", "highp",
-        "mediump", "lowp", "subroutine",
+        "const", "inout", "shared", "flat", "smooth", "noperspective", "centroid", "sample", "patch", "invariant",
+        "precise", "coherent", "volatile", "restrict", "readonly", "writeonly", "highp", "mediump", "lowp",
+        "subroutine",
     ]
 )  # fmt: skip
 _DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.MULTILINE)
 _MEMBERS = re.compile(
     r"\bstruct\s+\w+\s*\{([^{}]*)\}|\b(?:uniform|buffer|in|out)\s+\w+\s*\{([^{}]*)\}\s*[A-Za-z_]\w*\s*(?:\[[^\]]*\])?\s*;"
 )
-_DEFINE = re.compile(r"\s*#\s*define\s+([A-Za-z_]\w*)")
+_DEFINE = re.compile(r"^\s*#\s*define\s+([A-Za-z_]\w*)", re.MULTILINE)
+_CLOSES = {"(": ")", "[": "]", "{": "}"}
 
 
 @dataclass(frozen=True)
-class Declared:
-    """One name declared at the top level.
+class Head:
+    """How a statement begins, and the tokens behind that.
 
     Attributes:
-        name: the name.
-        role: what it is.
-        type: the GLSL type, the block's name for members and instances, empty for macros.
+        storage: the storage qualifier; None where there is none.
+        qualifiers: the others: `readonly`, `flat`, …
+        layout: `location`, `binding`, … with the tokens behind `=`, none for words alone (`rgba16f`).
+        rest: from the type on.
     """
 
-    name: str
-    role: Role
-    type: str = ""
-
-
-@dataclass(frozen=True)
-class Interface:
-    """What a shader's text declares towards the outside; also what stands inside `#if`.
-
-    Attributes:
-        uniforms: default-block uniforms (samplers and images too), name to type.
-        inputs, outputs: `in` and `out` variables, name to type.
-        blocks: uniform blocks, name to members.
-        buffers: storage blocks, name to members.
-    """
-
-    uniforms: dict[str, str] = field(default_factory=dict)
-    inputs: dict[str, str] = field(default_factory=dict)
-    outputs: dict[str, str] = field(default_factory=dict)
-    blocks: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    buffers: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    storage: Storage | None
+    qualifiers: frozenset[str]
+    rest: Sequence[str]
+    layout: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def tokens(text: str) -> list[str]:
     """Words, numbers and signs of a text without comments."""
-    return _TOKEN.findall(text)
+    return TOKEN.findall(text)
 
 
 def without_directives(text: str) -> str:
@@ -68,36 +56,19 @@ def without_directives(text: str) -> str:
     return _DIRECTIVE.sub(lambda match: re.sub(r"[^\n]", " ", match.group()), text)
 
 
-def declared(text: str) -> list[Declared]:
+def declared(text: str) -> set[str]:
     """All names a text declares at its top level, macros included, whatever `#if` they stand in."""
-    macros = [Declared(match[1], "macro") for line in text.split("\n") if (match := _DEFINE.match(line))]
-    found: list[Declared] = []
+    found = set(_DEFINE.findall(text))
     for statement, body in statements(tokens(without_directives(text))):
-        found += _of_statement(statement, body)
-    return macros + [name for name in found if not name.name.startswith("gl_")]
-
-
-def interface(text: str) -> Interface:
-    """The uniforms, inputs, outputs and blocks of a text without comments."""
-    result = Interface()
-    tables: dict[str, dict[str, str]] = {"uniform": result.uniforms, "in": result.inputs, "out": result.outputs}
-    blocks: dict[str, dict[str, tuple[str, ...]]] = {"uniform": result.blocks, "buffer": result.buffers}
-    for statement, body in statements(tokens(without_directives(text))):
-        storage, rest = _split(statement)
-        if body is not None and storage in blocks and rest:
-            blocks[storage][rest[0]] = tuple(_members(body))
-        elif body is None:
-            for name in _of_statement(statement, None):
-                if name.role in tables:
-                    tables[name.role][name.name] = name.type
-    return result
+        found |= set(_declared_by(head(statement).rest, body))
+    return {name for name in found if not name.startswith("gl_")}
 
 
 def calls(text: str, function: str) -> bool:
     """Whether a text without comments calls a function it does not declare itself."""
     if re.search(rf"(?<![\w.]){re.escape(function)}\s*\(", text) is None:
         return False
-    return not any(name.role == "function" and name.name == function for name in declared(text))
+    return all(_function(head(one).rest) != function for one, _ in statements(tokens(without_directives(text))))
 
 
 def mentions(text: str, name: str) -> bool:
@@ -118,7 +89,7 @@ def renamed(text: str, rename: Callable[[str], str]) -> str:
 # --- scanning --------------------------------------------------------------------------------------------------------
 
 
-def statements(words: list[str]) -> Iterator[tuple[list[str], list[str] | None]]:
+def statements(words: Sequence[str]) -> Iterator[tuple[list[str], Sequence[str] | None]]:
     """Top-level statements, each with the tokens of its braces where it has any.
 
     The tokens after the braces of a block or struct (`} name;`) are appended to the statement after a `}`.
@@ -132,7 +103,7 @@ def statements(words: list[str]) -> Iterator[tuple[list[str], list[str] | None]]
                 yield statement, None
             statement = []
         elif word == "{" and "=" not in statement:
-            end = _closing(words, position)
+            end = closing(words, position)
             body = words[position + 1 : end]
             if statement and statement[-1] == ")":  # a function's body ends the statement
                 yield statement, body
@@ -148,93 +119,93 @@ def statements(words: list[str]) -> Iterator[tuple[list[str], list[str] | None]]
         position += 1
 
 
-def _closing(words: list[str], start: int) -> int:
+def head(statement: Sequence[str]) -> Head:
+    """The qualifiers and layouts that a statement begins with, and what follows."""
+    storage: Storage | None = None
+    qualifiers: set[str] = set()
+    layout: dict[str, tuple[str, ...]] = {}
+    position = 0
+    while position < len(statement):
+        word = statement[position]
+        if word == "layout" and statement[position + 1 : position + 2] == ["("]:
+            end = closing(statement, position + 1)
+            for part in _split_at_commas(statement[position + 2 : end]):
+                if part:
+                    layout[str(part[0])] = tuple(map(str, part[2:])) if part[1:2] == ["="] else ()
+            position = end
+        elif word in _STORAGE:
+            storage = _STORAGE[word]
+        elif word in _QUALIFIERS:
+            qualifiers.add(str(word))
+        else:
+            break
+        position += 1
+    return Head(storage, frozenset(qualifiers), statement[position:], layout)
+
+
+def declarators(words: Sequence[str]) -> Iterator[tuple[str, bool, Sequence[str]]]:
+    """Name, whether it is an array, and initialiser of each of `a = 1, b[3], c`, the words behind a type."""
+    array_type = words[:1] == ["["]
+    if array_type:
+        words = words[closing(words, 0) + 1 :]
+    if words[1:2] == ["("]:  # a function's declaration
+        return
+    for part in _split_at_commas(words):
+        if not part or not _WORD.match(part[0]):
+            continue
+        rest = part[1:]
+        array = array_type
+        if rest[:1] == ["["]:
+            array = True
+            rest = rest[closing(rest, 0) + 1 :]
+        yield part[0], array, rest[1:] if rest[:1] == ["="] else []
+
+
+def closing(words: Sequence[str], start: int) -> int:
+    """The position of the bracket that closes the one at `start`; brackets of other kinds may stand in branches."""
+    opens, closes = words[start], _CLOSES[words[start]]
     depth = 0
     for position in range(start, len(words)):
-        depth += (words[position] == "{") - (words[position] == "}")
+        depth += (words[position] == opens) - (words[position] == closes)
         if depth == 0:
             return position
     return len(words)
 
 
-def _split(statement: list[str]) -> tuple[str, list[str]]:
-    """The storage qualifier of a statement, and the tokens after all qualifiers."""
-    storage = ""
-    position = 0
-    while position < len(statement):
-        word = statement[position]
-        if word == "layout" and statement[position + 1 : position + 2] == ["("]:
-            position = _after_brackets(statement, position + 1)
-            continue
-        if word not in _QUALIFIERS:
-            break
-        if word in ("uniform", "in", "out", "buffer"):
-            storage = word
-        position += 1
-    return storage, statement[position:]
-
-
-def _after_brackets(words: list[str], start: int) -> int:
+def _split_at_commas(words: Sequence[str]) -> list[list[str]]:
+    parts: list[list[str]] = [[]]
     depth = 0
-    for position in range(start, len(words)):
-        depth += (words[position] in "([") - (words[position] in ")]")
-        if depth == 0:
-            return position + 1
-    return len(words)
+    for word in words:
+        depth += (word in "([{") - (word in ")]}")
+        if word == "," and depth == 0:
+            parts.append([])
+        else:
+            parts[-1].append(word)
+    return parts
 
 
-def _of_statement(statement: list[str], body: list[str] | None) -> Iterator[Declared]:
-    storage, rest = _split(statement)
+def _function(rest: Sequence[str]) -> str:
+    """The function that a statement declares or defines; empty where it is something else."""
+    names = rest[closing(rest, 1) + 1 :] if rest[1:2] == ["["] else rest[1:]
+    return names[0] if names[1:2] == ["("] and _WORD.match(names[0]) else ""
+
+
+def _declared_by(rest: Sequence[str], body: Sequence[str] | None) -> Iterator[str]:
+    """The names that a statement declares, from its type on."""
     if not rest or rest[0] == "precision":
         return
-    if body is not None and "}" in rest:
-        after = rest[rest.index("}") + 1 :]
-        if rest[0] == "struct":
-            yield Declared(rest[1], "struct")
-            yield from (Declared(name, "variable", rest[1]) for name in _declarators(after))
-            return
-        role: Role = "buffer" if storage == "buffer" else "block"
-        yield Declared(rest[0], role)
-        members = _declarators(after) or _members(body)
-        yield from (Declared(name, "variable", rest[0]) for name in members)
-        return
-    position = 1
-    if position < len(rest) and rest[position] == "[":
-        position = _after_brackets(rest, position)
-    names = rest[position:]
-    if len(names) > 1 and _WORD.match(names[0]) and names[1] == "(":
-        yield Declared(names[0], "function", rest[0])
-        return
-    kinds: dict[str, Role] = {"uniform": "uniform", "in": "in", "out": "out"}
-    for name in _declarators(names):
-        yield Declared(name, kinds.get(storage, "variable"), rest[0])
-
-
-def _declarators(words: list[str]) -> list[str]:
-    """The names of `a = 1, b[3], c`."""
-    names: list[str] = []
-    depth = 0
-    expect = True
-    for word in words:
-        if word in "([{":
-            depth += 1
-        elif word in ")]}":
-            depth -= 1
-        elif depth == 0 and word == ",":
-            expect = True
-        elif depth == 0 and expect and _WORD.match(word):
-            names.append(word)
-            expect = False
-    return names
-
-
-def _members(body: list[str]) -> list[str]:
-    names: list[str] = []
-    for statement, _ in statements(body):
-        _, rest = _split(statement)
-        position = _after_brackets(rest, 1) if rest[1:2] == ["["] else 1
-        names += _declarators(rest[position:])
-    return names
+    if function := _function(rest):
+        yield function
+    elif body is None or "}" not in rest:
+        yield from (name for name, _, _ in declarators(rest[1:]))
+    else:
+        is_struct = rest[0] == "struct"
+        yield rest[1] if is_struct else rest[0]
+        own = [name for name, _, _ in declarators(rest[rest.index("}") + 1 :])]
+        yield from own
+        if not own and not is_struct:  # members of a block without a name of its own
+            for member, _ in statements(body):
+                yield from (name for name, _, _ in declarators(head(member).rest[1:]))
 
 
 def _member_positions(text: str) -> set[int]:

@@ -285,7 +285,7 @@ def provider_text(
     file = node.shaders / binding.shader
     source = includes.expand(file, root=node.shaders, prefix=before, plugged=dict(binding.includes))
     own = SourceText(*_rows((line, origin) for line, origin in _pairs(source) if not origin.shared))
-    names = {name.name for name in declared(own.text)}
+    names = declared(own.text)
     if binding.signature not in names:
         signature = _declared_signatures(node)[binding.signature]
         text = f"node '{binding.node}' ({node.name}): '{binding.shader}' does not define '{signature.declaration}'"
