@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from rendergraph.catalog.rules import number_rule, size_rule, word_rule
 from rendergraph.declare import Extensions, Input, Made, Output, Port
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, suggestion
-from rendergraph.glsl import SourceText
+from rendergraph.glsl import SourceText, strip_comments
 from rendergraph.glsl.globals import Global, globals_of
 from rendergraph.textures import FORMATS, SEMANTICS, SIGNATURES, Semantic, Signature
 from rendergraph.textures import Any as AnyTexture
@@ -301,8 +302,9 @@ class Entries:
         return True
 
     def _add_parameter(self, name: str, entry: Mapping[str, Value]) -> None:
-        known = [found.name for found in self.globals.declared if found.storage == "uniform" and found.type]
-        reader = Parameter(name, entry, self.header.names.get(name), self.declared.get(name), self.globals)
+        plain = (found for found in self.globals.declared if found.type in _SCALAR or _VECTOR.match(found.type))
+        known = [found.name for found in plain if found.storage == "uniform"]
+        reader = Parameter(name, entry, self.header.names.get(name), self.declared.get(name), self.globals, self._words)
         field = reader.field([other for other in known if other not in self.header.names])
         self.problems += reader.problems
         for text in reader.said:
@@ -310,6 +312,12 @@ class Entries:
         if field is not None:
             self.fields[name] = field
             self._without_range += [name] if reader.lacks_range else []
+
+    @cached_property
+    def _words(self) -> frozenset[str]:
+        """Words of the text, its includes, and of what is included by a parameter, as in `#include <CURVE>`."""
+        own = strip_comments("\n".join(self.rows))
+        return frozenset(re.findall(r"[A-Za-z_]\w*", "\n".join((*self.source.lines, own))))
 
     # What the header refers to ---------------------------------------------------------------------------------------
 

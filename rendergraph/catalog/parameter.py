@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any, Literal
 
 from rendergraph.declare import define, param, structural
@@ -27,14 +27,18 @@ class Parameter:
     """
 
     def __init__(
-        self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, known: Globals
-    ) -> None:
-        """Args are the name, the header's keys, its entry where there is one, and the declaration with its file's."""
+        self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, known: Globals,
+        words: Set[str],
+    ) -> None:  # fmt: skip
+        """Args are the name, the header's keys, its entry where there is one, the declaration with its file's, and
+        all words of the text.
+        """
         self.name = name
         self.entry = entry
         self.named = named
         self.found = found
         self.globals = known
+        self.words = words
         self.problems: list[Problem] = []
         self.said: list[tuple[str, str]] = []
         self.lacks_range = False
@@ -83,6 +87,9 @@ class Parameter:
         if found is None and role == "param":
             text = f"the header has parameter '{name}', but the shader declares no 'uniform float {name};'"
             text += suggestion(name, uniforms)
+        elif found is None and "role" not in self.entry and self.words.isdisjoint(self._macros()):
+            text = f"the header has parameter '{name}', but the shader has neither 'uniform float {name};' nor "
+            text += f"{name.upper()}, as which it would be compiled in{suggestion(name, uniforms)}"
         elif found is not None and (role != "param" or found.storage != "uniform"):
             what = f"'{found.storage} {found.type} {name};'" + (f", no {role}" if role != "param" else "")
             text = f"the header has parameter '{name}', which the shader declares as {what}"
@@ -92,6 +99,12 @@ class Parameter:
             text = self._unfit(found)
             self.said += [("RG441", text)] if text else []
         return not text
+
+    def _macros(self) -> list[str]:
+        """What it is in the text where it is compiled in."""
+        choices = self.entry["choices"].plain() if "choices" in self.entry else []
+        words = [self.name, *(f"{self.name}_{choice}" for choice in choices)]
+        return [word.upper().replace("-", "_") for word in words]
 
     def _unfit(self, found: Global) -> str:
         if not found.array and (found.type in _SCALAR or _VECTOR.match(found.type)):

@@ -19,6 +19,7 @@ uniform float strength;
 out vec4 darkened;
 void main() { darkened = texelFetch(color, ivec2(0), 0) * strength; }
 """
+MACROS = "int taps = TAPS, curve = CURVE_HARD;\n#if SMOOTH_IT\n#endif\n"
 WHOLE = """// A first comment.
 /*---
 doc: |
@@ -51,7 +52,7 @@ def mistakes(folder: Path, text: str, name: str = "effect.frag") -> list[str]:
 
 
 def test_a_header_says_everything_that_a_class_can(tmp_path: Path) -> None:
-    found = load(tmp_path, WHOLE + BODY)
+    found = load(tmp_path, WHOLE + BODY + MACROS)
     cls = found.cls
     assert found.warnings == ()
     assert cls.__doc__ == "Darken.\n\nMore about it."
@@ -139,7 +140,7 @@ def test_compute_images_and_buffers(tmp_path: Path) -> None:
 
 
 def test_the_schema_treats_it_like_any_node(tmp_path: Path) -> None:
-    (tmp_path / "effect.frag").write_text(WHOLE + BODY)
+    (tmp_path / "effect.frag").write_text(WHOLE + BODY + MACROS)
     found = schema(Catalog.discover([tmp_path], installed=False))
     rules = found["definitions"]["node"]["allOf"]
     (rule,) = [rule["then"]["properties"] for rule in rules if rule["if"]["properties"]["type"]["const"] == "effect"]
@@ -189,13 +190,19 @@ def headed(text: str) -> str:
         ("params: {strenght: {role: param}}",
          ["2:10: RG444 the header has parameter 'strenght', but the shader declares no 'uniform float strenght;'; "
           "did you mean 'strength'?"]),
-        ("params: {more: {doc: It.}}",
+        ("params: {strenght: {default: 1}}",
+         ["2:10: RG444 the header has parameter 'strenght', but the shader has neither 'uniform float strenght;' nor "
+          "STRENGHT, as which it would be compiled in; did you mean 'strength'?"]),
+        ("params: {mode: {choices: [a, b]}}",
+         ["2:10: RG444 the header has parameter 'mode', but the shader has neither 'uniform float mode;' nor "
+          "MODE, as which it would be compiled in; there is strength"]),
+        ("params: {more: {role: define}}",
          ["2:10: RG444 'more' is no uniform of the shader; it needs choices, or a number or a switch as default"]),
-        ("params: {mode: {choices: [a, b], default: c}}",
-         ["2:43: RG442 the default of 'mode' is one of a, b, not 'c'"]),
+        ("params: {mode: {role: define, choices: [a, b], default: c}}",
+         ["2:57: RG442 the default of 'mode' is one of a, b, not 'c'"]),
         ("inputs: {color: {}}\nparams: {color: {}}",
          ["3:10: RG440 'color' stands in line 2 too; no port or parameter has the name of another"]),
-        ("params: {filter: {default: 1}}",
+        ("params: {filter: {role: define, default: 1}}",
          ["2:10: RG490 shader 'effect.frag': 'filter' is reserved by GLSL or by the node's base class; "
           "choose another name"]),
         ("doc: 'open", ["2:6: RG001 not valid YAML: the quote that starts here is not closed"]),
@@ -212,6 +219,18 @@ def test_a_wrong_header_is_told_at_its_line(tmp_path: Path, text: str, messages:
         assert found[0].startswith("2:30: RG440 'format' takes a format; did you mean 'rgba8'?") or "rgba" in found[0]
     else:
         assert found == messages
+
+
+@pytest.mark.parametrize(
+    "body", ["#define X MODE\n", "#if MODE_A\n#endif\n", '#include "more.glsl"\n', "#include <MODE>\n", ""]
+)
+def test_what_is_compiled_in_stands_in_the_text(tmp_path: Path, body: str) -> None:
+    (tmp_path / "more.glsl").write_text("int mode = MODE;\n")
+    header = "/*---\ndoc: It has a MODE.\nparams: {mode: {choices: [a, b]}}\n---*/\n// MODE\n"
+    if body:
+        assert load(tmp_path, header + body + BODY).cls.role_of("mode") == "define"
+    else:
+        assert "nor MODE" in mistakes(tmp_path, header + BODY)[0]
 
 
 def test_a_header_ends(tmp_path: Path) -> None:
