@@ -13,6 +13,7 @@ from rendergraph.api import Depth, Function, Input, Node, Output, ShadowLookup, 
 from rendergraph.catalog import NodeType
 from rendergraph.errors import Problem
 from rendergraph.expand import ViewTable
+from rendergraph.glsl import strip_comments
 from rendergraph.program import StageText, compile_problems, link_problems, stage_texts
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
@@ -118,6 +119,36 @@ def test_every_driver_leads_to_the_authors_line(
     assert more in found.text
 
 
+@pytest.mark.parametrize(
+    ("line", "said", "marked"),
+    [
+        ("x = nope;", "0:{}(5): error: `nope' undeclared", "nope"),
+        ("    x = nope;", "0:{}(6): error: `nope' undeclared", "nope"),
+        ("\t  x\t =   1.0 + nope;", "0:{}(12): error: `nope' undeclared", "nope"),
+        # a macro of the line moves what comes after it
+        ("    x = M + nope + 1.0;", "0:{}(31): error: `nope' undeclared", "nope"),
+        ("    x = a /* c */ + nope + nope;", "0:{}(10): error: `nope' undeclared", "nope + nope"),
+        # nothing is quoted, or what is stands not in the line
+        ("    x =  vec3(1.0)  ;", "0:{}(6): error: value of type vec3 cannot be assigned", "vec3"),
+        ("    x  =  = 1.0;", "0:{}(6): error: syntax error, unexpected '='", "= 1.0"),
+        ("\t\tx = 1.0", "0:{}(9): error: syntax error, unexpected '}}'", ""),
+        # no column at all
+        ("    x = nope;", '0({}) : error C1503: undefined variable "nope"', "nope"),
+        ("    x = vec3(1.0);", "ERROR: 0:{}: '=' :  cannot convert", "x"),
+    ],
+)
+def test_the_column_is_the_authors(folder: Path, line: str, said: str, marked: str) -> None:
+    (folder / "main.frag").write_text(f"out vec4 c;\nvoid main() {{\nfloat x;\n{line}\n}}\n")
+    text = texts(folder, "main.frag")["fragment"]
+    stripped = strip_comments(line)
+    number = text.text.splitlines().index(stripped) + 1
+    (found,) = compile_problems(said.format(number), text)
+    assert found.place is not None
+    assert found.place.column is not None
+    assert line[found.place.column - 1 :].startswith(marked)
+    assert marked or found.place.column == len(line) + 1
+
+
 def test_the_vertex_stage_of_the_frameworks_own(folder: Path) -> None:
     vertex = texts(folder, "main.frag")["vertex"]
     found = answer("nvidia", vertex, "gl_Position", "gl_Position")
@@ -166,7 +197,12 @@ CASES = {
         COLOR,
         {"wrong.frag": '#include "a.glsl"\nout vec4 color; void main() { color = a(); }',
          "a.glsl": '\n#include "b.glsl"\nvec4 a() { return b(); }', "b.glsl": "// B\nvec4 b() {\n    return nothing;\n}"},
-        r"b\.glsl:3:\d+: RG410 node 'a': fragment shader: .*nothing.* \(included at a\.glsl:2\)",
+        r"b\.glsl:3:12: RG410 node 'a': fragment shader: .*nothing.* \(included at a\.glsl:2\)",
+    ),
+    "far in": (
+        COLOR,
+        {"wrong.frag": "out vec4 color;\nvoid main() {\n\t  float  x =\t 1.0;\n\t\tcolor  =  vec3( x );\n}"},
+        r"wrong\.frag:4:3: RG410",
     ),
     "inside a macro": (
         COLOR,
