@@ -45,7 +45,7 @@ _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 
 }
 _ANY_VALUE = "vec4(at, wave, 1.0)"
 _DEPTHS = ("depth", "shadow_map")
-_BUFFER_BYTES = 65_536
+_BUFFER_BYTES = 1 << 20
 
 
 @dataclass

@@ -26,6 +26,7 @@ from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.limits import check_plan, groups_of
 from rendergraph.compile.memory import ClearTarget, Memory
 from rendergraph.compile.programs import ProgramCache
+from rendergraph.compile.stored import check_stored
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
@@ -270,6 +271,7 @@ class _Compiler:
         check_uniforms(step, program, uniforms, {*sampled, *materials}, texts)
         check_blocks(step, program, blocks, texts)
         check_outputs(step, program, outputs)
+        check_stored(step, program, named, self.plan.resources, texts)
         return program, binds, uniforms
 
     def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _UNIFORM, _UNIFORM_BLOCK, _OUTPUT, _STORAGE_BLOCK = 0x92E1, 0x92E2, 0x92E4, 0x92E6
 _NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92FB, 0x92FD, 0x930E
-_ACTIVE = 0x92F5
+_ACTIVE, _BUFFER_DATA_SIZE = 0x92F5, 0x9303
 
 _WRITERS: dict[int, tuple[str, Any, int]] = {  # GL type: raw function, NumPy type, numbers per element
     0x1406: ("glProgramUniform1fv", np.float32, 1), 0x8B50: ("glProgramUniform2fv", np.float32, 2),
@@ -85,6 +85,7 @@ class Program:
         object: moderngl's Program or ComputeShader.
         uniforms: active uniforms outside blocks, by name.
         blocks, storage: active uniform and storage blocks, name to index.
+        storage_bytes: the least that a storage block's buffer holds, an array without a size counted as one element.
     """
 
     device: Device
@@ -92,6 +93,7 @@ class Program:
     uniforms: dict[str, Uniform] = field(default_factory=dict)
     blocks: dict[str, int] = field(default_factory=dict)
     storage: dict[str, int] = field(default_factory=dict)
+    storage_bytes: dict[str, int] = field(default_factory=dict)
 
     @property
     def glo(self) -> int:
@@ -177,6 +179,11 @@ def _inspect(program: Program) -> None:
     for interface, into in ((_UNIFORM_BLOCK, program.blocks), (_STORAGE_BLOCK, program.storage)):
         for index in range(_count(raw, glo, interface)):
             into[_name(raw, glo, interface, index)] = index
+    size = (ctypes.c_uint * 1)(_BUFFER_DATA_SIZE)
+    least = (ctypes.c_int * 1)()
+    for name, index in program.storage.items():
+        raw.glGetProgramResourceiv(glo, _STORAGE_BLOCK, index, 1, ctypes.byref(size), 1, None, ctypes.byref(least))
+        program.storage_bytes[name] = least[0]
     properties = (ctypes.c_uint * 4)(_TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION)
     values = (ctypes.c_int * 4)()
     for index in range(_count(raw, glo, _UNIFORM)):
