@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import rendergraph as rg
 from rendergraph.authoring.declarations import docs
 from rendergraph.authoring.examine import examine
 from rendergraph.catalog import Catalog
@@ -94,3 +95,10 @@ def test_shaders_begin_by_saying_what_they_are() -> None:
 def test_shipped_pipelines_begin_by_saying_what_they_show() -> None:
     for path in shipped_pipelines().values():
         assert path.read_text().startswith("# "), path.name
+
+
+@pytest.mark.parametrize("name", sorted(shipped_pipelines()))
+def test_the_radiance_of_a_shipped_pipeline_is_what_its_display_is_given(name: str) -> None:
+    """An EXR holds all light that the picture shows: glow and transparent surfaces too."""
+    graph = rg.load(name).graph
+    assert (graph.outputs["radiance"],) == graph["display"].inputs["radiance"]
