@@ -236,7 +236,7 @@ def test_the_comparison_is_what_the_files_give(gl: Any, tmp_path: Path, monkeypa
             assert float(shown) == pytest.approx(value, abs=5e-4)
         assert psnr == "∞" if m.psnr is None else float(psnr) == pytest.approx(m.psnr, abs=0.2)
         assert int(passes) == result.pass_count
-        assert unit == "MB"
+        assert unit == "MiB"
         assert float(size) == pytest.approx(float(str(result.memory["allocated_bytes"])) / (1 << 20), abs=0.06)
     difference = np.abs(made.side_by_side(found).astype(np.float64) - read(made.PICTURE)[..., :3])
     assert difference.mean() < 1.0, "run docs/_generate/comparison.py again"

@@ -517,7 +517,7 @@ def png(width: int, height: int, data: bytes = b"") -> bytes:
     [
         (2**31 - 1, 2**31 - 1, "RG352"),
         (16385, 1, "RG353 the image is 16385×1 pixels; the limit is 16384 a side"),
-        (16000, 16000, "RG353 the image claims 976 MB in a file of"),
+        (16000, 16000, "RG353 the image claims 976 MiB in a file of"),
         (100, 100, "RG352"),
     ],
 )
@@ -573,7 +573,7 @@ def test_limits_can_be_set(tmp_path: Path) -> None:
 
 def test_a_bomb_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.png").write_bytes(png(8000, 8000, bytes(8000 * 32001)))
-    assert "above 64 MB the limit is 1000:1" in refused(tmp_path / "a.png", capfd)
+    assert "above 64 MiB the limit is 1000:1" in refused(tmp_path / "a.png", capfd)
 
 
 def test_shared_images_decode(shared: Path) -> None:

@@ -145,8 +145,8 @@ def terminal_width() -> int:
 
 
 def megabytes(count: float) -> str:
-    """Bytes for a person: `12.4 MB` (2^20 bytes)."""
-    return f"{count / (1 << 20):.1f} MB"
+    """Bytes for a person: `12.4 MiB`."""
+    return f"{count / (1 << 20):.1f} MiB"
 
 
 def _printable(text: str, stream: Any) -> str:

@@ -206,12 +206,12 @@ def _check_size(image: _Image, channels: int, item: int) -> None:
         _refuse(image.source, "RG353", text)
     decoded = width * height * max(4, channels) * item
     if decoded > limits.bytes:
-        text = f"the image takes {decoded >> 20} MB decoded; the limit is {limits.bytes >> 20} MB"
+        text = f"the image takes {decoded >> 20} MiB decoded; the limit is {limits.bytes >> 20} MiB"
         _refuse(image.source, "RG353", text)
     if decoded > limits.ratio_from and decoded > limits.ratio * image.size:
         text = (
-            f"the image claims {decoded >> 20} MB in a file of {image.size} bytes; "
-            f"above {limits.ratio_from >> 20} MB the limit is {limits.ratio}:1"
+            f"the image claims {decoded >> 20} MiB in a file of {image.size} bytes; "
+            f"above {limits.ratio_from >> 20} MiB the limit is {limits.ratio}:1"
         )
         _refuse(image.source, "RG353", text)
 

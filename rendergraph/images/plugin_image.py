@@ -54,5 +54,5 @@ def _mistake(pixels: object, limits: Limits) -> str:
         return f"{pixels.dtype} values, not uint8 or floats"
     height, width = pixels.shape[:2]
     if max(height, width) > limits.side or height * width * 8 > limits.bytes:
-        return f"{width}×{height} pixels; the limit is {limits.side} a side and {limits.bytes >> 20} MB"
+        return f"{width}×{height} pixels; the limit is {limits.side} a side and {limits.bytes >> 20} MiB"
     return ""

@@ -38,7 +38,7 @@ class Limits:
         memory_bytes: memory for what a file declares without holding it, such as accessors without a view.
         image_side: texels along one side of an image.
         image_bytes: decoded bytes of one image.
-        image_ratio: decoded bytes for each byte of the file, where an image is above 64 MB.
+        image_ratio: decoded bytes for each byte of the file, where an image is above 64 MiB.
     """
 
     file_bytes: int = 2 << 30
