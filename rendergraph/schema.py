@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import inspect
 import json
+import os
 import re
+import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -39,12 +41,8 @@ def schema(catalog: Catalog) -> Schema:
 
     A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
     """
-    types: dict[str, type[Node] | None] = {}
-    for name in catalog.names():
-        try:
-            types[name] = catalog.get(name).cls
-        except InputError:
-            types[name] = None
+    types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
+    types |= {found.name: found.cls for found in catalog.usable()[0]}
     properties: Schema = {
         "rendergraph": {"const": VERSION, "description": "Version of the format."},
         "description": {"type": "string", "description": "What the pipeline shows, in a line."},
@@ -260,7 +258,7 @@ _MODELINE = re.compile(r"#\s*(?:yaml-language-server:\s*)?\$schema=(\S+)\s*$", r
 _MOST_BYTES = 1 << 24
 
 
-def outdated(pipeline: Path, roots: Roots, catalog: Catalog) -> Problem | None:
+def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[Path] = ()) -> Problem | None:
     """A warning where the schema that a pipeline file's modeline names was written before its node types changed.
 
     Types that the schema knows and the catalog does not are nothing to warn of: it may be for more plugins than this
@@ -270,6 +268,7 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog) -> Problem | None:
         pipeline: the file.
         roots: where the schema must lie; one elsewhere is not looked at.
         catalog: the types there are.
+        plugins: those that were named, to be named again.
     """
     text = pipeline.read_text(encoding="utf-8", errors="replace")
     found = _MODELINE.search(text)
@@ -287,7 +286,10 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog) -> Problem | None:
     if not changed:
         return None
     rest = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
-    way_out = f"`rendergraph schema -o {found[1]}` writes it anew"
+    words = [word for plugin in plugins for word in ("--plugin", str(plugin))]
+    way_out = (
+        f"`{shlex.join(['rendergraph', 'schema', *words, '-o', shown_file(os.path.normpath(file))])}` writes it anew"
+    )
     line = text.count("\n", 0, found.start()) + 1
     return Problem(
         "RG153",

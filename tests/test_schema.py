@@ -130,7 +130,14 @@ def test_check_says_when_the_schema_beside_the_file_is_out_of_date(
     assert warned() == ""
     (tmp_path / "fog.py").write_text(FOG.replace("max=10", "max=11"))
     assert "'fog' has changed" in warned()
-    check = check[:2]
+    (tmp_path / "inner").mkdir()
+    monkeypatch.chdir(tmp_path / "inner")  # what is said to type works where it is said
+    check = ["check", "../pipeline.yaml", "--plugin", "../fog.py"]
+    assert main(shlex.split(warned().split("`")[1])[1:]) == 0
+    assert warned() == ""
+    (tmp_path / "fog.py").write_text(FOG)
+    monkeypatch.chdir(tmp_path)
+    check = ["check", "pipeline.yaml"]
     assert warned() == ""  # a schema may be for more plugins than this run has
 
 

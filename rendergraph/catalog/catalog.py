@@ -117,6 +117,20 @@ class Catalog:
             self._loaded[key] = self._load(*key)
         return self._loaded[key]
 
+    def usable(self, names: Iterable[str] | None = None) -> tuple[list[NodeType], list[Problem]]:
+        """Types that can be had, all or of these names, and what is wrong with the others.
+
+        One plugin's mistake must not hide everybody else's types.
+        """
+        found: list[NodeType] = []
+        problems: list[Problem] = []
+        for name in self.names() if names is None else names:
+            try:
+                found.append(self.get(name))
+            except InputError as error:
+                problems += error.problems
+        return found, problems
+
     def _load(self, name: str, found: Sequence[Listed]) -> NodeType:
         listed = found[0]
         if len(found) > 1:

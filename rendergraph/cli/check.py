@@ -31,7 +31,7 @@ def command(as_json: bool, **selection: Any) -> None:
     said = {str(problem) for problem in pipeline.warnings}
     later = [problem for problem in graph.warnings if str(problem) not in said]
     file = pipeline.spec.path
-    stale = file and outdated(file, Roots.around(file, pipeline.asset_roots), pipeline.catalog)
+    stale = file and outdated(file, Roots.around(file, pipeline.asset_roots), pipeline.catalog, pipeline.plugins)
     later += [stale] if stale else []
     warn(later)
     width, height = graph.size

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
 from rendergraph.cli.describe import describe, summary
 from rendergraph.cli.output import emit, emit_json, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
-
-if TYPE_CHECKING:
-    from rendergraph.catalog import NodeType
 
 
 @click.command("nodes")
@@ -37,13 +33,7 @@ def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> Non
     if family is not None and family not in families:
         text = f"there is no family of nodes '{family}'{suggestion(family, filter(None, families))}"
         raise InputError(Problem("RG511", text))
-    found: list[NodeType] = []
-    problems: list[Problem] = []
-    for name in [name for key, names in families.items() if family in (None, key) for name in names]:
-        try:
-            found.append(catalog.get(name))
-        except InputError as error:  # a plugin's mistake must not hide everybody else's nodes
-            problems += error.problems
+    found, problems = catalog.usable(name for key, names in families.items() if family in (None, key) for name in names)
     warn(problems)
     added = catalog.extensions.listed() if family is None else []
     if family is None:

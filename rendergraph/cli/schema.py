@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from rendergraph.cli import options
@@ -17,7 +18,8 @@ from rendergraph.cli.words import click
 def command(plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
     """Print the JSON Schema of pipeline files.
 
-    It knows all installed nodes; editors complete and check pipelines with it.
+    It knows all installed nodes; editors complete and check pipelines with it. Of a type that fails it has the name
+    alone, and says so.
 
     \b
     Examples:
@@ -28,5 +30,6 @@ def command(plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> No
 
     catalog = Catalog.discover(plugins)
     text = json.dumps(schema(catalog), indent=2, ensure_ascii=False)
+    warn([replace(problem, severity="warning") for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)
     options.put(text, output, as_json=as_json)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import textwrap
 from pathlib import Path
 from typing import Any, Literal
@@ -77,6 +78,10 @@ def test_the_schema_is_json_and_goes_into_a_file(cli: Any, tmp_path: Path) -> No
     assert cli("schema", "-o", "s.json").out == "s.json\n"
     assert json.loads((tmp_path / "s.json").read_text()) == json.loads(text)
     assert cli("schema", "-o", "s.json", "--json").json == {"output": "s.json"}
+    (tmp_path / "broken.py").write_text("1 / 0\n")
+    told = cli("schema", "--plugin", "broken.py")
+    assert re.match(r"broken\.py:1:1: warning: RG491 .* ZeroDivisionError", told.err)
+    assert '"broken"' in told.out
 
 
 class Sample(Node):
