@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -36,6 +37,8 @@ _POISON = {  # by family, two values that a texel may hold before a pass; what d
     "depth_stencil": (0.25, 0.75), "uint": (7.0, 2_000_000_011.0), "int": (-7.0, 2_000_000_011.0),
 }  # fmt: skip
 _MOST_NAMES = 8192
+_MOST_BYTES = 64 << 20
+_MOST_STEPS = 256
 
 
 @dataclass
@@ -80,7 +83,7 @@ class Trial:
             if any(isinstance(cause, MemoryError) for cause in causes(error)):
                 raise  # that is the process's, and ends the check
             rest = tuple(name for name in variant.outputs if not self._is_missing(name, error))
-            if len(rest) < len(variant.outputs):  # an output may depend on what is connected
+            if len(rest) < len(variant.outputs) and not variant.end:  # one may depend on what is connected or chosen
                 self.tried.pop()
                 if rest:
                     self.run(replace(variant, outputs=rest))
@@ -155,6 +158,9 @@ class Trial:
                 alone = self._pipeline(Variant(""))
                 self._fed = self._draw(alone, self.session.prepare(alone, alias=False), 0)
             pipeline = self._pipeline(variant)  # read only now: both are the same file
+            if variant.end and _is_large(pipeline):
+                self.tried.pop()
+                return
             runner = self.session.prepare(pipeline, alias=False)
             steps = [c for c in runner.executable.steps[0] if self._is_own(c.step)]
             for compiled in steps:
@@ -242,6 +248,9 @@ class Trial:
 
     def _own(self, problem: Problem, error: RendergraphError | None) -> Problem:
         """The same at a place in the author's files instead of one in the surroundings'."""
+        if found := re.match(r"output 'to_(\w+)'", problem.text):  # the surroundings' output is named for the node's
+            text = f"output '{found[1]}'{problem.text[found.end() :]}"
+            return replace(problem, text=text, place=self.port_place(found[1]), line_text="")
         if problem.place is not None and not Path(problem.place.file).resolve().is_relative_to(self.folder.resolve()):
             return problem
         return replace(problem, place=line_through(error, self.type.file) if error else None, line_text="")
@@ -253,6 +262,12 @@ class Trial:
         more = f" and {len(met) - 3} more" if len(met) > 3 else ""
         word = "" if met[0].startswith("without ") else "with "
         return replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
+
+
+def _is_large(pipeline: Pipeline) -> bool:
+    """Whether an end of a range makes more than a check should wait for."""
+    made = pipeline.expansion()
+    return len(made.steps) > _MOST_STEPS or sum(one.bytes for one in made.resources.values()) > _MOST_BYTES
 
 
 def _texels(flags: npt.NDArray[np.bool_], array: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:

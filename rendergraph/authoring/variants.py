@@ -21,16 +21,18 @@ class Variant:
         params: parameters that differ.
         left_out: optional inputs that are not connected.
         outputs: the outputs that somebody reads.
+        end: whether it takes a number to an end of its range, where the node must do all that it does otherwise.
     """
 
     name: str
     params: Mapping[str, Any] = field(default_factory=dict)
     left_out: frozenset[str] = frozenset()
     outputs: tuple[str, ...] = ()
+    end: bool = False
 
 
 def variants(cls: type[Node]) -> list[Variant]:
-    """All variants of a type: choices, switches and limits of what becomes program text, inputs, outputs."""
+    """All variants of a type: choices, switches and limits of what shapes program or plan, inputs, outputs."""
     seen: list[Variant] = []
     for variant in _all(cls):
         if variant.outputs and variant not in seen and len(seen) < MOST:
@@ -41,9 +43,9 @@ def variants(cls: type[Node]) -> list[Variant]:
 def _all(cls: type[Node]) -> Iterator[Variant]:
     everything = _usable(cls, frozenset())
     yield Variant("", outputs=everything)
-    for name, value in _values(cls):
-        yield Variant(f"{name}={value}".lower() if isinstance(value, bool) else f"{name}={value}", {name: value},
-                      outputs=everything)  # fmt: skip
+    for name, value, end in _values(cls):
+        text = f"{name}={value}"
+        yield Variant(text.lower() if isinstance(value, bool) else text, {name: value}, outputs=everything, end=end)
     optional = [name for name, port in cls.inputs().items() if isinstance(port, Input | InOut) and port.optional]
     for name in optional:
         yield Variant(f"without {name}", left_out=frozenset({name}), outputs=_usable(cls, frozenset({name})))
@@ -61,21 +63,21 @@ def _usable(cls: type[Node], left_out: frozenset[str]) -> tuple[str, ...]:
     return tuple(name for name, port in cls.outputs().items() if not left_out & set(getattr(port, "needs", ())))
 
 
-def _values(cls: type[Node]) -> Iterator[tuple[str, Any]]:
-    """Parameters that change the program or the plan, with each value to try."""
+def _values(cls: type[Node]) -> Iterator[tuple[str, Any, bool]]:
+    """Parameters that change the program or the plan, with each value to try and whether it is the end of a range."""
     for name, info in cls.parameters().items():
         role = cls.role_of(name)
         extra = info.json_schema_extra
         limits = extra if isinstance(extra, Mapping) else {}
         if info.annotation is bool and role != "param":
-            yield name, not info.default
+            yield name, not info.default, False
         for choice in _choices(info.annotation):
             if choice != info.default and role != "param":
-                yield name, choice
-        if info.annotation in (int, float) and role == "define":
+                yield name, choice, False
+        if info.annotation in (int, float) and role != "param":
             for limit in (limits.get("minimum"), limits.get("maximum")):
                 if isinstance(limit, int | float) and limit != info.default:
-                    yield name, info.annotation(limit)
+                    yield name, info.annotation(limit), True
 
 
 def _choices(annotation: Any) -> list[Any]:

@@ -356,3 +356,39 @@ def test_pages_of_what_ends_a_check_tell_the_truth(tmp_path: Path, monkeypatch: 
             check_node(Path("blur.py"), limits=limits)
         said = str(caught.value.problems[0]).replace("longer than 1 s", "longer than 10 s")
         assert said == page["message"]
+
+
+ENDS = '''"""Goes wrong at both ends."""
+
+from __future__ import annotations
+
+from rendergraph.api import Any, Input, Node, Output, Steps, structural
+
+
+class Glow(Node):
+    """Blurs some times."""
+
+    radiance = Input(Any, size="any", doc="What is blurred.")
+    color = Output(like="radiance", size=lambda node, facts: (node.side, node.side), doc="The same, blurred.")
+
+    times: int = structural(default=3, min=1, max=16, doc="How often.")
+    side: int = structural(default=4, min=1, max=16384, doc="Texels along a side.")
+
+    def record(self, steps: Steps) -> None:
+        """Forgets its output at 1, and divides by 0 at 16."""
+        if self.times > 1:
+            steps.fullscreen("glow.frag")
+        1 / (16 - self.times)
+'''
+
+
+def test_numbers_that_shape_the_plan_are_tried_at_their_ends(check: Check) -> None:
+    shader = (
+        "uniform sampler2D radiance;\nout vec4 color;\nvoid main() { color = texelFetch(radiance, ivec2(0), 0); }\n"
+    )
+    answer = check(ENDS, shader)
+    missing, failing = answer.messages
+    assert re.match(r"glow.py:12:5: RG204 output 'color' .* never drawn: .*no step \(with times=1\)", missing), missing
+    assert re.match(r"glow.py:21:1: RG420 .*ZeroDivisionError: .* \(with times=16\)", failing), failing
+    mended = ENDS.replace("if self.times > 1:", "if self.times > 0:").replace("        1 / (16 - self.times)\n", "")
+    assert check(mended, shader).messages == []  # nothing waits for a picture of 16384 × 16384

@@ -70,7 +70,9 @@ def test_a_buffer_that_is_only_read_is_declared_so(author: Any, gl: rg.Session, 
     author.write(wrong__comp=NUMBERS_COMP, wrong__frag=NUMBERS_FRAG.replace(right, declared))
     (said,) = author.said(lambda: gl.render(author.pipeline()))
     line, column = (2, 2) if "\n" in declared else (1, 23)
-    expected = f"wrong.frag:{line}:{column}: RG457 node 'a' (wrong): wrong.py:{author.line('steps.full')}: buffer 'numbers' "
+    expected = (
+        f"wrong.frag:{line}:{column}: RG457 node 'a' (wrong): wrong.py:{author.line('steps.full')}: buffer 'numbers' "
+    )
     assert said.startswith(expected + "is only read, so it is declared `readonly buffer numbers`")
 
 
