@@ -100,6 +100,32 @@ def test_a_retyped_node_keeps_its_name_and_tells_what_was_set(make: Maker) -> No
     assert (found.added, found.removed, found.links) == ((), (), ())
 
 
+def test_shaders_are_their_text_wherever_they_lie(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    effect = '#include "part.glsl"\nuniform sampler2D seen;\nout vec4 made;\nvoid main() { made = part(seen); }\n'
+    part = "vec4 part(sampler2D seen) { return texelFetch(seen, ivec2(0), 0); }\n"
+    graphs = []
+    for name, main, included in (
+        ("a", effect, part),
+        ("b", f"// so\n{effect}", f"{part}\n"),
+        ("c", effect, "//" + part),
+    ):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "fx.frag").write_text(main)
+        (folder / "part.glsl").write_text(included)
+        node = {"type": "./fx.frag", "inputs": {"seen": "p.made@previous"}}
+        file = {"nodes": {"p": node}, "outputs": {"image": "p.made"}}
+        (folder / "p.yaml").write_text(json.dumps(file))
+        catalog = Catalog.discover()
+        graphs.append(link(resolve(folder / "p.yaml", catalog=catalog), catalog, ()))
+    monkeypatch.chdir(tmp_path)
+    assert not diff(graphs[0], graphs[1])
+    assert diff_text(diff(graphs[0], graphs[2])).splitlines()[1:] == [
+        "  ~ p: the shader's text differs (a/fx.frag, c/fx.frag)"
+    ]
+    assert "another text" in diff_svg(graphs[0], graphs[2], diff(graphs[0], graphs[2]))
+
+
 def test_outputs_and_sizes(make: Maker) -> None:
     shown = {"image": "display.color", "depth": "prepass.depth"}
     found = diff(make(BASE), make(BASE, shown))

@@ -32,6 +32,7 @@ _MADE: dict[tuple[object, ...], _Made] = {}  # so that a file is one class in al
 class _Made:
     cls: type[Node]
     warnings: tuple[Problem, ...]
+    text: str
 
 
 def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
@@ -57,7 +58,7 @@ def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
         if len(_MADE) >= _KEPT:
             _MADE.clear()
         _MADE[key] = made
-    return NodeType(name, listed.family, made.cls, file, file.parent, listed.plugin, made.warnings)
+    return NodeType(name, listed.family, made.cls, file, file.parent, listed.plugin, made.warnings, text=made.text)
 
 
 def _plugged(header: Header, extensions: Extensions) -> list[Any]:
@@ -85,7 +86,9 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
     if mistakes:
         problems = [Problem("RG490", f"shader '{file.name}': {text}", entries.place_of(text)) for text in mistakes]
         raise InputError(problems)
-    return _Made(cls, tuple(entries.warnings()))
+    lines = [line.rstrip() for line in source.lines if line.strip()]
+    text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", raw, re.DOTALL | re.MULTILINE)[:1], *lines])
+    return _Made(cls, tuple(entries.warnings()), text)
 
 
 def _is_forgiven(mistake: str) -> bool:

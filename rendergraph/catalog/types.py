@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
 from rendergraph.declare import Node
@@ -26,6 +26,7 @@ class NodeType:
         plugin: the name of the entry point, or of the folder, it came by.
         warnings: what is missing in a shader file and can be done without.
         missing: nobody has it; it stands in a graph that is only looked at.
+        text: of a shader file its header and its lines with those of its includes, without comments.
     """
 
     name: str
@@ -36,6 +37,7 @@ class NodeType:
     plugin: str = "builtin"
     warnings: tuple[Problem, ...] = ()
     missing: bool = False
+    text: str = field(default="", repr=False)
 
     @property
     def is_shader(self) -> bool:

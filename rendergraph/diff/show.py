@@ -30,7 +30,7 @@ def diff_text(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | No
     lines += [f"  - {node}" for node in difference.removed]
     lines += [f"  + {node}" for node in difference.added]
     lines += [f"  ~ {was} is called {now}" for was, now in difference.renamed.items()]
-    lines += [f"  ~ {change.node}: type {change.old} → {change.new}" for change in difference.retyped]
+    lines += [f"  ~ {change.node}: {change}" for change in difference.retyped]
     lines += [
         f"  ~ {change.node}.{change.name}: {value_text(change.old)} → {value_text(change.new)}"
         for change in difference.parameters

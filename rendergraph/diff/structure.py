@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from rendergraph.catalog import NodeType
+from rendergraph.errors import shown_file
 from rendergraph.link import Endpoint, Graph, GraphNode
 
 if TYPE_CHECKING:
@@ -14,11 +16,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Retyped:
-    """A node whose type is another one."""
+    """A node whose type is another one.
+
+    Attributes:
+        node: the node.
+        old, new: the types' names.
+        files: where both are called alike, their files: two shaders at the same place beside two pipelines.
+    """
 
     node: str
     old: str
     new: str
+    files: tuple[str, str] | None = None
+
+    def __str__(self) -> str:
+        """What differs, in a line."""
+        if self.files is None:
+            return f"type {self.old} → {self.new}"
+        return f"the shader's text differs ({', '.join(self.files)})"
 
 
 @dataclass(frozen=True)
@@ -92,7 +107,9 @@ class GraphDiff:
         """The second graph's nodes that are in the first one and differ, each with what differs in short."""
         table: dict[str, list[str]] = {}
         for retyped in self.retyped:
-            table.setdefault(retyped.node, []).append(f"{retyped.old} → {retyped.new}")
+            table.setdefault(retyped.node, []).append(
+                "another text" if retyped.files else f"{retyped.old} → {retyped.new}"
+            )
         for change in self.parameters:
             table.setdefault(change.node, []).append(
                 f"{change.name} {value_text(change.old)} → {value_text(change.new)}"
@@ -113,9 +130,7 @@ def diff(a: Graph, b: Graph) -> GraphDiff:
         removed=tuple(node.id for node in a.nodes if node.id not in nodes),
         renamed={old: new for old, new in nodes.items() if old != new},
         retyped=tuple(
-            Retyped(new, a[old].type.name, b[new].type.name)
-            for old, new in nodes.items()
-            if not _same_type(a[old], b[new])
+            _retyped(new, a[old].type, b[new].type) for old, new in nodes.items() if not _same_type(a[old], b[new])
         ),
         links=tuple(_links(a, b, nodes)),
         parameters=tuple(change for old, new in nodes.items() for change in _parameters(a[old], b[new])),
@@ -184,7 +199,15 @@ def _common(old: Sequence[tuple[str, str]], new: Sequence[tuple[str, str]], node
 
 
 def _same_type(a: GraphNode, b: GraphNode) -> bool:
+    """Whether two nodes draw the same: with one type, or with shaders of one text, wherever those lie."""
+    if a.type.is_shader and b.type.is_shader:
+        return a.type.text == b.type.text
     return (a.type.name, a.type.file) == (b.type.name, b.type.file)
+
+
+def _retyped(node: str, old: NodeType, new: NodeType) -> Retyped:
+    files = (shown_file(old.file), shown_file(new.file)) if old.name == new.name else None
+    return Retyped(node, old.name, new.name, files)
 
 
 # --- what differs ----------------------------------------------------------------------------------------------------
