@@ -77,18 +77,20 @@ def schema(catalog: Catalog) -> Schema:
             "node": _node(types, catalog.extensions),
         },
     }  # fmt: skip
-    _as_markdown(found)
-    return found
+    marked: Schema = _as_markdown(found)
+    return marked
 
 
-def _as_markdown(value: Any) -> None:
-    """Give what is written in Markdown to editors that show it; the others take it as it stands."""
-    if isinstance(value, dict):
-        text = value.get("description")
-        if isinstance(text, str) and ("`" in text or "\n" in text):
-            value["markdownDescription"] = text
-    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        _as_markdown(part)
+def _as_markdown(value: Any) -> Any:
+    """The same, where editors that show Markdown are told what is written in it; the others take it as it stands."""
+    if isinstance(value, list):
+        return [_as_markdown(part) for part in value]
+    if not isinstance(value, dict):
+        return value
+    text = value.get("description")
+    is_markdown = isinstance(text, str) and ("`" in text or "\n" in text)
+    more = {"markdownDescription": text} if is_markdown else {}
+    return {key: _as_markdown(part) for key, part in value.items()} | more
 
 
 def _one_of(shipped: Iterable[str], doc: str) -> Schema:
@@ -290,6 +292,8 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
     way_out = (
         f"`{shlex.join(['rendergraph', 'schema', *words, '-o', shown_file(os.path.normpath(file))])}` writes it anew"
     )
+    if gone := [f"'{name}'" for name in then if name not in now]:  # the plugins of those are not known here
+        way_out += f", with --plugin for {', '.join(gone[:3])}{f' and {len(gone) - 3} more' if len(gone) > 3 else ''} too"
     line = text.count("\n", 0, found.start()) + 1
     return Problem(
         "RG153",

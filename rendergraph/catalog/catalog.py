@@ -12,7 +12,7 @@ from rendergraph.catalog.extensions import extensions
 from rendergraph.catalog.surroundings import Named, surroundings
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 
 GROUP = "rendergraph.nodes"
 """The entry point group; an entry's value is a package of node modules in folders by family."""
@@ -134,9 +134,9 @@ class Catalog:
     def _load(self, name: str, found: Sequence[Listed]) -> NodeType:
         listed = found[0]
         if len(found) > 1:
-            plugins = " and ".join(f"'{other.plugin}' ({other.file})" for other in found)
+            plugins = " and ".join(f"'{other.plugin}' ({shown_file(other.file)})" for other in found)
             text = f"node type '{name}' comes from {plugins}; rename one"
-            raise InputError(Problem("RG493", text, Place(str(listed.file))))
+            raise InputError(Problem("RG493", text, Place(shown_file(listed.file))))
         if listed.module:
             return modules.load(name, listed)
         from rendergraph.catalog import shader  # what reads shaders is imported where there are any

@@ -10,7 +10,7 @@ from pydantic import PydanticUserError
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes, mistake_place
 from rendergraph.declare.blame import own_place
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Place, Problem, shown_file
 
 
 def load(name: str, listed: Listed) -> NodeType:
@@ -19,7 +19,7 @@ def load(name: str, listed: Listed) -> NodeType:
     Raises:
         InputError: the module fails, or it declares its node wrongly.
     """
-    place = Place(str(listed.file))
+    place = Place(shown_file(listed.file))
     try:
         module = importlib.import_module(listed.module)
     except (Exception, SystemExit) as error:  # whatever a stranger's module raises is a mistake in that module
@@ -48,4 +48,4 @@ def _failed(name: str, listed: Listed, error: BaseException) -> Problem:
         file, line = error.filename, error.lineno or 0
     said = getattr(error, "message", error) if isinstance(error, PydanticUserError) else error  # without its link
     text = f"node type '{name}' cannot be imported: {type(error).__name__}: {said}"
-    return Problem("RG491", " ".join(text.split()), Place(file, line, 1 if line else 0))
+    return Problem("RG491", " ".join(text.split()), Place(shown_file(file), line, 1 if line else 0))

@@ -19,7 +19,7 @@ from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import open_name, own_choices
 from rendergraph.declare.port_mistakes import port_mistakes
 from rendergraph.declare.ports import History, Internal
-from rendergraph.errors import Place
+from rendergraph.errors import Place, shown_file
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
@@ -76,7 +76,7 @@ def mistake_place(file: Path, mistake: str) -> Place:
     try:
         tree = ast.parse(file.read_text(encoding="utf-8"))
     except (OSError, SyntaxError, ValueError):
-        return Place(str(file))
+        return Place(shown_file(file))
     classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
     declared: dict[str, ast.stmt] = {}
     for statement in (statement for cls in classes for statement in cls.body):
@@ -84,8 +84,8 @@ def mistake_place(file: Path, mistake: str) -> Place:
         declared |= {target.id: statement for target in targets if isinstance(target, ast.Name)}
     named = [declared[name] for name in re.findall(r"'(\w+)'", mistake) if name in declared]
     for node in [*named, *classes]:
-        return Place(str(file), node.lineno, node.col_offset + 1)
-    return Place(str(file))
+        return Place(shown_file(file), node.lineno, node.col_offset + 1)
+    return Place(shown_file(file))
 
 
 def _names(cls: type[Node]) -> Iterator[str]:
