@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from rendergraph.errors import InputError, Problem, suggestion
@@ -152,8 +153,8 @@ def attributes_of(program: Program) -> dict[str, str]:
 
 def _placed(problem: Problem, name: str, texts: Texts) -> Problem:
     """The problem at the line where the shader declares a name, if it is found."""
-    for text in texts().values():
-        found = declared_at(text.source, [name])
+    for mentions, text in product((False, True), texts().values()):
+        found = declared_at(text.source, [name], mentions=mentions)
         if found is not None:
             return replace(problem, place=found[0], line_text=found[1])
     return problem

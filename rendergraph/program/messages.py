@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from rendergraph.errors import Place, Problem
+from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.source import Origin, SourceText
 from rendergraph.program.text import StageText
 
@@ -64,15 +65,24 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     return [Problem("RG411", text, where.place() if where else None)]
 
 
-def declared_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] | None:
-    """Where an author's file first declares one of some names, and that line."""
+def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = True) -> tuple[Place, str] | None:
+    """Where an author's file declares one of some names, and that line.
+
+    Args:
+        source: a stage's text.
+        names: what to look for.
+        mentions: take a line of the author's that declares something else with the name too, such as a parameter.
+    """
+    declared = {one.name: one.at for one in globals_of(source.text).declared} if names else {}
     for name in names:
+        at = declared.get(name)
+        number = source.text.count("\n", 0, at) if at is not None else 0
+        if at is not None and (place := source.origins[number].place(at - source.text.rfind("\n", 0, at))):
+            return place, source.lines[number]
         pattern = re.compile(rf"\b{re.escape(name)}\b")
-        for line, origin in zip(source.lines, source.origins, strict=True):
+        for line, origin in zip(source.lines, source.origins, strict=True) if mentions else ():
             match = pattern.search(line)
-            if match and origin.file is not None and _DECLARES.search(line):
-                place = origin.place(match.start() + 1)
-                assert place is not None
+            if match and not origin.shared and _DECLARES.search(line) and (place := origin.place(match.start() + 1)):
                 return place, line
     return None
 

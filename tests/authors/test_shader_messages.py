@@ -294,6 +294,18 @@ CASES = {
         {"wrong.frag": "uniform sampler2D gain;\nout vec4 color;\nvoid main() { color = texture(gain, vec2(0)); }"},
         r"wrong\.frag:1:19: RG430 .* samples 'gain', but the step reads no texture of that name",
     ),
+    "a texture named like something of the framework's": (
+        COLOR,
+        {"wrong.frag": "out vec4 color;\nuniform sampler2D depth;\nvoid main() { color = texture(depth, vec2(0)); }"},
+        r"wrong\.frag:2:19: RG430 .* samples 'depth', but the step reads no texture of that name",
+    ),
+    "a texture named like a variable of an earlier stage": (
+        DRAWN,
+        {"wrong.vert": "in vec3 in_position;\nvoid main() {\n    float depth = 1.0;\n"
+                       "    gl_Position = vec4(in_position, depth);\n}",
+         "wrong.frag": "uniform sampler2D depth;\nout vec4 color;\nvoid main() { color = texture(depth, vec2(0)); }"},
+        r"wrong\.frag:1:19: RG430 .* samples 'depth', but the step reads no texture of that name",
+    ),
     "a buffer misspelt": (
         COLOR + 'numbers = Internal(kind="buffer", bytes=64)\n\ndef record(self, steps):\n'
         '    steps.compute("wrong.comp", over=1, out=self.numbers)\n'
