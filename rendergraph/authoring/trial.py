@@ -204,7 +204,12 @@ class Trial:
         for frame in range(1, FRAMES + 1):
             runner.run(frame, (frame - 1) / 30, 1 / 30, scene, camera)
         runner.check()
-        return {name: runner.read(resource) for name, resource in plan.schedule.wanted.items()}
+        drawn = {}
+        for name, resource in plan.schedule.wanted.items():
+            own = f"{self.type.name}.{name.removeprefix('to_')}"  # the bytes themselves, instead of what shows some
+            is_buffer = own in plan.placement and isinstance(plan.resources[own].desc, BufferDesc)
+            drawn[name] = runner.read(own if is_buffer else resource)
+        return drawn
 
     # Looking ----------------------------------------------------------------------------------------------------------
 
@@ -237,6 +242,9 @@ class Trial:
             total = _texels(differ, one[name]).size
             if count and not any(problem.code == "RG454" for problem in self.problems):
                 text = f"{count} of {total} texels of '{port}' are not written; write them all, or declare `clear=`"
+                if one[name].ndim == 1:
+                    text = f"{count} of {total} bytes of '{port}' are not written, or added to what nobody has cleared; " \
+                           "write them all, or declare `clear=0`"  # fmt: skip
                 self.say(Problem("RG454", text, self.port_place(port)))
             elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():
                 bad = int(_texels(~np.isfinite(one[name]), one[name]).sum())

@@ -392,3 +392,33 @@ def test_numbers_that_shape_the_plan_are_tried_at_their_ends(check: Check) -> No
     assert re.match(r"glow.py:21:1: RG420 .*ZeroDivisionError: .* \(with times=16\)", failing), failing
     mended = ENDS.replace("if self.times > 1:", "if self.times > 0:").replace("        1 / (16 - self.times)\n", "")
     assert check(mended, shader).messages == []  # nothing waits for a picture of 16384 × 16384
+
+
+COUNTS = '''"""Counts into a buffer that nobody clears."""
+
+from __future__ import annotations
+
+from rendergraph.api import Any, Input, Node, Output, Steps
+
+
+class Glow(Node):
+    """Counts dark and bright texels."""
+
+    radiance = Input(Any, doc="What is counted.")
+    counts = Output(Any, kind="buffer", bytes=256, doc="Texels of each value.")
+
+    def record(self, steps: Steps) -> None:
+        """One dispatch."""
+        steps.compute("glow.comp", over=self.radiance)
+'''
+
+
+def test_a_buffer_that_is_added_to_and_not_cleared_is_counted_in_bytes(check: Check, tmp_path: Path) -> None:
+    (tmp_path / "glow.comp").write_text("""layout(local_size_x = 8, local_size_y = 8) in;
+uniform sampler2D radiance;
+layout(std430) buffer counts { uint bins[64]; };
+void main() { atomicAdd(bins[texelFetch(radiance, ivec2(0), 0).r > 0.5 ? 63 : 62], 1u); }
+""")
+    (said,) = check(COUNTS).messages
+    assert re.match(r"glow.py:12:5: RG454 256 of 256 bytes of 'counts' .* nobody has cleared; .*`clear=0`$", said), said
+    assert check(COUNTS.replace("bytes=256", "bytes=256, clear=0")).messages == []
