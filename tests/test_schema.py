@@ -139,6 +139,9 @@ def test_check_says_when_the_schema_beside_the_file_is_out_of_date(
     monkeypatch.chdir(tmp_path)
     check = ["check", "pipeline.yaml"]
     assert warned() == ""  # a schema may be for more plugins than this run has
+    schema_file = tmp_path / "rendergraph.schema.json"
+    schema_file.write_text(schema_file.read_text().replace("tonemap", "tone"))
+    assert warned().endswith("writes it anew, with --plugin for 'fog', 'tone' too")
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[1]", '{"definitions": {"node": 1}}', "no json"])

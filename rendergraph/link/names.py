@@ -204,7 +204,7 @@ class Names:
     def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str, value: Value) -> str:
         outputs = node_type.cls.outputs()
         name = port or wanted
-        text = f"node '{node.id}' ({node_type.name}, {line_of(node.place, value.place)}) has no output '{name}'"
+        text = f"node '{node.id}' of {line_of(node.place, value.place)} ({node_type.name}) has no output '{name}'"
         if port is None:
             return f"{text}; name one as in {node.id}.PORT{suggestion('', outputs)}"
         if name in node_type.cls.inputs():
