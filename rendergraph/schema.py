@@ -293,7 +293,9 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
         f"`{shlex.join(['rendergraph', 'schema', *words, '-o', shown_file(os.path.normpath(file))])}` writes it anew"
     )
     if gone := [f"'{name}'" for name in then if name not in now]:  # the plugins of those are not known here
-        way_out += f", with --plugin for {', '.join(gone[:3])}{f' and {len(gone) - 3} more' if len(gone) > 3 else ''} too"
+        way_out += (
+            f", with --plugin for {', '.join(gone[:3])}{f' and {len(gone) - 3} more' if len(gone) > 3 else ''} too"
+        )
     line = text.count("\n", 0, found.start()) + 1
     return Problem(
         "RG153",
