@@ -159,11 +159,29 @@ def _text(found: NodeType, base: Graph, links: Links, reader: tuple[str, str, st
     id_ = found.word if all(node.id != found.word for node in base.nodes) else "example"
     inputs = f", inputs: {_flow(links)}" if links else ""
     lines = [f"extends: {base.name}", "nodes:", f"  {id_}: {{type: {found.name}{inputs}}}"]
+    through = _through(found, base, links)
+    outputs = {name: f"{id_}.{out}" for name, out in through.items()}
     if reader is not None:
         node, port, out = reader
-        return "\n".join([*lines, f"  {node}: {{inputs: {_flow({port: f'{id_}.{out}'})}}}"]) + "\n"
-    outputs = {name: f"{id_}.{name}" for name, port in found.cls.outputs().items() if _shows(port)}
-    return "\n".join([*lines, f"outputs: {_flow(outputs)}"]) + "\n"
+        lines.append(f"  {node}: {{inputs: {_flow({port: f'{id_}.{out}'})}}}")
+    else:
+        others = {name: port for name, port in found.cls.outputs().items() if name not in through.values()}
+        outputs |= {name: f"{id_}.{name}" for name, port in others.items() if _shows(port) and name not in outputs}
+    return "\n".join([*lines, *([f"outputs: {_flow(outputs)}"] if outputs else [])]) + "\n"
+
+
+def _through(found: NodeType, base: Graph, links: Links) -> Links:
+    """Outputs of the base that the node changes, and as which of its own they leave it."""
+    changed: Links = {}
+    ports = {name: port for name, port in found.cls.outputs().items() if _shows(port)}
+    for name, end in base.outputs.items():
+        taken = [ours for ours, theirs in links.items() if theirs == str(end)]
+        like = [out for out, port in ports.items() if out in taken or getattr(port, "like", None) in taken]
+        means = base.textures[end].semantic.name if end in base.textures else ""
+        alike = [out for out, port in ports.items() if taken and _meaning(port) == means]
+        if like or alike:
+            changed[name] = (like or alike)[0]
+    return changed
 
 
 def _shows(port: Port) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import rendergraph as rg
-from rendergraph.api import Depth, InOut, Input, Luminance, Node, Occlusion, Output, Radiance
+from rendergraph.api import Depth, DisplayColor, InOut, Input, Luminance, Node, Occlusion, Output, Radiance
 from rendergraph.catalog import Catalog
 from rendergraph.example import example
 
@@ -55,6 +55,14 @@ class Outlined(Node):
     color = Output(Radiance, doc="Outlined.")
 
 
+class Film(Node):
+    """An effect on what is shown."""
+
+    color = Input(DisplayColor, doc="The picture.")
+    filmed = Output(like="color", doc="With grain.")
+    grain = Output(Luminance, format="r8", doc="The grain alone.")
+
+
 class Gap(Node):
     """How open it is, without inputs."""
 
@@ -81,6 +89,7 @@ extends: forward
 nodes:
   fog: {type: fog, inputs: {depth: light.surface_depth, radiance: light.radiance}}
   display: {inputs: {radiance: fog.foggy}}
+outputs: {radiance: fog.foggy}
 """,
         ),
         (
@@ -90,6 +99,15 @@ extends: forward
 nodes:
   edges: {type: edges, inputs: {depth: light.surface_depth}}
 outputs: {edges: edges.edges}
+""",
+        ),
+        (
+            Film,
+            """\
+extends: forward
+nodes:
+  film: {type: film, inputs: {color: display.color}}
+outputs: {image: film.filmed, grain: film.grain}
 """,
         ),
         (
@@ -108,6 +126,7 @@ extends: forward
 nodes:
   veil: {type: veil, inputs: {radiance: light.radiance}}
   display: {inputs: {radiance: veil.radiance}}
+outputs: {radiance: veil.radiance}
 """,
         ),
         (Outlined, None),
