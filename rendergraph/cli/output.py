@@ -144,6 +144,11 @@ def terminal_width() -> int:
     return 1 << 20
 
 
+def amount(count: int, one: str, many: str = "") -> str:
+    """`1 run`, `2 runs`."""
+    return f"{count} {one if count == 1 else many or one + 's'}"
+
+
 def megabytes(count: float) -> str:
     """Bytes for a person: `12.4 MiB`."""
     return f"{count / (1 << 20):.1f} MiB"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
-from rendergraph.cli.output import Bar, emit, emit_json, say, table, warn
+from rendergraph.cli.output import Bar, amount, emit, emit_json, say, table, warn
 from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
@@ -60,13 +60,14 @@ def command(
 
     \b
     Examples:
-      rendergraph sweep forward -x shadows.taps=1,2,4 -x sun.resolution=512,2048 --size 320x180 -o out
-      rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr --size 160x90 -o models
-      rendergraph sweep forward -x light.ambient=0,[0.1,0.1,0.2] --size 160x90 -o models --resume --json
+      rendergraph sweep forward -x shadows.taps=1,2,4 -x light.ambient=0,[0.1,0.1,0.2] --size 320x180 -o out
+      rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr -o lit --size 160x90 --json
+      rendergraph sweep forward -x light.shading=phong,pbr,unlit --reference shading-pbr -o lit --size 160x90 --resume
     """
     from rendergraph.compare import sweep
     from rendergraph.compare.axes import is_sweep, read_sweep
     from rendergraph.compare.report import sweep_page
+    from rendergraph.compare.study import kept_runs
 
     words = ["sweep", pipeline, *(w for a in axes for w in ("-x", f"{a.path}={','.join(a.values)}"))]
     words += options.words(**selection) + ([] if reference is None else ["--reference", reference])
@@ -83,16 +84,27 @@ def command(
     bar = Bar("runs")
     base = options.make(pipeline=pipeline, **selection)
     shared.check_limits(thresholds, base.catalog.extensions)
-    found = sweep(
-        base, axes, out, shared.load_reference(reference, selection), frames=frames or 5, frame=frame, resume=resume,
-        device=device, progress=bar.show,
-    )  # fmt: skip
-    bar.clear()
+    again = shared.typed([*words, "-o", str(out)])
+    against = shared.load_reference(reference, selection)
+    try:
+        found = sweep(
+            base, axes, out, against, frames=frames or 5, frame=frame, resume=resume, device=device, progress=bar.show
+        )
+    except KeyboardInterrupt:
+        kept = kept_runs(out)
+        say(f"{amount(kept, 'run')} kept in {out}" + (f"; go on with: {again} --resume" if kept else ""))
+        raise
+    finally:
+        bar.clear()
     warn([*found.comparison.warnings, *base.catalog.extensions.warnings])
     page = out / "report.html"
-    options.write(sweep_page(found, shared.typed([*words, "-o", str(out)])), page)
+    options.write(sweep_page(found, again), page)
+    if found.timed:
+        say(f"{amount(found.timed, 'run')} measured again: fewer than {amount(frames or 5, 'frame')} had been")
+    if found.redrawn:
+        say(f"{amount(found.redrawn, 'run')} drawn again: what they are drawn from has changed, or their pictures have")
     if found.torn:
-        say(f"{found.torn} lines of the results were not whole; those runs were drawn again")
+        say(f"{amount(found.torn, 'line')} of the results not whole; what they told was done again")
     beyond = shared.exceeded(found.comparison.results, thresholds)
     if as_json:
         emit_json(found.as_json() | {"report": str(page), "exceeded": beyond})
@@ -115,8 +127,9 @@ def _text(found: Sweep) -> str:
     ]  # fmt: skip
     heads = (*shared.heads(comparison.results), "Pareto")
     lines = [
-        f"{len(rows)} runs against {comparison.reference.name}: {found.executed} passes drawn, {found.alone} one by one"
-        + (f"; {found.resumed} runs were there" if found.resumed else ""),
+        f"{amount(len(rows), 'run')} against {comparison.reference.name}: "
+        f"{amount(found.executed, 'pass', 'passes')} drawn, {found.alone} one by one"
+        + (f"; {amount(found.resumed, 'run')} kept from before" if found.resumed else ""),
         table(rows, heads, right=range(1, len(heads) - 1)),
     ]
     if comparison.software:

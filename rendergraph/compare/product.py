@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,10 @@ from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import Progress, light_error, opened
 from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, unique_names
-from rendergraph.compare.runs import Run, is_kept, keep, key_of, open_folder, restored
+from rendergraph.compare.runs import NO_TIMES, Run, found_again, keep, key_of, restored, settle
 from rendergraph.compare.sources import file_digest
-from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw
+from rendergraph.compare.study import begin, open_folder, study_of
+from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw, measure
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result
 from rendergraph.metrics import Encoding
 
@@ -34,6 +35,8 @@ class Sweep:
         executed: passes that were drawn for the runs of this time.
         alone: passes those runs would have drawn one by one.
         resumed: runs that were there already.
+        timed: runs of which the picture was there, and not as many measured frames.
+        redrawn: runs that were there, drawn from files that have changed since.
         torn: lines of the results that were not whole.
     """
 
@@ -42,6 +45,8 @@ class Sweep:
     executed: int
     alone: int
     resumed: int
+    timed: int
+    redrawn: int
     torn: int
 
     def as_json(self) -> dict[str, Any]:
@@ -54,6 +59,8 @@ class Sweep:
             "executed_passes": self.executed,
             "passes_one_by_one": self.alone,
             "resumed": self.resumed,
+            "timed_again": self.timed,
+            "redrawn": self.redrawn,
             "runs": [run | {"pareto": run["name"] in front} for run in runs],
         }
 
@@ -67,7 +74,8 @@ class _Work:
         encoding: of the output that is compared.
         other: the reference, where it is a pipeline of its own.
         ledger: where results go.
-        results: what is there, by the run's number.
+        results, records: what is there, by the run's number; results may lack times.
+        frames: how many are to be measured.
         device: what drew.
         reference, light: what is measured against, once it is there.
     """
@@ -76,7 +84,9 @@ class _Work:
     encoding: Encoding
     other: Pipeline | None
     ledger: Ledger
+    frames: int
     results: dict[int, Result] = field(default_factory=dict)
+    records: dict[int, Mapping[str, Any]] = field(default_factory=dict)
     device: Mapping[str, object] = field(default_factory=dict)
     reference: Reference | None = None
     light: Pixels | None = None
@@ -85,8 +95,12 @@ class _Work:
 
     @property
     def missing(self) -> list[int]:
-        """Numbers of the runs that have no result."""
-        return [number for number in range(len(self.runs)) if number not in self.results]
+        """Numbers of the runs that have no result, or one of fewer frames than asked for."""
+        return [number for number in range(len(self.runs)) if not self.is_done(number)]
+
+    def is_done(self, number: int) -> bool:
+        """Whether a run is drawn and measured."""
+        return number in self.results and self.results[number].times.frames >= self.frames
 
 
 def sweep(
@@ -105,21 +119,24 @@ def sweep(
 ) -> Sweep:
     """Draw every combination of the axes' values into a folder each, and measure it.
 
+    A run's picture and figures are kept as soon as it is drawn, its times when they are known: what is interrupted
+    loses little.
+
     Args:
         base: what the axes change.
         axes: paths with values.
-        out: the folder; `results.jsonl` in it grows by a line a run.
+        out: the folder; `results.jsonl` in it grows by a line a run that has been measured.
         reference: a picture or a pipeline that runs are measured against; the first run by default.
-        frames: how many frames are measured.
+        frames: how many frames are measured, at least; runs that are there and have fewer are measured again.
         frame: number of the frame whose pictures are kept.
-        resume: keep runs that are in the results already.
+        resume: keep runs that the folder has already.
         most_bytes: of textures that variants drawn together may take.
         session: where to draw; a private one by default.
         device: GL device number where no session is given.
         progress: told about the runs done.
 
     Raises:
-        InputError: an axis names nothing, a value does not fit, or the folder has results already.
+        InputError: an axis names nothing, a value does not fit, or the folder has results already, or of another study.
         RenderError: it failed while drawing or writing.
         DeviceError: there is no usable GL device.
     """
@@ -133,22 +150,26 @@ def sweep(
     picture = read_picture(reference, variants[0].graph.size, names[0]) if isinstance(reference, Path) else None
     output, encoding = compared_output(staged, picture[1] if picture else None)
     against = key_of(other or variants[0], frame, "") if picture is None else file_digest(Path(str(reference)))
-    ledger, records, torn = open_folder(out, resume=resume)
+    study = study_of(base, frame, str(reference) if picture else other.name if other else names[0])
+    ledger, records, torn = open_folder(out, study, resume=resume)
     runs = [
         Run(name, run, pipeline, output, key_of(pipeline, frame, against), out / name)
         for name, run, pipeline in zip(names, settings, variants, strict=True)
     ]
-    work = _Work(runs, encoding, other, ledger)
+    work = _Work(runs, encoding, other, ledger, frames)
     if picture:
         work.reference = Reference(str(reference), "file", *picture)
     for number, run in enumerate(runs):
-        if run.key in records and is_kept(run, records[run.key]):
-            work.results[number] = restored(run, records[run.key], encoding)
-            work.device = records[run.key]["device"]
-    resumed = len(work.results)
+        if record := found_again(run, records):
+            work.results[number], work.records[number] = restored(run, record, encoding), record
+            work.device = record["device"]
+    resumed = sum(map(work.is_done, range(len(runs))))
+    timed = len(work.results) - resumed
+    redrawn = sum(number not in work.results and run.folder.exists() for number, run in enumerate(runs))
     if work.missing or other:
         with opened(session, device) as session:
-            _draw_missing(work, session, frames, frame, most_bytes, progress or (lambda done, total: None))
+            begin(out, study)
+            _draw_missing(work, session, frame, most_bytes, progress or (lambda done, total: None))
     results = tuple(work.results[number] for number in range(len(runs)))
     first = variants[0]
     comparison = Comparison(
@@ -163,7 +184,7 @@ def sweep(
         notes=tuple(notes),
         warnings=tuple(dict.fromkeys(problem for variant in variants for problem in variant.warnings)),
     )
-    return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, torn)
+    return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, timed, redrawn, torn)
 
 
 def pareto(results: Sequence[Result]) -> list[Result]:
@@ -176,12 +197,10 @@ def pareto(results: Sequence[Result]) -> list[Result]:
     return found
 
 
-def _draw_missing(
-    work: _Work, session: Session, frames: int, frame: int, most_bytes: int, progress: Progress
-) -> None:  # fmt: skip
+def _draw_missing(work: _Work, session: Session, frame: int, most_bytes: int, progress: Progress) -> None:
     """Draw, measure and keep the runs that are not there; the reference first, where it is not the first of them."""
-    output = work.runs[0].output
-    if work.reference is None and (work.other or 0 not in work.missing):
+    output, missing = work.runs[0].output, work.missing
+    if work.reference is None and (work.other or 0 in work.results):
         pipeline = work.other or work.runs[0].pipeline
         shown = session.render(pipeline, frames=range(1, frame + 1))
         if work.other:
@@ -190,22 +209,33 @@ def _draw_missing(
             work.reference = Reference(work.runs[0].name, "variant", shown[output], work.encoding)
         work.light, work.device = shown.get("radiance"), shown.device
     variants = [run.pipeline for run in work.runs]
-    for batch in batches(variants, work.missing, most_bytes):
+    for batch in batches(variants, missing, most_bytes):
         work.executed += batch.pass_count
-        for drawn in draw(session, variants, batch, frames, frame):
-            run = work.runs[drawn.number]
-            work.device = drawn.device
-            if work.reference is None:
-                work.reference = Reference(run.name, "variant", drawn.arrays[output], work.encoding)
-                work.light = drawn.arrays.get("radiance")
-            result = _measured(run, drawn, work.reference, work.light)
-            keep(run, result, drawn.arrays, drawn.device, work.ledger)
+        if undrawn := any(number not in work.results for number in batch.numbers):
+            for drawn in draw(session, variants, batch, frame):
+                if drawn.number not in work.results:
+                    _keep(work, drawn)
+        for number, times in measure(session, variants, batch, work.frames, warm=undrawn):
+            run, result = work.runs[number], replace(work.results[number], times=times)
+            work.records[number] = settle(run, work.records[number], times, work.device, work.ledger)
+            work.results[number] = result
             work.alone += result.pass_count
-            work.results[drawn.number] = result
-            progress(len(work.results), len(work.runs))
+            progress(len(work.runs) - len(work.missing), len(work.runs))
 
 
-def _measured(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None) -> Result:
+def _keep(work: _Work, drawn: Drawn) -> None:
+    """Compare a run with the reference, which it may be itself, and write down what is known before its times are."""
+    run = work.runs[drawn.number]
+    work.device = drawn.device
+    if work.reference is None:
+        work.reference = Reference(run.name, "variant", drawn.arrays[run.output], work.encoding)
+        work.light = drawn.arrays.get("radiance")
+    result = _compared(run, drawn, work.reference, work.light)
+    work.records[drawn.number] = keep(run, result, drawn.arrays, drawn.device)
+    work.results[drawn.number] = result
+
+
+def _compared(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None) -> Result:
     pixels, own = drawn.arrays[run.output], drawn.arrays.get("radiance")
     plugins = run.pipeline.catalog.extensions.metrics()
     if reference.pixels is pixels:
@@ -218,7 +248,7 @@ def _measured(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None
     plan = run.pipeline.plan()
     return Result(
         name=run.name, source=run.pipeline.source, pixels=pixels, encoding=reference.encoding, metrics=found,
-        times=drawn.times, memory=plan.memory.as_json(), pass_count=len(passes(plan)), settings=run.settings,
+        times=NO_TIMES, memory=plan.memory.as_json(), pass_count=len(passes(plan)), settings=run.settings,
         radiance_rmse=light_error(own, light),
         flip_map=map_, graph=run.pipeline.graph, plan=plan,
     )  # fmt: skip

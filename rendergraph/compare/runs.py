@@ -1,4 +1,4 @@
-"""One folder a run: the picture and `run.json`, written before the line in the results that says they are whole."""
+"""One folder a run: the picture and `run.json`, kept as soon as it is drawn; timed, it gets a line in the results."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph import __version__, metrics
 from rendergraph.compare.divergence import passes
-from rendergraph.compare.ledger import Ledger
+from rendergraph.compare.ledger import CHECKSUM, Ledger
 from rendergraph.compare.sources import sources_digest
-from rendergraph.compare.timing import Times
+from rendergraph.compare.timing import Spread, Times
 from rendergraph.compare.values import Pixels, Result, machine
-from rendergraph.errors import InputError, Place, Problem, RenderError
+from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.metrics import Encoding, Metrics
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
 
-RESULTS = "results.jsonl"
+RUN = "run.json"
+NO_TIMES = Times(0, None, None, Spread.of([math.nan]), ())
+"""Of a run that has been drawn and not measured."""
+UNTIMED: Mapping[str, Any] = {"frames": 0, "frame_ms": None, "gpu_ms": None, "cpu_ms": None, "passes": []}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,32 +63,13 @@ def key_of(pipeline: Pipeline, frame: int, against: str) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def open_folder(out: Path, *, resume: bool) -> tuple[Ledger, dict[str, dict[str, Any]], int]:
-    """The folder's results: where they go, what is there by key, and how many lines are not whole.
-
-    Raises:
-        InputError: there are results already, or it cannot be a folder.
-    """
-    ledger = Ledger(out / RESULTS)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(Problem("RG504", f"cannot be written: {error.strerror}", Place(str(out)))) from error
-    if ledger.path.exists() and not resume:
-        text = "it has results of a sweep; --resume adds what is missing, or name another folder"
-        raise InputError(Problem("RG504", f"cannot be written: {text}", Place(str(out))))
-    records, torn = ledger.read()
-    return ledger, {record["key"]: record for record in records if "key" in record}, torn
-
-
-def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping[str, object], ledger: Ledger) -> None:
-    """Write a run's folder, then its line.
+def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping[str, object]) -> dict[str, Any]:
+    """Write a run's picture and its `run.json`, as yet without times, and return the record.
 
     Raises:
         RenderError: the disk does not take it.
     """
     from rendergraph.images import PictureInfo, Saved, save_outputs
-    from rendergraph.images.files import staged
 
     try:
         run.folder.mkdir(exist_ok=True)
@@ -95,22 +79,65 @@ def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping
     graph = run.pipeline.graph
     info = graph.textures[graph.outputs[run.output]]
     described = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
-    resolved = run.pipeline.spec.to_yaml(origins=False)
     picture = Saved(run.picture, arrays[run.output], described, raw=False)
-    save_outputs([picture], {"rendergraph:pipeline": resolved})
+    save_outputs([picture], {"rendergraph:pipeline": run.pipeline.spec.to_yaml(origins=False)})
     record = {
         "key": run.key,
         **_finite(result.as_json()),
+        **UNTIMED,
         "picture": f"{run.folder.name}/{run.picture.name}",
         "picture_sha256": _digest(run.picture),
         "size": list(graph.size),
         "device": dict(device),
         "machine": machine(),
     }
+    _describe(run, record)
+    return record
+
+
+def settle(
+    run: Run, record: Mapping[str, Any], times: Times, device: Mapping[str, object], ledger: Ledger
+) -> dict[str, Any]:
+    """Add the times to a run that was kept, then its line to the results, and return the new record.
+
+    Raises:
+        RenderError: the disk does not take it.
+    """
+    timed = {key: value for key, value in record.items() if key != CHECKSUM}
+    timed |= {**_finite(times.as_json()), "device": dict(device), "machine": machine()}
+    _describe(run, timed)
+    ledger.append(timed)
+    return timed
+
+
+def _describe(run: Run, record: Mapping[str, Any]) -> None:
+    from rendergraph.images.files import staged
+
+    resolved = run.pipeline.spec.to_yaml(origins=False)
     document = {**record, "resolved": resolved, "metrics": metrics.description()}
-    with staged([run.folder / "run.json"]) as (part,):
+    with staged([run.folder / RUN]) as (part,):
         part.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    ledger.append(record)
+
+
+def found_again(run: Run, lines: Mapping[str, dict[str, Any]]) -> dict[str, Any] | None:
+    """The record of a run that is there already, None where it is not or its picture is another.
+
+    Args:
+        run: which.
+        lines: of the results, by key. A run that was drawn and not yet timed has none, only its `run.json`.
+    """
+    record = lines.get(run.key) or _drawn_before(run)
+    return record if record is not None and is_kept(run, record) else None
+
+
+def _drawn_before(run: Run) -> dict[str, Any] | None:
+    try:
+        document = json.loads((run.folder / RUN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not isinstance(document, dict) or document.get("key") != run.key:
+        return None
+    return {name: value for name, value in document.items() if name not in ("resolved", "metrics")}
 
 
 def is_kept(run: Run, record: Mapping[str, Any]) -> bool:
@@ -129,8 +156,9 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
     return Result(
         name=run.name, source=run.pipeline.source, pixels=read(run.picture), encoding=encoding,
         metrics=_metrics(record),
-        times=Times.from_json(record), memory=plan.memory.as_json(), pass_count=len(passes(plan)),
-        settings=run.settings, radiance_rmse=record["radiance_rmse"], graph=run.pipeline.graph, plan=plan,
+        times=Times.from_json(record) if record["frames"] else NO_TIMES, memory=plan.memory.as_json(),
+        pass_count=len(passes(plan)), settings=run.settings, radiance_rmse=record["radiance_rmse"],
+        graph=run.pipeline.graph, plan=plan,
     )  # fmt: skip
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 512 << 20
 """Textures of one batch; the outputs of all its variants are alive at once."""
+MOST_RUNS = 16
+"""Variants of one batch: what is drawn together is kept together, and lost together when it is interrupted."""
 MOST_VIEWS = 48
 """View tables of one batch: each has a binding point of its own, and OpenGL promises 84."""
 
@@ -53,11 +55,10 @@ class Batch:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """One variant of a batch: its outputs by name, and the times of the passes it needs."""
+    """One variant of a batch: its outputs by name."""
 
     number: int
     arrays: Mapping[str, Pixels]
-    times: Times
     device: Mapping[str, object]
 
 
@@ -69,8 +70,9 @@ def batches(variants: Sequence[Pipeline], numbers: Sequence[int], most_bytes: in
         numbers: which of them.
         most_bytes: of textures in a batch; a single variant may have more.
     """
-    if not numbers:
-        return []
+    if len(numbers) > MOST_RUNS or not numbers:
+        parts = range(0, len(numbers), MOST_RUNS)
+        return [batch for at in parts for batch in batches(variants, numbers[at : at + MOST_RUNS], most_bytes)]
     chosen = [variants[number] for number in numbers]
     merged = merge([variant.graph for variant in chosen])
     base = {f.name: getattr(chosen[0], f.name) for f in fields(Pipeline)}
@@ -89,26 +91,35 @@ def batches(variants: Sequence[Pipeline], numbers: Sequence[int], most_bytes: in
     return [*batches(variants, numbers[:half], most_bytes), *batches(variants, numbers[half:], most_bytes)]
 
 
-def draw(session: Session, variants: Sequence[Pipeline], batch: Batch, frames: int, frame: int) -> Iterator[Drawn]:
+def draw(session: Session, variants: Sequence[Pipeline], batch: Batch, frame: int) -> Iterator[Drawn]:
     """Draw a batch and hand out its variants.
 
     Args:
         session: where.
         variants: all of them.
         batch: which ones.
-        frames: how many frames are measured.
         frame: number of the frame whose pictures are wanted.
     """
-    drawn = session.render(batch.pipeline, frames=range(1, frame + 1))
-    times = drawn.times
-    if frames > len(times):
-        times = session.render(batch.pipeline, frames=range(1, frames + 1)).times
+    drawn = session.render(batch.pipeline, frames=range(1, frame + 1), warm_up=False)  # nothing is measured here
+    for place, number in enumerate(batch.numbers):
+        arrays = {name: drawn[batch.merged.output(place, name)] for name in variants[number].graph.outputs}
+        yield Drawn(number, arrays, drawn.device)
+
+
+def measure(
+    session: Session, variants: Sequence[Pipeline], batch: Batch, frames: int, *, warm: bool
+) -> Iterator[tuple[int, Times]]:
+    """The times of a batch's variants, each the sum of the passes it needs.
+
+    Args:
+        session: where.
+        variants: all of them.
+        batch: which ones.
+        frames: how many frames are measured.
+        warm: whether the batch has just been drawn.
+    """
+    times = session.render(batch.pipeline, frames=range(1, frames + 1), warm_up=not warm).times
     for place, number in enumerate(batch.numbers):
         graph = variants[number].graph
         own = {name: batch.merged.names[place][name] for name in passes(variants[number].plan())}
-        yield Drawn(
-            number=number,
-            arrays={name: drawn[batch.merged.output(place, name)] for name in graph.outputs},
-            times=times_within(times, own, {node.id: node.type.name for node in graph.nodes}),
-            device=drawn.device,
-        )
+        yield number, times_within(times, own, {node.id: node.type.name for node in graph.nodes})

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -106,3 +110,25 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
     assert told["axes"] == {"shadows.taps": ["1", "3"], "display.curve": ["aces", "none"]}
     assert told["size"] == [48, 27]
     assert len((tmp_path / "out" / "results.jsonl").read_text().splitlines()) == 4
+
+
+def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any, tmp_path: Path) -> None:
+    words = ["sweep", "forward", "-x", f"display.exposure={','.join(map(str, range(18)))}", *SMALL, "-n", "400"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rendergraph.cli", *words, "-o", "out"], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job's suite ignores SIGINT
+    )  # fmt: skip
+    while process.poll() is None and len(list(tmp_path.glob("out/*/run.json"))) < 2:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1].splitlines()
+    kept = len(list(tmp_path.glob("out/*/run.json")))
+    assert process.returncode == 130
+    assert 2 <= kept < 18
+    assert told[-2].startswith(f"{kept} runs kept in out; go on with: rendergraph sweep forward -x display.exposure=0,")
+    assert told[-2].endswith("-n 400 -o out --resume")
+    before = {file: file.stat().st_mtime_ns for file in tmp_path.glob("out/*/image.png")}
+    words[-1] = "1"
+    report = cli(*words, "-o", "out", "--resume", "--json").json
+    assert (report["timed_again"], len(report["runs"])) == (kept, 18)
+    assert {file: file.stat().st_mtime_ns for file in before} == before

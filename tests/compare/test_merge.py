@@ -47,7 +47,7 @@ def pictures(
     """Every variant's picture, drawn together."""
     drawn: dict[int, Any] = {}
     for batch in batches(variants, range(len(variants)), most_bytes):
-        for each in draw(session, variants, batch, 1, frame):
+        for each in draw(session, variants, batch, frame):
             drawn[each.number] = each.arrays["radiance"]
     return [drawn[number] for number in range(len(variants))]
 
@@ -148,7 +148,7 @@ def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> 
     ends = {end.node for end in base.graph.outputs.values()}
     variants = [base, *(base.set("display.exposure", 0.5) for _ in range("display" in ends))]
     (batch,) = batches(variants, range(len(variants)))
-    drawn = [each.arrays for each in draw(gl, variants, batch, 1, 2)]
+    drawn = [each.arrays for each in draw(gl, variants, batch, 2)]
     assert batch.pass_count <= len(passes(base.plan())) + 1
     for arrays, variant in zip(drawn, variants, strict=True):
         for output, pixels in gl.render(variant, frames=range(1, 3)).items():

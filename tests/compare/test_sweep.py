@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
+from rendergraph.compare import product
 from rendergraph.compare.axes import (
     Axis,
     check_axes,
@@ -23,6 +24,8 @@ from rendergraph.compare.axes import (
 from rendergraph.compare.ledger import Ledger, checksum
 from rendergraph.compare.product import pareto, sweep
 from rendergraph.compare.report import sweep_page
+from rendergraph.compare.study import RESULTS, kept_runs
+from rendergraph.compare.together import batches
 from rendergraph.errors import InputError
 from rendergraph.images import read, write
 
@@ -71,8 +74,71 @@ def test_resuming_draws_what_is_missing_and_nothing_else(base: rg.Pipeline, gl: 
     assert (more.executed, more.resumed) == (1 + 2 + 2, 2)
     (tmp_path / first.comparison.results[1].name / "image.png").write_bytes(b"spoilt")
     assert sweep(base, few, tmp_path, frames=1, resume=True, session=gl).resumed == 1
-    other = sweep(base.set("light.ambient", 0.1), few, tmp_path, frames=1, resume=True, session=gl)
-    assert other.resumed == 0
+
+
+def test_another_study_does_not_write_over_the_pictures_of_this_one(
+    base: rg.Pipeline, gl: rg.Session, tmp_path: Path
+) -> None:
+    out, axes, truth = tmp_path / "out", AXES[:1], rg.load("shading-flat", size=(48, 27)).set("sun.resolution", 128)
+    sweep(base, axes, out, frames=1, session=gl)
+    before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    others: list[tuple[rg.Pipeline, dict[str, Any], str]] = [
+        (base.set("light.ambient", 0.1), {}, r"other values \(-s, -p or the pipeline's file\)"),
+        (base.with_size((40, 20)), {}, "size 48x27, not 40x20"),
+        (truth, {}, "pipeline forward, not shading-flat"),
+        (base, {"reference": truth}, "reference shadows.taps=1, not shading-flat"),
+        (base, {"frame": 2}, "frame 1, not 2"),
+    ]
+    for other, options, message in others:
+        with pytest.raises(
+            InputError, match=rf"RG504 .* of another study: .*{message}.*; name another folder: -o .*-2"
+        ):
+            sweep(other, axes, out, frames=1, resume=True, session=gl, **options)
+    assert {file: file.read_bytes() for file in out.rglob("*") if file.is_file()} == before
+
+
+def test_more_frames_are_measured_and_no_picture_is_drawn_again(
+    base: rg.Pipeline, gl: rg.Session, tmp_path: Path
+) -> None:
+    axes = AXES[:1]
+    first = sweep(base, axes, tmp_path, frames=1, session=gl)
+    (tmp_path / RESULTS).write_bytes((tmp_path / RESULTS).read_bytes().split(b"\n")[0] + b"\n")
+    pictures = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.png")}
+    more = sweep(base, axes, tmp_path, frames=3, resume=True, session=gl)
+    assert (more.resumed, more.timed, more.redrawn) == (0, 2, 0)
+    assert [result.times.frames for result in more.comparison.results] == [3, 3]
+    assert [result.metrics for result in more.comparison.results] == [r.metrics for r in first.comparison.results]
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.png")} == pictures
+    for result in more.comparison.results:
+        assert json.loads((tmp_path / result.name / "run.json").read_text())["frames"] == 3
+    again = sweep(base, axes, tmp_path, frames=2, resume=True, session=gl)
+    assert (again.resumed, again.timed, again.executed) == (2, 0, 0)
+
+
+def test_runs_are_kept_before_they_are_measured(
+    base: rg.Pipeline, gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*args: Any, **options: Any) -> None:
+        raise KeyboardInterrupt
+
+    axes = AXES[:1]
+    with monkeypatch.context() as patched:
+        patched.setattr(product, "measure", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            sweep(base, axes, tmp_path, frames=1, session=gl)
+    assert kept_runs(tmp_path) == 2
+    pictures = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.png")}
+    with pytest.raises(InputError, match="--resume adds what is missing"):
+        sweep(base, axes, tmp_path, frames=1, session=gl)
+    found = sweep(base, axes, tmp_path, frames=1, resume=True, session=gl)
+    assert (found.resumed, found.timed) == (0, 2)
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.png")} == pictures
+    assert [json.loads(line)["frames"] for line in (tmp_path / RESULTS).read_text().splitlines()] == [1, 1]
+
+
+def test_what_is_drawn_together_is_few_enough_to_lose(base: rg.Pipeline) -> None:
+    many = pipelines(base, combinations([Axis("display.exposure", tuple(map(str, range(20))))]))
+    assert [len(batch.numbers) for batch in batches(many, range(20))] == [16, 4]
 
 
 GLOW = """

@@ -1,0 +1,85 @@
+"""The folder of a sweep: what was studied in it, so that another study does not write over its pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.compare.ledger import Ledger
+from rendergraph.compare.runs import RUN
+from rendergraph.errors import InputError, Place, Problem
+
+if TYPE_CHECKING:
+    from rendergraph.session import Pipeline
+
+RESULTS = "results.jsonl"
+STUDY = "study.json"
+_VALUES = "resolved"
+"""The whole file without the axes; the other entries of a study are said in words."""
+
+
+def study_of(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
+    """What all runs of a sweep have in common, and what they are measured against.
+
+    More values of an axis are the same study, and so are edited shaders: those runs are drawn again.
+    """
+    spec, (width, height) = base.spec, base.spec.size
+    return {
+        "pipeline": base.name,
+        "scene": str(spec.scene.stem) if spec.scene else None,
+        "environment": str(base.environment) if base.environment else None,
+        "camera": base.camera,
+        "size": f"{width}x{height}",
+        "frame": frame,
+        "reference": reference,
+        _VALUES: spec.to_yaml(origins=False),
+    }
+
+
+def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[Ledger, dict[str, dict[str, Any]], int]:
+    """The folder's results: where they go, what is there by key, and how many lines are not whole.
+
+    Raises:
+        InputError: there are results already, or those of another study, or it cannot be a folder.
+    """
+    ledger = Ledger(out / RESULTS)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _refused(out, error.strerror or str(error)) from error
+    if (ledger.path.exists() or (out / STUDY).exists()) and not resume:
+        raise _refused(out, "it has results of a sweep; --resume adds what is missing, or name another folder")
+    before = _study_in(out)
+    if before is not None and (differing := [key for key in study if before.get(key) != study[key]]):
+        named = [f"{key} {before.get(key)}, not {study[key]}" for key in differing if key != _VALUES]
+        what = "; ".join(named) or "other values (-s, -p or the pipeline's file)"
+        raise _refused(out, f"it has results of another study: {what}; name another folder: -o {out}-2")
+    records, torn = ledger.read()
+    return ledger, {record["key"]: record for record in records if "key" in record}, torn
+
+
+def begin(out: Path, study: Mapping[str, Any]) -> None:
+    """Write down what is studied in a folder; to be called before the first picture goes there."""
+    from rendergraph.images.files import staged
+
+    with staged([out / STUDY]) as (part,):
+        part.write_text(json.dumps(study, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def kept_runs(out: Path) -> int:
+    """How many runs a folder has, measured or not."""
+    return sum(1 for _ in out.glob(f"*/{RUN}"))
+
+
+def _study_in(out: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads((out / STUDY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _refused(out: Path, text: str) -> InputError:
+    return InputError(Problem("RG504", f"cannot be written: {text}", Place(str(out))))
