@@ -98,6 +98,26 @@ def test_unknown_outputs_and_taps_name_what_there_is(gl: rg.Session) -> None:
         pipeline.render(taps=["ligth.radiance"], session=gl)
 
 
+def test_what_a_notebook_gives_is_understood_or_refused_in_words(gl: rg.Session) -> None:
+    pipeline = rg.load("deferred", size=(8, 8))
+    values = np.linspace(0, 1, 3, dtype=np.float32)
+    assert pipeline.set("display.exposure", values[1]).sets == ("display.exposure=0.5",)
+    assert pipeline.set("light.ambient", values).sets == ("light.ambient=[0.0, 0.5, 1.0]",)
+    assert list(gl.render(pipeline, outputs="image", taps="gbuffer.depth")) == ["image", "gbuffer.depth"]
+    for frames in (5, range(0), range(3)):
+        with pytest.raises(UsageError, match="it is a range of numbers from 1"):
+            gl.render(pipeline, frames=frames)  # type: ignore[arg-type]  # a mistake
+    with pytest.raises(UsageError, match="fps is 0; it is a number above 0"):
+        gl.render(pipeline, fps=0)
+
+
+def test_a_closed_session_says_so_and_may_be_closed_again() -> None:
+    with rg.Session() as session:
+        session.close()
+        with pytest.raises(RenderError, match="RG615 the session is closed; draw before"):
+            session.render(rg.load("forward", size=(8, 8)))
+
+
 def test_a_frame_shows_itself_in_a_notebook(gl: rg.Session) -> None:
     frame = rg.load("forward", size=(16, 16)).render(session=gl)
     assert frame._repr_png_().startswith(b"\x89PNG")

@@ -87,6 +87,11 @@ def _limit_names() -> dict[str, dict[str, str]]:
     return {**names, "plan": {"plan-memory": "memory"}}
 
 
+def _each(names: Iterable[str]) -> list[str]:
+    """Several names, or a text that is one: its letters are never meant."""
+    return [names] if isinstance(names, str) else list(names)
+
+
 @dataclass(frozen=True, eq=False)
 class Pipeline:
     """A pipeline with everything that is said about it; `set` and the like return changed copies."""
@@ -109,7 +114,7 @@ class Pipeline:
         """The same with one value changed, `ao.radius` or a pipeline parameter's name, as `-s` does."""
         import json
 
-        text = value if isinstance(value, str) else json.dumps(value)
+        text = value if isinstance(value, str) else json.dumps(value, default=lambda found: found.tolist())  # NumPy's
         return replace(self, sets=(*self.sets, f"{path}={text}"))
 
     def patch(self, patch: str | Path | Mapping[str, Any]) -> Pipeline:
@@ -245,7 +250,7 @@ class Pipeline:
             InputError: an output or a port that the pipeline does not have.
         """
         graph = self.graph
-        names = list(graph.outputs) if outputs is None else list(outputs)
+        names = graph.outputs if outputs is None else _each(outputs)
         wanted: dict[str, Endpoint] = {}
         problems = []
         for name in names:
@@ -254,7 +259,7 @@ class Pipeline:
             else:
                 hint = suggestion(name, graph.outputs)
                 problems.append(Problem("RG205", f"pipeline '{graph.name}' has no output '{name}'{hint}"))
-        for tap in taps:
+        for tap in _each(taps):
             try:
                 end = wanted[tap] = endpoint(graph, tap)
             except InputError as error:

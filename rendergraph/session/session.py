@@ -64,6 +64,7 @@ class Session:
         self.active: Executable | None = None
         self.scenes_made = 0
         self._kept = Kept()
+        self._closed = False
         self._image_warnings: list[Problem] = []
 
     def __enter__(self) -> Session:
@@ -76,6 +77,9 @@ class Session:
 
     def close(self) -> None:
         """Free everything; the context too, unless it was borrowed."""
+        if self._closed:
+            return
+        self._closed = True
         with self.device.current():
             self.device.raw.glUseProgram(0)  # one in use would outlive its deletion
             self._forget_executables()
@@ -85,7 +89,11 @@ class Session:
             self.programs.release()
         self.device.release()
 
-    def _check_thread(self) -> None:
+    def _check_usable(self) -> None:
+        if self._closed:
+            raise RenderError(
+                Problem("RG615", "the session is closed; draw before its `with` block ends, or make another")
+            )
         if threading.get_ident() != self._thread:
             raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
 
@@ -109,11 +117,14 @@ class Session:
 
         `warm_up` draws the first frame once more beforehand, unmeasured, and starts history afresh after it.
         """
-        self._check_thread()
+        self._check_usable()
         wanted = pipeline.wanted(outputs, taps)
         frames = range(1, 2) if frames is None else frames
-        if not frames:
-            raise UsageError(Problem("RG500", f"{frames} has no frame; frame 1 is the first"))
+        if not isinstance(frames, range) or not frames or min(frames) < 1:
+            text = f"frames is {frames!r}; it is a range of numbers from 1, as in range(1, 31) for the first 30"
+            raise UsageError(Problem("RG500", text))
+        if not fps > 0:
+            raise UsageError(Problem("RG500", f"fps is {fps}; it is a number above 0"))
         with self.device.current():
             runner = self.prepare(pipeline, outputs, taps, alias=alias, poison=poison, shuffle=shuffle)
             if warm_up:
@@ -160,7 +171,7 @@ class Session:
         The runner's `run` is the bare frame: what `render` does before and after it (warming up, reading back) is the
         caller's. To be called, and its runner run, inside `with session.device.current()`.
         """
-        self._check_thread()
+        self._check_usable()
         from rendergraph.allocate import allocate
         from rendergraph.schedule import schedule
 
