@@ -73,6 +73,15 @@ def test_the_page_holds_everything_it_shows(comparison: Comparison) -> None:
         assert text in page
 
 
+def test_structure_is_said_in_lines_and_drawn_as_wide_as_the_page(comparison: Comparison) -> None:
+    page = comparison_page(comparison, "")
+    section = page[page.index('id="structure"') : page.index('id="memory"')]
+    assert "<pre>~ shadows.taps: 3 → 1</pre>" in section
+    for tag in re.findall(r"<svg [^>]*role=[^>]*>", section):
+        width = float(re.search(r' width="(\d+)"', tag)[1])  # type: ignore[index]
+        assert f"max-width:100%;min-width:{0.6 * width:.0f}px;height:auto" in tag
+
+
 def test_software_times_say_so_wherever_they_stand(comparison: Comparison) -> None:
     soft = comparison_page(replace(comparison, device={"renderer": "x", "software": True}), "c")
     for identity in ("summary", "passes", "quality", "machine"):

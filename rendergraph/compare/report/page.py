@@ -23,7 +23,7 @@ from rendergraph.compare.report.parts import (
 )  # fmt: skip
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.values import Comparison, Result, machine
-from rendergraph.diff import diff, diff_svg
+from rendergraph.diff import diff, diff_svg, diff_text
 from rendergraph.images import viewable
 from rendergraph.metrics import description
 from rendergraph.resources import folder
@@ -340,7 +340,9 @@ def _structure(comparison: Comparison) -> str:
         if not difference:
             parts.append(f"<h3>{escape(title)}</h3><p>No difference.</p>")
         else:
-            parts.append(f"<h3>{escape(title)}</h3>{drawing(diff_svg(graph, result.graph, difference), title)}")
+            said = "\n".join(line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:])
+            picture = drawing(diff_svg(graph, result.graph, difference), title)
+            parts.append(f"<h3>{escape(title)}</h3><pre>{escape(said)}</pre>{picture}")
     return "\n".join(parts)
 
 

@@ -57,8 +57,14 @@ def img(identity: str, source: str, alt: str) -> str:
 
 
 def drawing(svg: str, label: str) -> str:
-    """An SVG document in a shadow tree: its style sheet stays its own."""
-    svg = re.sub(r"<svg ", f'<svg role="img" aria-label="{escape(label)}" ', svg, count=1)
+    """An SVG document in a shadow tree: its style sheet stays its own.
+
+    A wide one is made as narrow as the page, to 6 tenths of its width: what is smaller cannot be read, and is scrolled.
+    """
+    width = re.search(r'<svg [^>]*?\bwidth="([\d.]+)"', svg)
+    least = f"min-width:{0.6 * float(width[1]):.0f}px;" if width else ""
+    style = f"max-width:100%;{least}height:auto"
+    svg = re.sub(r"<svg ", f'<svg role="img" style="{style}" aria-label="{escape(label)}" ', svg, count=1)
     return f'<div class="drawing"><template shadowrootmode="open">{svg}</template></div>'
 
 
