@@ -13,7 +13,7 @@ import numpy.typing as npt
 from rendergraph.compile import Executable
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import author_line, what_happened
-from rendergraph.errors import Misuse, Problem, RenderError, shown_file
+from rendergraph.errors import Misuse, Problem, RenderError, node_named, shown_file
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.surroundings import settle
@@ -237,7 +237,7 @@ class Runner:
             happened = what_happened(error, type(node.node))
             if not author_line(error, type(node.node)) and node.type.file.name:
                 happened = f"{shown_file(node.type.file)}: {happened}"
-            text = f"node '{node.id}' ({node.type.name}) failed in update: {happened}"
+            text = f"{node_named(node.id, node.type.name)} failed in update: {happened}"
             raise RenderError(Problem(code, text, node.place)) from error
 
     def _check_views(self) -> None:
@@ -246,7 +246,7 @@ class Runner:
             maker = name.rpartition(".")[0]
             if table.count and maker in self._active and name not in self.executable.views.current:
                 node = self.graph[maker]
-                text = f"node '{maker}' ({node.type.name}) never sets the views of '{name}'; do so in `update`"
+                text = f"{node_named(maker, node.type.name)} never sets the views of '{name}'; do so in `update`"
                 raise RenderError(Problem("RG433", text, node.place))
         self._complete = True
 

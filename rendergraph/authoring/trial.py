@@ -261,7 +261,13 @@ class Trial:
             return replace(problem, text=text, place=self.port_place(found[1]), line_text="")
         if problem.place is not None and not Path(problem.place.file).resolve().is_relative_to(self.folder.resolve()):
             return problem
-        return replace(problem, place=line_through(error, self.type.file) if error else None, line_text="")
+        place = line_through(error, self.type.file) if error else Place(self.shown)
+        found = re.search(rf"{re.escape(self.shown)}:(\d+): ", problem.text)
+        if found:  # a step's own line stands in the text, and once is enough
+            place = Place(self.shown, int(found[1]), 1)
+            return replace(problem, text=problem.text.replace(found[0], "", 1), place=place, line_text="")
+        ports = [word for word in re.findall(r"'(\w+)'", problem.text) if word in self.type.cls.ports()]
+        return replace(problem, place=self.port_place(ports[0]) if ports and not place.line else place, line_text="")
 
     def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:
         met = list(dict.fromkeys(names))

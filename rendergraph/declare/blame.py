@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from types import CodeType, FrameType, TracebackType
 
-from rendergraph.errors import Misuse, shown_file
+from rendergraph.declare.node import Node
+from rendergraph.errors import Misuse, nearest, shown_file, suggestion
 
 
 def author_line(error: BaseException, cls: type) -> str:
@@ -45,8 +46,20 @@ def is_deliberate(error: BaseException, cls: type) -> bool:
 def what_happened(error: BaseException, cls: type) -> str:
     """`file:line: KeyError: 'x'`, without the exception's name where the framework refused a call."""
     where = author_line(error, cls)
-    text = str(error) if isinstance(error, Misuse) else f"{type(error).__name__}: {error}"
+    text = str(error) if isinstance(error, Misuse) else f"{type(error).__name__}: {error}{_meant(error)}"
     return f"{where}: {text}" if where else text
+
+
+def _meant(error: BaseException) -> str:
+    """What a misspelt attribute of a node, or of what the framework hands to one, may have been."""
+    if not isinstance(error, AttributeError) or not error.name:
+        return ""
+    asked = type(error.obj)
+    if issubclass(asked, Node):  # what it declares, and nothing of its base classes
+        return suggestion(error.name, [*asked.ports(), *asked.parameters()], most=99)
+    known = [name for name in dir(asked) if not name.startswith("_")] if is_framework(asked.__module__) else []
+    near = nearest(error.name, known)
+    return f"; did you mean '{near}'?" if near is not None else ""
 
 
 def _frames(trace: TracebackType | None) -> Iterator[tuple[FrameType, CodeType, int]]:

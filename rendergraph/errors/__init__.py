@@ -142,6 +142,11 @@ def nearest(word: str, words: Iterable[str]) -> str | None:
     return None
 
 
+def node_named(node: str, node_type: str) -> str:
+    """How messages name a node: with its type, where that is not the same word."""
+    return f"node '{node}'" + (f" ({node_type})" if node_type not in ("", node) else "")
+
+
 def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
     """`; did you mean 'x'?`, or the whole list where it is short, or nothing."""
     known = sorted(set(words))

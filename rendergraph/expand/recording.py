@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Part, Port
 from rendergraph.declare.blame import author_line, what_happened
-from rendergraph.errors import InputError, Misuse, Problem, shown_file
+from rendergraph.errors import InputError, Misuse, Problem, node_named, shown_file
 from rendergraph.expand.model import is_empty
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.steps import Request, Steps
@@ -220,7 +220,7 @@ def _returns_nothing(value: object) -> None:
 
 def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", doing: str = "recording") -> Problem:
     """What a node's own code raised or asked for wrongly, with the author's line."""
-    who = f"node '{node.id}' ({node.type.name})"
+    who = node_named(node.id, node.type.name)
     happened = what_happened(error, type(node.node))
     if not author_line(error, type(node.node)) and node.type.file.name:
         happened = f"{shown_file(node.type.file)}: {happened}"

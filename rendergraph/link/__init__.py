@@ -8,7 +8,7 @@ from dataclasses import replace
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import InOut, Input, LightFacts, TextureInfo
 from rendergraph.document import Value
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
@@ -195,7 +195,7 @@ class _Linker:
                 and name not in bound.failed
                 and not self._dropped(bound, name)
             ):
-                text = f"input '{name}' of node '{bound.spec.id}' ({bound.type.name}) is not connected"
+                text = f"input '{name}' of {node_named(bound.spec.id, bound.type.name)} is not connected"
                 self._say(bound.spec.value.problem("RG114", text + self._source_for(bound, port), key=True))
 
     def _dropped(self, bound: Bound, name: str) -> bool:

@@ -27,7 +27,7 @@ from rendergraph.declare import (
 )  # fmt: skip
 from rendergraph.declare.blame import is_deliberate, what_happened
 from rendergraph.document import shown
-from rendergraph.errors import Problem
+from rendergraph.errors import Problem, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Bound
 from rendergraph.resolve import MOST_SIDE
@@ -202,7 +202,7 @@ class Infer:
             for part in param.data if isinstance(param.data, list) else [param]:
                 if f"'{part.data}'" in message:
                     value, key = part, False
-        problem = value.problem("RG209", f"node '{bound.spec.id}' ({bound.type.name}): {shown(message, 200)}", key=key)
+        problem = value.problem("RG209", f"{node_named(bound.spec.id, bound.type.name)}: {shown(message, 200)}", key=key)
         if problem not in self.problems:
             self.problems.append(problem)
 

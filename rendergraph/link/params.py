@@ -14,7 +14,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.declare import Added, Choice, Extensions, Node, closed, open_name, own_choices
 from rendergraph.declare.blame import what_happened
 from rendergraph.document import Value, kind_of, shown
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, node_named, suggestion
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec
 
@@ -36,7 +36,7 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
         return cls.model_validate_json(json.dumps(values)), problems
     except (Exception, SystemExit) as error:  # validators are the author's code
         if not isinstance(error, ValidationError):
-            text = f"node '{spec.id}' ({node_type.name}): its own checks fail: {what_happened(error, cls)}"
+            text = f"{node_named(spec.id, node_type.name)}: its own checks fail: {what_happened(error, cls)}"
             return cls.model_construct(), [*problems, spec.value.problem("RG209", text, key=True)]
         for name, details in _by_parameter(error).items():
             values.pop(name, None)

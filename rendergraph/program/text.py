@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Function, Input
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, Problem, node_named
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
@@ -288,7 +288,7 @@ def provider_text(
     names = declared(own.text)
     if binding.signature not in names:
         signature = _declared_signatures(node)[binding.signature]
-        text = f"node '{binding.node}' ({node.name}): '{binding.shader}' does not define '{signature.declaration}'"
+        text = f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{signature.declaration}'"
         raise InputError(Problem("RG408", text, Origin(node.shaders / binding.shader, 1).place()))
     macros = {**read_defines(binding.reads, resources, views), **dict(binding.defines)}
     names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}

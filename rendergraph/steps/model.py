@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
-from rendergraph.errors import Place, Problem, shown_file
+from rendergraph.errors import Place, Problem, node_named, shown_file
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 
@@ -165,7 +165,7 @@ class Step:
     @property
     def said_of(self) -> str:
         """The node, its type, and the author's line of the step."""
-        who = f"node '{self.node}'" + (f" ({self.type})" if self.type else "")
+        who = node_named(self.node, self.type)
         return who + (f": {shown_file(self.caller[0])}:{self.caller[1]}" if self.caller is not None else "")
 
     @property

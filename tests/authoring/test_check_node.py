@@ -272,6 +272,25 @@ def test_an_input_that_nothing_can_be_made_up_for_is_a_warning(check: Check) -> 
     ]
 
 
+RECORDS = {
+    "raises": ("raise KeyError('lamp')", r"glow.py:15:1: RG420 node 'glow' failed while recording: KeyError: 'lamp'$"),
+    "samples its target": ("steps.fullscreen('glow.frag', radiance=self.brighter, out=self.brighter)",
+                           r"glow.py:15:1: RG422 node 'glow': it samples 'glow.brighter'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_a_place_in_the_nodes_file_is_said_once(check: Check, name: str) -> None:
+    line, message = RECORDS[name]
+    (said,) = check(body("", "def record(self, steps: object) -> None:", '    """Draw."""', f"    {line}")).messages
+    assert re.match(message, said), said
+
+
+def test_a_target_that_is_not_written_is_named_where_it_is_declared(check: Check) -> None:
+    (said,) = check(body("extra = Output(Radiance, doc='Never written.')")).messages
+    assert re.match(r"glow.py:\d+:5: RG437 node 'glow': glow.frag writes no output 'extra'", said), said
+
+
 def test_every_kind_of_port_is_fed_and_read() -> None:
     report = check_node(Path(__file__).parent / "zoo" / "zoo.py")
     assert report.problems == ()

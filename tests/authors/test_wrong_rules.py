@@ -17,7 +17,7 @@ RULES = {
     # what fails, by the rule's name
     'more = Output(Radiance, size=lambda node, facts: node.side(), doc="D.")  # here':
         "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: AttributeError: 'Wrong' object has no attribute "
-        "'side'",
+        "'side'; there is color, more",
     'more = Output(Radiance, size=lambda node, facts: "large", doc="D.")':
         "'a.more' (wrong): the rule for its size gives 'large', not width and height",
     'more = Output(Radiance, size=lambda node, facts: 64, doc="D.")':
@@ -36,7 +36,7 @@ RULES = {
         "RG208 'a.more' (wrong): a buffer has at least 1 byte, not 2.5",
     'color = Output(Radiance, clear=lambda node: node.dark, doc="D.")  # here':
         "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
-        "attribute 'dark'",
+        "attribute 'dark'; there is color",
     'color = Output(Radiance, clear=lambda node: "black", doc="D.")':
         "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four, or None",
     'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")':
@@ -50,7 +50,7 @@ RULES = {
         "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",
     'last = Input(AnyTexel, filter=lambda node: node.smooth, optional=True, doc="D.")  # here':
         "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
-        "attribute 'smooth'",
+        "attribute 'smooth'; there is color, last",
     'last = Input(AnyTexel, filter=lambda node: "bicubic", optional=True, doc="D.")':
         "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
     'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here':

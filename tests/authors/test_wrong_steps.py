@@ -175,8 +175,10 @@ CALLS = {
         "RG422 it samples 'a.color' in the step that writes it; blend, sample another mip or layer, or go through an "
         "`Internal`",
     # Python's own
-    'steps.fulscreen("wrong.frag")': "RG420 AttributeError: 'Steps' object has no attribute 'fulscreen'",
-    'steps.fullscreen("wrong.frag", source=self.sorce)': "RG420 AttributeError: 'Wrong' object has no attribute 'sorce'",
+    'steps.fulscreen("wrong.frag")': "RG420 AttributeError: 'Steps' object has no attribute 'fulscreen'; did "
+        "you mean 'fullscreen'?",
+    'steps.fullscreen("wrong.frag", source=self.sorce)':
+        "RG420 AttributeError: 'Wrong' object has no attribute 'sorce'; did you mean 'source'?",
     'steps.fullscreen()': "RG420 TypeError: Steps.fullscreen() missing 1 required positional argument: 'shader'",
     '1 / 0': "RG420 ZeroDivisionError: division by zero",
     'exit(7)': "RG420 SystemExit: 7",
