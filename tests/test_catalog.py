@@ -150,6 +150,37 @@ def test_installed_packages_come_by_entry_point(tmp_path: Path, monkeypatch: pyt
     assert (found.plugin, found.family) == ("someones", "sky")
 
 
+def test_the_folder_of_a_project_stands_in_for_an_installed_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installed = tmp_path / "site"
+    for root in (installed / "my_clouds", tmp_path / "project"):
+        (root / "nodes").mkdir(parents=True)
+        (root / "__init__.py").touch()
+        (root / "nodes" / "__init__.py").touch()
+        (root / "nodes" / "clouds.py").write_text(GOOD.replace("._shared import SIZE", "math import pi as SIZE"))
+    info = installed / "my_clouds-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: My.Clouds\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[rendergraph.nodes]\nclouds = my_clouds.nodes\n"
+        "[rendergraph.extensions]\nclouds = my_clouds.no_such_module:EXTENSION\n"
+    )
+    monkeypatch.syspath_prepend(str(installed))
+    project = tmp_path / "project"
+    toml = project / "pyproject.toml"
+    for name in ("another", "rendergraph", 3):
+        toml.write_text(f"[project]\nname = {name!r}\n")
+        with pytest.raises(InputError, match="RG493"):
+            Catalog.discover([project]).get("clouds")
+    toml.write_text('[project]\nname = "my-clouds"\n')
+    catalog = Catalog.discover([project])
+    assert catalog.get("clouds").file == project / "nodes" / "clouds.py"
+    assert "tonemap" in catalog
+    assert not catalog.extensions.problems
+    assert Catalog.discover([project / "nodes"]).names() == Catalog.discover().names()
+
+
 def test_the_standard_nodes_come_the_same_way() -> None:
     catalog = Catalog.discover()
     found = catalog.get("tonemap")

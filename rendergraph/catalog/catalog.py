@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rendergraph.catalog import find, modules
 from rendergraph.catalog.extensions import extensions
-from rendergraph.catalog.surroundings import Named, surroundings
+from rendergraph.catalog.surroundings import Named, plain, projects, surroundings
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
@@ -42,7 +42,8 @@ class Catalog:
 
         Args:
             plugin_paths: node modules, shader files, or folders of them; code, so never taken from a pipeline file.
-            installed: look at more than `plugin_paths`.
+            installed: look at more than `plugin_paths`. Where a folder is a package's project, as its `pyproject.toml`
+                says, it stands in for an installed copy of the package.
 
         Raises:
             InputError: a plugin path does not exist, or the settings file is malformed.
@@ -52,12 +53,15 @@ class Catalog:
         named = {entry.path.resolve(): entry for entry in surroundings()} if installed else {}
         named |= {path.resolve(): Named(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
+        own = projects(path for path in named if path.is_dir())
         for entry in entry_points(group=GROUP) if installed else ():
+            if entry.dist is not None and plain(entry.dist.name) in own:
+                continue
             _add(listed, find.package(entry.name, entry.value.partition(":")[0]))
         for plugin in named.values():
             _add(listed, find.loose(plugin.path, plugin.place, plugin.where))
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
-        return cls(listed, extensions=extensions(folders, installed=installed))
+        return cls(listed, extensions=extensions(folders, installed=installed, without=own))
 
     def with_file(self, name: str, file: Path) -> Catalog:
         """The same with one shader file under the name, which is most likely its path."""
@@ -88,7 +92,7 @@ class Catalog:
     def has_plugin(self, name: str) -> bool:
         """Whether something comes from a plugin of this name, spelled as packages or as modules are."""
         plugins = {one.plugin for found in self._listed.values() for one in found}
-        return any(_plain(plugin) == _plain(name) for plugin in plugins)
+        return any(plain(plugin) == plain(name) for plugin in plugins)
 
     def files(self) -> set[Path]:
         """The files of everything that has been listed."""
@@ -142,11 +146,6 @@ class Catalog:
         from rendergraph.catalog import shader  # what reads shaders is imported where there are any
 
         return shader.load(name, listed, self.extensions)
-
-
-def _plain(name: str) -> str:
-    """A package's name as indexes compare them (PEP 503)."""
-    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def _add(listed: dict[str, list[Listed]], found: Iterable[tuple[str, Listed]]) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
+from rendergraph.catalog.surroundings import plain
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes, raised_at
 from rendergraph.errors import Place, Problem, shown_file
 from rendergraph.stamps import look
@@ -21,22 +22,29 @@ NAME = "EXTENSION"
 """What a plugin's folder calls it."""
 
 
-def extensions(folders: Iterable[tuple[str, Path]] = (), *, installed: bool = True) -> Extensions:
+def extensions(
+    folders: Iterable[tuple[str, Path]] = (), *, installed: bool = True, without: Collection[str] = ()
+) -> Extensions:
     """What plugins add; nothing is looked for or imported before it is asked for.
 
     Args:
         folders: packages that stand for the folders of plugins the user named, and the folders.
         installed: look at entry points too.
+        without: distributions whose entry points are left out, spelled as indexes compare them.
     """
     named = tuple(folders)
-    return Extensions(lambda: _sources(named, installed))
+    return Extensions(lambda: _sources(named, installed, without))
 
 
-def _sources(folders: Iterable[tuple[str, Path]], installed: bool) -> Iterator[Source]:
+def _sources(
+    folders: Iterable[tuple[str, Path]], installed: bool, without: Collection[str]
+) -> Iterator[Source]:
     from importlib.metadata import entry_points
 
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.value) if installed else ():
         plugin = entry.dist.name if entry.dist is not None else entry.name
+        if entry.dist is not None and plain(plugin) in without:
+            continue
         yield _source(plugin, _file(entry), entry.load, entry.value)
     for package, folder in folders:
         file = folder / f"{MODULE}.py"

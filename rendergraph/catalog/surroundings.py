@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from rendergraph.errors import Place, shown_file
 from rendergraph.settings import at_home, nearest
+from rendergraph.stamps import look
 
+OWN = "rendergraph"
+"""The distribution that nobody stands in for."""
 VARIABLE = "RENDERGRAPH_PATH"
 """Folders and files with nodes, separated as in PATH."""
 
@@ -41,3 +45,32 @@ def surroundings() -> Iterator[Named]:
     for text in os.environ.get(VARIABLE, "").split(os.pathsep):
         if text.strip():
             yield Named(at_home(text.strip()), where=f", which {VARIABLE} names")
+
+
+def projects(folders: Iterable[Path]) -> frozenset[str]:
+    """The distributions that folders are the projects of, spelled as indexes compare them (PEP 503).
+
+    Who names a project's folder means that, and not a copy of it that was installed some time ago.
+    """
+    names = {_project(folder) for folder in folders} - {"", OWN}
+    return frozenset(names)
+
+
+def plain(name: str) -> str:
+    """A package's name as indexes compare them (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def _project(folder: Path) -> str:
+    """The name that the `pyproject.toml` of a folder gives; nothing where there is none to read."""
+    file = folder / "pyproject.toml"
+    look(file)
+    if not file.is_file():
+        return ""
+    import tomllib
+
+    try:
+        name = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["name"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+    return plain(name) if isinstance(name, str) else ""

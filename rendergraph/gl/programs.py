@@ -179,10 +179,10 @@ def _inspect(program: Program) -> None:
     for interface, into in ((_UNIFORM_BLOCK, program.blocks), (_STORAGE_BLOCK, program.storage)):
         for index in range(_count(raw, glo, interface)):
             into[_name(raw, glo, interface, index)] = index
-    size = (ctypes.c_uint * 1)(_BUFFER_DATA_SIZE)
+    asked = (ctypes.c_uint * 1)(_BUFFER_DATA_SIZE)
     least = (ctypes.c_int * 1)()
     for name, index in program.storage.items():
-        raw.glGetProgramResourceiv(glo, _STORAGE_BLOCK, index, 1, ctypes.byref(size), 1, None, ctypes.byref(least))
+        raw.glGetProgramResourceiv(glo, _STORAGE_BLOCK, index, 1, ctypes.byref(asked), 1, None, ctypes.byref(least))
         program.storage_bytes[name] = least[0]
     properties = (ctypes.c_uint * 4)(_TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION)
     values = (ctypes.c_int * 4)()
