@@ -13,8 +13,9 @@ from pydantic import create_model
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Input, Node, Output, structural
 from rendergraph.document import Value, shown
-from rendergraph.errors import nearest
+from rendergraph.errors import nearest, shown_file
 from rendergraph.resolve import NodeSpec, PipelineSpec
+from rendergraph.settings import nearest as nearest_settings
 from rendergraph.textures import Any as AnyTexture
 
 _LINK = re.compile(r"([^.@]+)(?:\.([^.@]+))?(?:@previous)?\Z")
@@ -30,7 +31,12 @@ def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
         text += f"; did you mean '{near}'?"
     if spec.missing:
         return f"{text}; it may come with what is not installed: {', '.join(spec.missing)}"
-    return text if near is not None else f"{text}; install the plugin that brings it, or name its file with --plugin"
+    project = nearest_settings(spec.path.parent) if spec.path is not None else None
+    if project is not None and project.plugins and not Path.cwd().resolve().is_relative_to(project.folder):
+        return f"{text}; {shown_file(project.file)} names plugins, but only for those who stand in its folder"
+    if near is not None:
+        return text
+    return f"{text}; install the plugin that brings it, or name its file: --plugin; explain RG102 has all ways"
 
 
 def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
