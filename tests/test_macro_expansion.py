@@ -45,6 +45,10 @@ BOMBS = {
     "continued lines": chain(40).replace("#define A40 ", "#define A40 \\\n") + "\nfloat y \\\n = A40;",
     "calls that do not end": "#define D(x) x\n" + "D(" * 100_000,
     "names pasted together": chain(40).replace("#define A40", "#define A4") + "\n#define P(a, b) a##b\nfloat y = P(A, 4);",
+    "a word that doubles": "#define D(a) a##a\n#define E(a) D(a)\n" + "E(" * 22 + "x" + ")" * 22 + ";",
+    "one after the other, each hidden in all that follow": chain(3000, "A{0}") + "\nfloat y = A3000;",
+    "the same around words of others": "#define F(x) x\n" + chain(900, "A{0}").replace("A0 x", "A0 " + "F(y) " * 90_000)
+    + "\nA900",
 }  # fmt: skip
 
 
@@ -65,6 +69,8 @@ FINE = {
     "a name that is not called": "#define D(x) x x\nfloat D = D + D;",
     "a call that does not end": "#define D(x) x x\nfloat y = D(D(D(1);",
     "many small ones": "#define sq(x) ((x) * (x))\n" + "float y = sq(sq(a)) + sq(b) * sq(c);\n" * 2000,
+    "a long row": f"{chain(300, 'A{0}')}\nfloat y = A300;",
+    "a number of many digits": f"#if {'1' * 5000}\n#endif",
     "text alone": "float f() { return 1.0; }\n" * 20_000,
 }
 

@@ -111,7 +111,7 @@ class _Preprocessor:
     at: int = 0
     spent: int = 0
     macros: dict[str, _Macro] = field(default_factory=dict)
-    _hidden: dict[tuple[frozenset[str], str], frozenset[str]] = field(default_factory=dict)
+    _hidden: dict[tuple[frozenset[str], frozenset[str]], frozenset[str]] = field(default_factory=dict)
     _branches: list[list[bool]] = field(default_factory=list)  # each: takes lines now, has taken some, outer takes
 
     def run(self, lines: Iterable[tuple[str, int]]) -> None:
@@ -172,15 +172,13 @@ class _Preprocessor:
         done: list[_Token] = []
         rest = tokens[::-1]
         while rest:
-            self.spent += 1
-            if self.spent > MOST_TOKENS:
-                raise _TooFar
+            self._spend(1)
             word, hidden = token = rest.pop()
             macro = self.macros.get(word)
             if macro is None or word in hidden:
                 done.append(token)
             elif macro.parameters is None:
-                inside = self._also(hidden, word)
+                inside = self._both(hidden, frozenset((word,)))
                 rest += [(part, inside) for part in reversed(macro.body)]
             elif not rest or rest[-1][0] != "(":
                 done.append(token)
@@ -192,15 +190,22 @@ class _Preprocessor:
                     done.append(token)
                     continue
                 arguments, closing = found
-                made = self._substituted(macro, arguments, self._also(hidden & closing, word))
+                made = self._substituted(macro, arguments, self._both(hidden & closing, frozenset((word,))))
                 rest += reversed(made)
         return done
 
-    def _also(self, hidden: frozenset[str], word: str) -> frozenset[str]:
-        key = hidden, word
+    def _both(self, hidden: frozenset[str], more: frozenset[str]) -> frozenset[str]:
+        """Two sets as one, made once: macros that lead to each other in a long row hide as many names in each."""
+        key = hidden, more
         if key not in self._hidden:
-            self._hidden[key] = hidden | {word}
+            self._spend(len(hidden) + len(more))
+            self._hidden[key] = hidden | more
         return self._hidden[key]
+
+    def _spend(self, count: int) -> None:
+        self.spent += count
+        if self.spent > MOST_TOKENS:
+            raise _TooFar
 
     def _substituted(self, macro: _Macro, arguments: list[list[_Token]], inside: frozenset[str]) -> list[_Token]:
         given = dict(zip(macro.parameters or (), arguments, strict=False))
@@ -220,13 +225,12 @@ class _Preprocessor:
                 if word not in expanded:
                     expanded[word] = self._expanded(given[word])
                 parts = expanded[word]
-            self.spent += len(parts)
-            if self.spent > MOST_TOKENS:
-                raise _TooFar
+            self._spend(len(parts))
             if paste and parts:
                 made[-1] = (made[-1][0] + parts[0][0], made[-1][1] & parts[0][1])
+                self._spend(len(made[-1][0]))  # a word may double as well
                 parts = parts[1:]
-            made += [(part, hidden | inside) for part, hidden in parts]
+            made += [(part, self._both(hidden, inside)) for part, hidden in parts]
             paste = False
         return made
 
@@ -289,5 +293,5 @@ class Condition:
             return inner
         if found := re.match(r"0[xX]([0-9a-fA-F]+)", word):
             return int(found[1], 16)
-        digits = re.match(r"[0-9]*", word)[0]  # type: ignore[index]  # it matches always
+        digits = re.match(r"[0-9]{0,20}", word)[0]  # type: ignore[index]  # it matches always
         return int(digits or "0", 8 if re.fullmatch("0[0-7]+", digits) else 10)
