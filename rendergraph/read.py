@@ -136,6 +136,10 @@ class _Grammar:
             if not self.is_mapping(value, what):
                 return None
             kept: dict[str, Value] = {}
+            if known is TOP_KEYS and (sweep := dict(value.items()).get("sweep")) is not None:
+                text = "this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
+                self.say(sweep, "RG101", text, key=True)
+                return None
             for key, child in value.items():
                 if key not in known:
                     where = "a pipeline" if known is TOP_KEYS else f"'{what}'"

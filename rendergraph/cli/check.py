@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from rendergraph.cli import options
-from rendergraph.cli.output import emit_json, say, warn
+from rendergraph.cli.output import amount, emit_json, say, warn
 from rendergraph.cli.words import click
 
 
@@ -15,17 +16,28 @@ from rendergraph.cli.words import click
 def command(as_json: bool, **selection: Any) -> None:
     """Find every mistake, without a GPU.
 
-    Looks at the pipeline, everything it refers to, its scene and the options. Exits 0 where all is well; exits 3 with
-    every mistake, its line and the way out where not.
+    Looks at the pipeline, everything it refers to, its scene and the options; given a sweep's file, at every run. Exits
+    0 where all is well; exits 3 with every mistake, its line and the way out where not.
 
     \b
     Examples:
       rendergraph check forward
       rendergraph check forward --scene spheres -s light.ambient=0.1 --json
     """
+    from rendergraph.compare.axes import is_sweep
     from rendergraph.schema import outdated
     from rendergraph.settings import Roots
 
+    if is_sweep(Path(selection["pipeline"])):
+        from rendergraph.cli.sweep import check_file
+
+        file = selection.pop("pipeline")
+        runs, warnings = check_file(Path(file), selection)
+        warn(warnings)
+        say(f"{file}: a sweep of {amount(runs, 'run')}")
+        if as_json:
+            emit_json({"sweep": file, "runs": runs, "warnings": [problem.as_json() for problem in warnings]})
+        return
     pipeline = options.load(**selection)
     graph = pipeline.check()
     said = {str(problem) for problem in pipeline.warnings}

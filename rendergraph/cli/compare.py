@@ -248,4 +248,6 @@ def _first(found: Comparison, result: Result) -> str:
     amount = (
         "in size" if first.most is None else f"in {100 * first.share:.3g} % of its texels, by up to {first.most:.4g}"
     )
-    return f"{result.name}: the first pass that differs from {base} is {first.node} ({first.port}), {amount}"
+    return (
+        f"{result.name}: the first pass that differs from {base} is {first.node} ({first.port}){first.after}, {amount}"
+    )

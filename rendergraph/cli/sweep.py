@@ -11,8 +11,11 @@ from rendergraph.cli.output import Bar, amount, emit, emit_json, say, table, war
 from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
-    from rendergraph.compare.axes import Axis
+    from collections.abc import Mapping
+
+    from rendergraph.compare.axes import Axis, SweepFile
     from rendergraph.compare.product import Sweep
+    from rendergraph.errors import Problem
 
 
 def _axis(text: str) -> Axis:
@@ -66,7 +69,7 @@ def command(
     """
     from rendergraph.compare import sweep
     from rendergraph.compare.axes import is_sweep, read_sweep
-    from rendergraph.compare.report import sweep_page
+    from rendergraph.compare.report import quality_svg, sweep_page
     from rendergraph.compare.study import kept_runs
 
     words = ["sweep", pipeline, *(w for a in axes for w in ("-x", f"{a.path}={','.join(a.values)}"))]
@@ -77,10 +80,8 @@ def command(
         file = read_sweep(Path(pipeline))
         named = {axis.path for axis in axes}
         axes = (*(axis for axis in file.axes if axis.path not in named), *axes)
-        pipeline, reference, frames = file.pipeline, reference or file.reference, frames or file.frames
-        selection["scene"] = selection["scene"] or file.scene
-        selection["size"] = selection["size"] or file.size
-        selection["sets"] = (*file.sets, *selection["sets"])
+        reference, frames = reference or file.reference, frames or file.frames
+        pipeline, selection = file.pipeline, _with_file(file, selection)
     bar = Bar("runs")
     base = options.make(pipeline=pipeline, **selection)
     shared.check_limits(thresholds, base.catalog.extensions)
@@ -99,6 +100,8 @@ def command(
     warn([*found.comparison.warnings, *base.catalog.extensions.warnings])
     page = out / "report.html"
     options.write(sweep_page(found, again), page)
+    chart = out / "quality.svg"
+    options.write(quality_svg(found.comparison), chart)
     if found.timed:
         say(f"{amount(found.timed, 'run')} measured again: fewer than {amount(frames or 5, 'frame')} had been")
     if found.redrawn:
@@ -107,14 +110,42 @@ def command(
         say(f"{amount(found.torn, 'line')} of the results not whole; what they told was done again")
     beyond = shared.exceeded(found.comparison.results, thresholds)
     if as_json:
-        emit_json(found.as_json() | {"report": str(page), "exceeded": beyond})
+        emit_json(found.as_json() | {"report": str(page), "chart": str(chart), "exceeded": beyond})
     else:
         emit(_text(found))
+        emit(str(chart))
         emit(str(page))
     for text in beyond:
         say(text)
     if beyond:
         raise click.exceptions.Exit(shared.BEYOND)
+
+
+def check_file(path: Path, selection: Mapping[str, Any]) -> tuple[int, tuple[Problem, ...]]:
+    """Find every mistake in a sweep's file and in its runs, and say how many those are and what was noticed.
+
+    Raises:
+        InputError: with all mistakes.
+    """
+    from rendergraph.compare import check_sweep
+    from rendergraph.compare.axes import read_sweep
+
+    file = read_sweep(path)
+    merged = _with_file(file, selection)
+    runs = check_sweep(
+        options.make(pipeline=file.pipeline, **merged), file.axes, shared.load_reference(file.reference, merged)
+    )
+    return len(runs), tuple(dict.fromkeys(problem for run in runs for problem in run.warnings))
+
+
+def _with_file(file: SweepFile, selection: Mapping[str, Any]) -> dict[str, Any]:
+    """The options with what a file says where they say nothing."""
+    return {
+        **selection,
+        "scene": selection["scene"] or file.scene,
+        "size": selection["size"] or file.size,
+        "sets": (*file.sets, *selection["sets"]),
+    }
 
 
 def _text(found: Sweep) -> str:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis
     from rendergraph.compare.pictures import compare
-    from rendergraph.compare.product import Sweep, sweep
+    from rendergraph.compare.product import Sweep, check_sweep, sweep
     from rendergraph.compare.values import Comparison, Result
 
-__all__ = ["Axis", "Comparison", "Result", "Sweep", "compare", "sweep"]
+__all__ = ["Axis", "Comparison", "Result", "Sweep", "check_sweep", "compare", "sweep"]
 
-_WHERE = {"Axis": "axes", "compare": "pictures", "Sweep": "product", "sweep": "product"}
+_WHERE = {"Axis": "axes", "compare": "pictures", "Sweep": "product", "check_sweep": "product", "sweep": "product"}
 
 
 def __getattr__(name: str) -> Any:

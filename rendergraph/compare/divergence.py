@@ -65,7 +65,8 @@ def first_difference(
             most, share = _amount(a, b)
             semantic = variant.info(f"{node}.{port}").semantic
             causes = _causes(graph, node, difference)
-            return Difference(node, back[node], port, most, share, causes, (a, b), semantic)
+            added = tuple(cause for cause in causes if cause in difference.added)
+            return Difference(node, back[node], port, most, share, causes, added, (a, b), semantic)
     return None
 
 

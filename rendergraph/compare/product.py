@@ -140,15 +140,10 @@ def sweep(
         RenderError: it failed while drawing or writing.
         DeviceError: there is no usable GL device.
     """
-    check_axes(axes)
+    staged, notes, picture, output, encoding = _looked_at(base, axes, reference)
     settings = combinations(axes)
-    variants = pipelines(base, settings)
-    other = None if reference is None or isinstance(reference, Path) else reference
-    staged, notes = on_one_stage([*variants, *([other] if other else [])])
-    variants, other = staged[: len(variants)], staged[-1] if other else None
+    variants, other = staged[: len(settings)], staged[-1] if len(staged) > len(settings) else None
     names = unique_names([run_name(run) for run in settings])
-    picture = read_picture(reference, variants[0].graph.size, names[0]) if isinstance(reference, Path) else None
-    output, encoding = compared_output(staged, picture[1] if picture else None)
     against = key_of(other or variants[0], frame, "") if picture is None else file_digest(Path(str(reference)))
     study = study_of(base, frame, str(reference) if picture else other.name if other else names[0])
     ledger, records, torn = open_folder(out, study, resume=resume)
@@ -185,6 +180,31 @@ def sweep(
         warnings=tuple(dict.fromkeys(problem for variant in variants for problem in variant.warnings)),
     )
     return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, timed, redrawn, torn)
+
+
+def check_sweep(base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None = None) -> list[Pipeline]:
+    """The pipelines that `sweep` would draw; everything that can be wrong without GL is found.
+
+    Raises:
+        InputError: as from `sweep`.
+    """
+    staged, *_ = _looked_at(base, axes, reference)
+    for pipeline in staged:
+        pipeline.check()
+    return staged[: len(combinations(axes))]
+
+
+def _looked_at(
+    base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None
+) -> tuple[list[Pipeline], list[str], tuple[Pixels, Encoding] | None, str, Encoding]:
+    """Runs on one stage and what was changed for that, a reference picture, and the compared output's name and kind."""
+    check_axes(axes)
+    variants = pipelines(base, combinations(axes))
+    own = [] if reference is None or isinstance(reference, Path) else [reference]
+    staged, notes = on_one_stage([*variants, *own])
+    name = run_name(combinations(axes)[0])
+    picture = read_picture(reference, staged[0].graph.size, name) if isinstance(reference, Path) else None
+    return staged, notes, picture, *compared_output(staged, picture[1] if picture else None)
 
 
 def pareto(results: Sequence[Result]) -> list[Result]:

@@ -59,6 +59,7 @@ class Difference:
         most: greatest difference of a channel, None where sizes or formats differ.
         share: part of the texels that differ, 0…1.
         causes: nodes that differ in structure and lead there, the pass itself included.
+        added: those of them that the base does not have: they have no counterpart that they could differ from.
         pixels: the output in the base and in the variant.
         semantic: what its texels mean.
     """
@@ -69,14 +70,21 @@ class Difference:
     most: float | None
     share: float
     causes: tuple[str, ...]
+    added: tuple[str, ...]
     pixels: tuple[Pixels, Pixels]
     semantic: str
+
+    @property
+    def after(self) -> str:
+        """What the base does not have on the way there: `, after added node bloom`."""
+        several = "s" if len(self.added) > 1 else ""
+        return f", after added node{several} {', '.join(self.added)}" if self.added else ""
 
     def as_json(self) -> dict[str, Any]:
         """Everything but the texels."""
         return {
             "node": self.node, "base_node": self.base_node, "port": self.port, "most": self.most, "share": self.share,
-            "causes": list(self.causes),
+            "causes": list(self.causes), "added": list(self.added),
         }  # fmt: skip
 
 

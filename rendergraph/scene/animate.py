@@ -76,7 +76,7 @@ def complete(scene: Scene, camera_name: str | None = None) -> Scene:
     if camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"
-            raise InputError(Problem("RG322", text, Place(str(scene.source)) if scene.source else None))
+            raise InputError(Problem("RG322", text, Place(f"--camera {camera_name}")))
         cameras = {camera_name: cameras[camera_name], **cameras}
     first = next(iter(cameras.values()))
     lights = scene.lights or (key_light(scene, first),)

@@ -112,6 +112,35 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
     assert len((tmp_path / "out" / "results.jsonl").read_text().splitlines()) == 4
 
 
+def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> None:
+    file = tmp_path / "study.yaml"
+    text = "sweep: 1\npipeline: forward\nreference: shading-pbr\naxes: {shadows.taps: [1, 3], display.curve: [aces, none]}\n"
+    file.write_text(text)
+    found = cli("check", "study.yaml")
+    assert (found.code, found.err) == (0, "study.yaml: a sweep of 4 runs\n")
+    assert cli("check", "study.yaml", "--json").json == {"sweep": "study.yaml", "runs": 4, "warnings": []}
+    file.write_text(text.replace("none", "acse").replace("shadows.taps", "shadows.tap"))
+    found = cli("check", "study.yaml")
+    assert found.code == 3
+    assert "-x display.curve=acse: RG104" in found.err
+    assert "-x shadows.tap=1: RG103" in found.err
+    for verb in ("run", "plan", "graph"):
+        found = cli(verb, "study.yaml")
+        assert found.code == 3
+        assert found.err.splitlines()[0] == (
+            "study.yaml:1:1: RG101 this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
+        )
+        assert found.err.count("RG") == 1
+
+
+def test_a_sweep_writes_its_chart_as_a_picture(cli: Any, tmp_path: Path) -> None:
+    words = ("sweep", "forward", *SMALL, "-x", "shadows.taps=1", "-n", "1", "-o", "out")
+    found = cli(*words)
+    assert found.out.startswith("1 run against shadows.taps=1: 3 passes drawn")
+    assert found.out.splitlines()[-2:] == ["out/quality.svg", "out/report.html"]
+    assert (tmp_path / "out" / "quality.svg").read_text().startswith("<svg xmlns")
+
+
 def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any, tmp_path: Path) -> None:
     words = ["sweep", "forward", "-x", f"display.exposure={','.join(map(str, range(18)))}", *SMALL, "-n", "400"]
     process = subprocess.Popen(

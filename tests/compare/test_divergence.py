@@ -76,6 +76,7 @@ def test_an_added_pass_is_told_as_the_cause(make: Any, gl: rg.Session) -> None:
     assert first is not None
     assert first.node == "r"
     assert set(first.causes) == {"q", "r"}
+    assert (first.added, first.after) == (("q",), ", after added node q")
 
 
 def test_a_function_that_changed_shows_in_the_pass_that_calls_it(gl: rg.Session) -> None:

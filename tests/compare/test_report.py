@@ -119,6 +119,37 @@ def test_a_scatter_shows_all_points_inside_and_the_front() -> None:
     assert sum(dot.attrib["class"] == "best" for dot in dots) == 10
     ET.fromstring(scatter_svg([], "time", "error"))
     ET.fromstring(scatter_svg([Point("zero", "z", 0, 0, 0, 0, True)], "time", "error"))
+    great = scatter_svg([Point("n", "n", 1700.0, 1600, 1900, 0.00016, True)], "time", "error")
+    assert ">2000</text>" in great
+    assert ">0.0002</text>" in great
+    assert "e+" not in great
+
+
+def test_no_line_goes_through_a_label() -> None:
+    import re
+
+    points = [
+        Point(f"n{i}", f"radius {i}", 100.0 + 20 * i, 99 + 20 * i, 118 + 20 * i, 0.5 / (1 + i), True) for i in range(6)
+    ]
+    svg = scatter_svg(points, "time", "error")
+    labels = [
+        (float(x), float(y) - 4, 6.8 * len(text))
+        for x, y, text in re.findall(r'<text class="ink" x="([\d.]+)" y="([\d.]+)">([^<]+)<', svg)
+    ]
+    assert len(labels) == 6
+    lines = re.findall(r'<path d="M([\d.]+) ([\d.]+)H([\d.]+)"', svg)
+    front = re.findall(r'class="front" d="M([\d.]+) ([\d.]+)((?:H[\d.]+V[\d.]+)+)"', svg)[0]
+    x, y = map(float, front[:2])
+    uprights = []
+    for across, down in re.findall(r"H([\d.]+)V([\d.]+)", front[2]):
+        lines.append((x, y, across))
+        uprights.append((float(across), y, float(down)))
+        x, y = float(across), float(down)
+    for left, middle, width in labels:
+        for start, height, end in lines:
+            assert abs(float(height) - middle) > 5 or float(end) < left or float(start) > left + width
+        for across, top, bottom in uprights:
+            assert not left < across < left + width or middle < top - 4 or middle > bottom + 4
 
 
 # --- in a browser ----------------------------------------------------------------------------------------------------

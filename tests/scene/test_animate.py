@@ -113,7 +113,7 @@ def test_complete_takes_the_camera_asked_for(tmp_path: Path) -> None:
     scene = read(tmp_path, "cameras: {a: {}, b: {eye: [1, 0, 0]}}\nlights: {l: {type: point}}\n")
     assert list(animate.complete(scene, "b").cameras) == ["b", "a"]
     assert animate.complete(scene).lights == scene.lights
-    with pytest.raises(InputError, match="RG322 the scene has no camera 'c'"):
+    with pytest.raises(InputError, match=r"^--camera c: RG322 the scene has no camera 'c'"):
         animate.complete(scene, "c")
 
 

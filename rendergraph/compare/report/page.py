@@ -32,6 +32,7 @@ from rendergraph.views import lifetimes_svg
 
 MOST_COLUMNS = 8
 """Variants whose passes stand side by side; more are not read, and the quickest good ones stand for them."""
+_QUALITY = "Error against time"
 
 
 def comparison_page(comparison: Comparison, command: str) -> str:
@@ -52,7 +53,12 @@ def comparison_page(comparison: Comparison, command: str) -> str:
             section("pictures", "Pictures", _viewer(comparison), _sheet(comparison)),
             section("first", "Where they part", _first(comparison)),
             section("passes", "Time of each pass", _passes(shown_results), software_note(comparison.software)),
-            section("quality", "Quality against time", _scatter(comparison, ()), software_note(comparison.software)),
+            section(
+                "quality",
+                "Quality against time",
+                drawing(quality_svg(comparison), _QUALITY),
+                software_note(comparison.software),
+            ),
             section("structure", "Structure", _structure(comparison)),
             section("memory", "Memory", _memory(comparison.results)),
         ],
@@ -81,8 +87,8 @@ def sweep_page(found: Sweep, command: str) -> str:
         comparison,
         [
             section("axes", "Axes", axes, saved),
-            section("quality", "Quality against time", _scatter(comparison, front), _front_words(front),
-                    software_note(comparison.software)),
+            section("quality", "Quality against time", drawing(quality_svg(comparison, front), _QUALITY),
+                    _front_words(front), software_note(comparison.software)),
             section("summary", "Runs", _summary(comparison, front=front), software_note(comparison.software)),
             section("pictures", "Pictures", _viewer(comparison), _sheet(comparison)),
             section("passes", "Time of each pass", _passes(best), software_note(comparison.software)),
@@ -283,6 +289,7 @@ def _first(comparison: Comparison) -> str:
             continue
         name = f"<code>{escape(first.node)}.{escape(first.port)}</code>"
         was = f" (there <code>{escape(first.base_node)}</code>)" if first.base_node != first.node else ""
+        was += escape(first.after)
         amount = (
             "in size"
             if first.most is None
@@ -295,7 +302,8 @@ def _first(comparison: Comparison) -> str:
             for pixels, whose in zip(first.pixels, (base, result.name), strict=True)
         )
         parts.append(
-            f"{head}<p>The first pass that differs from <code>{escape(base)}</code> is {name}{was}: {amount}.{why}</p>"
+            f"{head}<p>The first pass that differs from <code>{escape(base)}</code> is {name}{was}: "
+            f"{amount}.{why}</p>"
             f'<div class="pair">{pair}</div>'
         )
     return "\n".join(parts)
@@ -304,7 +312,8 @@ def _first(comparison: Comparison) -> str:
 # --- drawings --------------------------------------------------------------------------------------------------------
 
 
-def _scatter(comparison: Comparison, front: Sequence[Result]) -> str:
+def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
+    """Error against time, a point a result, as an SVG document; the front is found where none is given."""
     results = comparison.results
     best = {result.name for result in (front or pareto(results))}
     points = []
@@ -318,8 +327,7 @@ def _scatter(comparison: Comparison, front: Sequence[Result]) -> str:
         )  # fmt: skip
     kind = "GPU" if results[0].times.gpu_ms else "frame"
     note = ", software rasteriser" if comparison.software else ""
-    svg = scatter_svg(points, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")
-    return drawing(svg, "Error against time")
+    return scatter_svg(points, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")
 
 
 def _front_words(front: Sequence[Result]) -> str:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
 WIDTH, HEIGHT = 760.0, 380.0
-LEFT, RIGHT, TOP, BOTTOM = 76.0, 24.0, 20.0, 52.0
+LEFT, RIGHT, TOP, BOTTOM = 76.0, 36.0, 20.0, 52.0
 MOST_LABELS = 24
+_LINE = 13.0
+"""Height of a label."""
 _STYLE = """
 .ink{fill:#1f2328}.fact{fill:#57606a}.grid{stroke:#7d8590;stroke-opacity:.25}.front{stroke:#2c9163;fill:none}
 .dot{fill:#3b7dd8}.best{fill:#2c9163}
@@ -54,8 +57,8 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         f"<style>{_STYLE}</style>",
     ]
     for part in range(6):
-        parts.append(_tick(x(right * part / 5), HEIGHT - BOTTOM, f"{right * part / 5:.3g}", upright=True))
-        parts.append(_tick(LEFT, y(up * part / 5), f"{up * part / 5:.3g}", upright=False))
+        parts.append(_tick(x(right * part / 5), HEIGHT - BOTTOM, _plain(right * part / 5), upright=True))
+        parts.append(_tick(LEFT, y(up * part / 5), _plain(up * part / 5), upright=False))
     middle = (TOP + HEIGHT - BOTTOM) / 2
     parts.append(f'<text class="fact" x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 10:.0f}" text-anchor="middle">'
                  f"{escape(time)}</text>")  # fmt: skip
@@ -66,10 +69,15 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         path = f"M{x(front[0].ms):.1f} {y(front[0].error):.1f}"
         path += "".join(f"H{x(p.ms):.1f}V{y(p.error):.1f}" for p in front[1:])
         parts.append(f'<path class="front" d="{path}" stroke-width="1.5" stroke-dasharray="5 4"/>')
-    # Labels go where neither a point nor another label is; those of the front choose first.
-    taken = [_Spot(x(p.ms) - 7, x(p.ms) + 7, y(p.error)) for p in points]
+    # Labels go where neither a point, a line nor another label is; those of the front choose first.
+    taken = [_Spot(min(x(p.ms) - 7, x(p.low)), max(x(p.ms) + 7, x(p.high)), y(p.error)) for p in points]
+    for a, b in itertools.pairwise(front):
+        taken.append(_Spot(x(a.ms), x(b.ms), y(a.error)))
+        steps = math.ceil((y(b.error) - y(a.error)) / _LINE)
+        taken += [_Spot(x(b.ms) - 1, x(b.ms) + 1, y(a.error) + _LINE * step) for step in range(1, steps)]
     for point in sorted(points, key=lambda p: (not p.best, p.ms)):
-        told = f"{point.name}: {point.ms:.3g} ms ({point.low:.3g}–{point.high:.3g}), {point.error:.4g}"
+        spread = f"{_plain(point.low)}–{_plain(point.high)}"
+        told = f"{point.name}: {_plain(point.ms)} ms ({spread}), {_plain(point.error)}"
         at, height = x(point.ms), y(point.error)
         parts.append(
             f'<g><title>{escape(told)}</title><path d="M{x(point.low):.1f} {height:.1f}H{x(point.high):.1f}" '
@@ -91,7 +99,7 @@ class _Spot:
     y: float
 
     def meets(self, other: _Spot) -> bool:
-        return abs(self.y - other.y) < 13 and self.left < other.right and other.left < self.right
+        return abs(self.y - other.y) < _LINE and self.left < other.right and other.left < self.right
 
 
 def _label(text: str, x: float, y: float, taken: list[_Spot]) -> str:
@@ -113,6 +121,11 @@ def _tick(x: float, y: float, text: str, *, upright: bool) -> str:
         return line + f'<text class="fact" x="{x:.1f}" y="{y + 18:.1f}" text-anchor="middle">{text}</text>'
     line = f'<path class="grid" d="M{x:.1f} {y:.1f}H{WIDTH - RIGHT:.0f}"/>'
     return line + f'<text class="fact" x="{x - 8:.1f}" y="{y + 4:.1f}" text-anchor="end">{text}</text>'
+
+
+def _plain(value: float) -> str:
+    """Three digits without an exponent: `1200`, `0.00015`."""
+    return f"{float(f'{value:.3g}'):.12f}".rstrip("0").rstrip(".")
 
 
 def _ceiling(value: float) -> float:
