@@ -93,13 +93,13 @@ def _draw(
     known = pipeline.graph.outputs
     outputs = tuple(t if t.name else replace(t, name=images.output_for(t.path, known)) for t in outputs)
     targets = [*outputs, *taps]
-    _check(targets, numbers, selection)
     wanted = list(dict.fromkeys(target.name for target in outputs if target.name))
     tapped = list(dict.fromkeys(target.name for target in taps if target.name))
     for name, end in pipeline.wanted(wanted, tapped).items():
         if pipeline.graph.textures[end].desc is None:
             text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
             raise InputError(Problem("RG508", text))
+    _check(targets, numbers, selection)
 
     written: list[str] = []
     progress = Progress(len(numbers))
@@ -151,5 +151,6 @@ def say_summary(report: dict[str, Any]) -> None:
     for node, reason in report["culled"].items():
         say(f"not drawn: {node}: {reason}")
     device, (width, height) = report["device"], report["size"]
-    text = f"{width}×{height}, {len(report['passes'])} passes, {report['frame_ms']['median']:.1f} ms a frame"
+    passes = len(report["passes"])
+    text = f"{width}×{height}, {passes} pass{'' if passes == 1 else 'es'}, {report['frame_ms']['median']:.1f} ms a frame"
     say(f"{text} on {device['renderer']}" + (" (software: no measure of a GPU)" if device["software"] else ""))

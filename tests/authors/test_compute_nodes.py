@@ -55,14 +55,15 @@ def test_a_step_covers_what_it_reads_where_it_writes_no_texture(histogram: Any) 
     assert [step.invocations for step in steps if step.kind == "compute"] == [(17, 9, 1)]
 
 
+@pytest.mark.parametrize("ending", ["exr", "npy"])
 def test_a_buffer_is_no_picture_on_the_command_line(
-    histogram: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    histogram: Any, ending: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from rendergraph.cli.app import main
 
     histogram.pipeline(TEXT)
     monkeypatch.chdir(histogram.folder)
-    assert main(["run", "test.yaml", "--plugin", "plugins", "--tap", "count.counts=counts.exr"]) == 3
+    assert main(["run", "test.yaml", "--plugin", "plugins", "--tap", f"count.counts=counts.{ending}"]) == 3
     said = capsys.readouterr().err
     assert (
         "RG508 'count.counts' is a buffer, which no picture file holds; from Python it is frame['count.counts']" in said

@@ -139,3 +139,11 @@ def test_a_failure_keeps_the_frames_that_are_done(cli: Any, fake: Any, tmp_path:
     assert result.code == 1
     assert result.out.split() == ["a.01.png", "b.01.exr"]
     assert sorted(os.listdir(tmp_path)) == ["a.01.png", "b.01.exr"]
+
+
+def test_one_pass_is_a_pass(capsys: pytest.CaptureFixture[str]) -> None:
+    from rendergraph.cli.run import say_summary
+
+    device = {"renderer": "none", "software": False}
+    say_summary({"culled": {}, "device": device, "size": (6, 4), "passes": [{}], "frame_ms": {"median": 1.0}})
+    assert capsys.readouterr().err == "6×4, 1 pass, 1.0 ms a frame on none\n"
