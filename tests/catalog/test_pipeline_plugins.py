@@ -300,7 +300,9 @@ def test_settings_that_do_not_count_are_said(write: Write, monkeypatch: pytest.M
     with pytest.raises(InputError, match=said):
         link(spec_of(Path("p/p.yaml")), Catalog.discover(), ())
     monkeypatch.chdir(folder / "p")
-    assert spec_of(Path("p.yaml")).catalog.get("times")
+    catalog = spec_of(Path("p.yaml")).catalog
+    assert catalog is not None
+    assert catalog.get("times").is_shader
 
 
 def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
