@@ -152,5 +152,6 @@ def say_summary(report: dict[str, Any]) -> None:
         say(f"not drawn: {node}: {reason}")
     device, (width, height) = report["device"], report["size"]
     passes = len(report["passes"])
-    text = f"{width}×{height}, {passes} pass{'' if passes == 1 else 'es'}, {report['frame_ms']['median']:.1f} ms a frame"
+    count = f"{passes} pass{'' if passes == 1 else 'es'}"
+    text = f"{width}×{height}, {count}, {report['frame_ms']['median']:.1f} ms a frame"
     say(f"{text} on {device['renderer']}" + (" (software: no measure of a GPU)" if device["software"] else ""))

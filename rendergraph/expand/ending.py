@@ -29,18 +29,19 @@ def wanted_resources(numbering: Numbering) -> dict[str, str]:
             raise InputError(Problem("RG204", text, numbering.graph[end.node].place))
         resource, version = numbering.at_end[end]
         last = version == numbering.version[resource]
-        wanted[name] = resource if last else _keep(numbering, end, resource, version)
+        wanted[name] = resource if last else _keep(numbering, name, end, resource, version)
     return wanted
 
 
-def _keep(numbering: Numbering, end: Endpoint, resource: str, version: int) -> str:
+def _keep(numbering: Numbering, name: str, end: Endpoint, resource: str, version: int) -> str:
     """A copy of a version that somebody continues: what a tap in the middle of a chain shows."""
     kept = f"{end} kept"
     if kept not in numbering.resources:
         index = 1 + max(step.index for step in numbering.steps if step.node == end.node)
         numbering.resources[kept] = replace(numbering.resources[resource], id=kept, role="output")
         read, write = Read("source", resource, version, "image"), Write("copy", kept, 1, "image")
-        numbering.steps.append(Step(end.node, index, "copy", reads=(read,), writes=(write,), label=f"{end} kept"))
+        label = f"copy of {end}, kept for {'tap' if '.' in name else 'output'} '{name}'"
+        numbering.steps.append(Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label))
     return kept
 
 

@@ -19,9 +19,13 @@ def mebibytes(count: int) -> str:
 
 
 def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
-    """Step key to what it is called: the node's id, with a number where the node has several steps."""
-    several = {step.node for step in steps if step.index > 0}
-    return {step.key: f"{step.node}[{step.index}]" if step.node in several else step.node for step in steps}
+    """Step key to what it is called: the node's id, with a number where the node has several steps.
+
+    A copy is the framework's own and has a name that says what for.
+    """
+    several = {step.node for step in steps if step.index > 0 and step.kind != "copy"}
+    names = {step.key: f"{step.node}[{step.index}]" if step.node in several else step.node for step in steps}
+    return names | {step.key: step.label for step in steps if step.kind == "copy"}
 
 
 def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dict[tuple[str, int], str]:

@@ -126,13 +126,17 @@ def _order_text(plan: ResourcePlan) -> str:
     live = live_bytes(plan)
     rows = [("  #", "step", "reads", "writes", "live", "why here")]
     for position, step in enumerate(plan.schedule.steps):
-        reads = [read.resource + ("@previous" if read.previous else "") for read in step.all_reads]
+        continued = {read.resource for read in step.reads if read.use == "attach"}  # kept, and not looked at
+        reads = [
+            read.resource + ("@previous" if read.previous else "") for read in step.all_reads if read.use != "attach"
+        ]
+        writes = [w.resource + (" (continued)" if w.resource in continued else "") for w in step.writes]
         rows.append(
             (
                 f"{position + 1:3}",
                 names[step.key],
                 _ids(reads),
-                _ids([write.resource for write in step.writes]),
+                _ids(writes),
                 mebibytes(live[position]),
                 plan.schedule.reasons.get(step.key, ""),
             )

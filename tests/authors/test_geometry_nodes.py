@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -213,3 +214,32 @@ def test_more_tables_and_buffers_than_the_device_binds(
         "RG435 there are 2 view tables; this device binds 1 at once",
         f"test.yaml:4:3: RG435 node 'a' (wrong): wrong.py:{author.line('steps.full')}: it has 2 buffers; this device takes 1",
     ]
+
+
+GLOW = """
+radiance = InOut(Radiance, doc="What is drawn on.")
+
+def record(self, steps):
+    steps.fullscreen("glow.frag", state=State(blend=ADD))
+"""
+
+
+def test_a_plan_tells_what_is_continued_from_what_is_read_and_says_what_a_copy_is_for(author: Any) -> None:
+    from rendergraph.views.plan import plan_text
+
+    author.node('color = Output(Radiance, clear=0, doc="White.")')
+    author.node(GLOW, "glow")
+    author.write(glow__frag="out vec4 radiance;\nvoid main() { radiance = vec4(1.0); }\n")
+    pipeline = author.pipeline(
+        "nodes:\n  a: {type: wrong}\n  g: {type: glow, inputs: {radiance: a.color}}\n"
+        "outputs: {before: a.color, image: g.radiance}\n"
+    )
+    rows = plan_text(pipeline.plan(None)).split("lifetimes")[0].splitlines()[2:]
+    cells = [re.split(r"  +", row.strip())[1:4] for row in rows if row.strip()]
+    assert cells == [
+        ["a", "-", "a.color"],
+        ["copy of a.color, kept for output 'before'", "a.color", "a.color kept"],
+        ["g", "-", "a.color (continued)"],
+    ]
+    rows = plan_text(pipeline.plan([], ["a.color", "g.radiance"])).splitlines()
+    assert any("copy of a.color, kept for tap 'a.color'" in row for row in rows)
