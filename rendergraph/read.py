@@ -161,6 +161,7 @@ class _Grammar:
             for key, child in value.items():
                 if not isinstance(key, str) or not NAME.match(key):
                     text = f"'{shown(key)}' is no {what}; letters, digits, '_' and '-' make one, no digit first"
+                    text += "; a blank stands between the ':' and the value" if ":" in str(key) else ""
                     self.say(child, "RG107", text, key=True)
                     self.dropped.add((*self._path, str(key)))
                 elif where == "nodes" and key == "inputs":

@@ -19,7 +19,8 @@ from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.stamps import look
 
 FILE_NAME = "rendergraph.toml"
-_KEYS = ("asset_roots", "plugins")
+_EXAMPLES = {"asset_roots": "../assets", "plugins": "my_effects"}
+_KEYS = tuple(_EXAMPLES)
 _MOST_BYTES = 100_000
 
 
@@ -77,7 +78,8 @@ def load(file: Path) -> Settings:
         if key not in _KEYS:
             problems.append(Problem("RG017", f"no setting '{shown(key)}'{suggestion(key, _KEYS)}", place))
         elif not isinstance(value, list) or not all(isinstance(item, str) and "\0" not in item for item in value):
-            problems.append(Problem("RG017", f"'{key}' is a list of paths, as in {key} = [\"../assets\"]", place))
+            text = f"'{key}' is a list of paths, as in {key} = [\"{_EXAMPLES[key]}\"]"
+            problems.append(Problem("RG017", text, place))
         else:
             paths[key] = tuple(file.parent / at_home(item) for item in value)
     if problems:

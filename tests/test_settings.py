@@ -31,7 +31,7 @@ def test_the_nearest_above(tmp_path: Path) -> None:
     [
         ("asset_roots = [", "RG017 not a valid settings file"),
         ("asset_root = []", r"RG017 no setting 'asset_root'; did you mean 'asset_roots'\?"),
-        ('plugins = "nodes"', "RG017 'plugins' is a list of paths, as in plugins ="),
+        ('plugins = "nodes"', r"RG017 'plugins' is a list of paths, as in plugins = \[\"my_effects\"\]"),
         ("plugins = [1]", "RG017 'plugins' is a list of paths"),
         ('plugins = ["a\\u0000b"]', "RG017 'plugins' is a list of paths"),
     ],

@@ -354,7 +354,7 @@ class Entries:
         missing += [f"min and max of {_listed(self._without_range)}"] if self._without_range else []
         if missing:
             text = f"shader node '{self.file.name}' lacks {'; '.join(missing)}; its header can say them"
-            yield Problem("RG445", text, Place(self.shown), severity="warning")
+            yield Problem("RG445", text, Place(self.shown, 1, 1), severity="warning")
         match = re.search(r"\bdiscard\b", self.text)
         outputs = [port for port in self.ports.values() if isinstance(port, Made)]
         if match and any(port.clear is None for port in outputs):

@@ -16,6 +16,7 @@ BEGIN, END = "/*---", "---*/"
 """The lines between which a header stands."""
 
 _BEGIN = re.compile(rf"^[ \t]*{re.escape(BEGIN)}[ \t]*$", re.MULTILINE)
+_ALMOST = re.compile(r"[ \t]*/\*[ \t]+---[ \t]*\Z")
 _NAME = re.compile(r"[A-Za-z]\w*\Z", re.ASCII)
 _REFERENCE = re.compile(r"\$[A-Za-z]\w*\Z", re.ASCII)
 _MOST_SIDE = 16_384
@@ -64,9 +65,12 @@ def read_header(text: str, file: Path, name: str) -> Header:
         InputError: it has no end, or is no YAML at all.
     """
     begin = _BEGIN.search(text)
-    if begin is None:
-        return Header()
     lines = text.split("\n")
+    if begin is None:
+        almost = next((number for number, line in enumerate(lines) if _ALMOST.match(line)), None)
+        if almost is not None and any(line.strip() == END for line in lines[almost:]):
+            raise InputError(_problem(name, lines, almost, f"a header begins with a line '{BEGIN}', without blanks"))
+        return Header()
     first = text.count("\n", 0, begin.start()) + 1  # the line behind the fence, counted from 0
     last = next((number for number in range(first, len(lines)) if "*/" in lines[number]), None)
     if last is None or lines[last].strip() != END:

@@ -54,7 +54,9 @@ def command(
         raise InputError(report.mistakes)
     warn(report.problems)
     count = len(report.variants)
-    say(f"{report.node}: all is well in {count} variant{'' if count == 1 else 's'}")
+    warnings = len(report.problems)
+    found = f"{warnings} warning{'' if warnings == 1 else 's'}, no mistake" if warnings else "all is well"
+    say(f"{report.node}: {found} in {count} variant{'' if count == 1 else 's'}")
     if as_json:
         emit_json(
             {

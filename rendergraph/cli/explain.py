@@ -47,6 +47,9 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
         catalog = catalog.with_file(topic, Path(topic))
     if topic not in catalog:
         known = [*catalog.names(), *_FILES]
+        beside = next((f"{topic}{end}" for end in SHADERS if Path(f"{topic}{end}").is_file()), None)
+        if beside is not None:
+            raise InputError(Problem("RG511", f"nothing is called '{topic}'; did you mean './{beside}'?"))
         text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
         raise InputError(Problem("RG511", text))
     found = catalog.get(topic)
@@ -186,8 +189,8 @@ def _default(row: dict[str, Any]) -> str:
 
 
 def _node_text(node: dict[str, Any]) -> str:
-    origin = node["family"] or "single file"
-    parts = [f"{node['name']}  ({origin})", node["doc"]]
+    family = f"  ({node['family']})" if node["family"] else ""
+    parts = [f"{node['name']}{family}", node["doc"]]
     if node["inputs"]:
         rows = [(p["name"], meaning(p), ", ".join(input_facts(p)), p["doc"]) for p in node["inputs"]]
         parts.append("Inputs\n" + _block(rows))

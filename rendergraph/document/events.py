@@ -223,7 +223,7 @@ def _syntax(source: Source, error: Any) -> Problem:
     elif "flow node" in context:
         what = "a value is expected here; close the '[' or '{' before it, or take a comma away"
     elif "expected ':'" in problem:
-        what, mark = "this key has no ':'", start or mark
+        what, mark = "this key has no ': ', a colon and a blank", start or mark
     elif "block" in context:
         what = "this does not fit what is above; check the indentation"
     else:

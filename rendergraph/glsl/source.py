@@ -262,7 +262,8 @@ def read_text(file: Path) -> str:
     """
     look(file)
     if not file.is_file():
-        known = {path.name for path in file.parent.glob("*") if path.is_file()} if file.parent.is_dir() else set()
+        beside = file.parent.glob("*") if file.parent.is_dir() else ()
+        known = {path.name for path in beside if path.suffix == file.suffix and path.is_file()}
         text = f"there is no shader '{shown_file(file)}'{suggestion(file.name, known)}"
         raise InputError(Problem("RG400", text))
     if file.stat().st_size > MAX_BYTES:

@@ -303,7 +303,9 @@ def test_values_that_are_not_finite_are_a_warning(check: Check) -> None:
     assert re.match(r"glow.py:8:5: warning: RG458 851 of 851 texels of 'brighter' are not finite", answer.messages[0])
 
 
-def test_what_a_shader_file_lacks_is_a_warning(check: Check) -> None:
+def test_what_a_shader_file_lacks_is_a_warning(
+    check: Check, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = SHADER.replace("out vec4", "uniform float spare;\nout vec4").replace(
         "{ ", "{ if (gl_FragCoord.x < 10.0) discard; "
     )
@@ -311,6 +313,9 @@ def test_what_a_shader_file_lacks_is_a_warning(check: Check) -> None:
     assert answer.code == 0
     assert {re.search("RG4..", message)[0] for message in answer.messages} == {"RG445", "RG446", "RG455"}  # type: ignore[index]
     assert all("warning" in message for message in answer.messages)
+    capsys.readouterr()
+    assert main(["check-node", str(tmp_path / "glow.frag")]) == 0
+    assert capsys.readouterr().err.splitlines()[-1] == "glow: 3 warnings, no mistake in 1 variant"
     assert check(None, text.replace("brighter = gain", "brighter = gian")).code == 3
 
 

@@ -240,6 +240,13 @@ def test_a_header_ends(tmp_path: Path) -> None:
     ]
 
 
+def test_a_header_begins_without_blanks(tmp_path: Path) -> None:
+    assert mistakes(tmp_path, "// so\n  /* ---\ndoc: x\n---*/\n" + BODY) == [
+        "2:3: RG440 a header begins with a line '/*---', without blanks"
+    ]
+    assert load(tmp_path, "/* ---\nno header\n--- */\n" + BODY).cls.__doc__ == "The shader effect.frag."
+
+
 def test_a_banner_is_no_header(tmp_path: Path) -> None:
     banner = "/*--------\n * doc: no\n *--------*/\n"
     assert load(tmp_path, banner + BODY).cls.__doc__ == "The shader effect.frag."

@@ -275,7 +275,7 @@ def test_versions_are_accepted(tmp_path: Path, version: str) -> None:
 def test_what_is_missing_is_one_warning(tmp_path: Path) -> None:
     (warning,) = load(tmp_path, "uniform float a;\nuniform bool b;\nout vec4 c;").warnings
     assert str(warning) == (
-        f"{tmp_path}/effect.frag: warning: RG445 shader node 'effect.frag' lacks doc of the node; "
+        f"{tmp_path}/effect.frag:1:1: warning: RG445 shader node 'effect.frag' lacks doc of the node; "
         "doc of 'c', 'a' and 'b'; min and max of 'a'; its header can say them"
     )
 

@@ -60,6 +60,15 @@ def test_every_code_can_be_explained(cli: Any, code: str) -> None:
     assert page["message"].strip().splitlines()[0].strip() in text
 
 
+def test_shaders_are_hinted_at(cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "part.glsl").write_text("")
+    (tmp_path / "film.frag").write_text("out vec4 made;\nvoid main() { made = vec4(1.0); }\n")
+    assert "RG511 nothing is called 'film'; did you mean './film.frag'?" in cli("explain", "film").err
+    assert "RG400 there is no shader 'nothere.frag'; there is film.frag\n" in cli("explain", "./nothere.frag").err
+    assert cli("explain", "./film.frag").out.startswith("./film.frag\n")
+
+
 @pytest.mark.parametrize(
     ("topic", "keys"), [("scene", ["keyframes", "fov_y_degrees"]), ("pipeline", ["extends", "params"])]
 )
