@@ -51,8 +51,7 @@ def said(kind: str, text: str, where: Path, catalog: Catalog) -> list[str]:
     try:
         if kind == "pipeline":
             spec = resolve(file, catalog=catalog)
-            found = spec.notes
-            link(spec, catalog, LIGHTS)
+            found = (*spec.notes, *link(spec, catalog, LIGHTS).warnings)
         elif kind == "command":
             words = shlex.split(text)
             sets = [words[number + 1] for number, word in enumerate(words) if word == "-s"]

@@ -72,6 +72,12 @@ def test_a_graph_of_typed_nodes(toy_catalog: Catalog) -> None:
         graph.dag.add_node("other")
 
 
+def test_an_image_that_is_light_is_warned_about(toy_catalog: Catalog) -> None:
+    assert linked(FORWARD, toy_catalog).warnings == ()
+    (warning,) = linked(FORWARD.replace("image: display.color", "image: light.radiance"), toy_catalog).warnings
+    assert (warning.code, warning.severity, warning.place and warning.place.line) == ("RG154", "warning", 9)
+
+
 def test_many_and_one(toy_catalog: Catalog) -> None:
     text = FORWARD.replace("visibility: shadows.visibility", "lookup: [shadows.lookup, shadows.lookup]")
     assert linked(text, toy_catalog)["light"].inputs["lookup"] == (Endpoint("shadows", "lookup"),) * 2

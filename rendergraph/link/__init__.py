@@ -18,7 +18,7 @@ from rendergraph.link.params import instance, plugged
 from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
-from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Signature
+from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature
 
 
 def link(
@@ -88,6 +88,7 @@ class _Linker:
     Attributes:
         problems: mistakes; a sketch has been linked before, and pays no heed to them.
         missing: those that say that a type is not there or cannot be used.
+        warnings: what is odd and no mistake.
     """
 
     def __init__(
@@ -99,6 +100,7 @@ class _Linker:
         self.catalog = spec.catalog or catalog
         self.lights = tuple(lights)
         self.problems: list[Problem] = []
+        self.warnings: list[Problem] = []
 
     def graph(self) -> Graph:
         types = self._types()
@@ -131,7 +133,7 @@ class _Linker:
             lights=self.lights,
             textures=textures,
             aliases=self._aliases(names),
-            warnings=tuple(dict.fromkeys(warning for one in types.values() for warning in one.warnings)),
+            warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )
 
     def _say(self, problem: Problem) -> None:
@@ -332,6 +334,12 @@ class _Linker:
                 if kind not in TEXTURE_KINDS:
                     text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
                     self._say(found.value.problem("RG129", text))
+                elif name == "image" and info.semantic.name == Radiance.name:
+                    text = (
+                        "output 'image' is scene-linear light as it is; send it through an output transform "
+                        "('rendergraph nodes display' lists them), or call the output 'radiance'"
+                    )
+                    self.warnings.append(replace(found.value.problem("RG154", text), severity="warning"))
 
     def _aliases(self, names: Names) -> dict[str, Endpoint]:
         found: dict[str, Endpoint] = {}
