@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
 from rendergraph.cli.output import Bar, emit, emit_json, megabytes, say, table, warn
 from rendergraph.cli.words import click
-from rendergraph.errors import Problem, UsageError, suggestion
+from rendergraph.errors import InputError, Problem, UsageError, suggestion
 
 if TYPE_CHECKING:
     import rendergraph as rg
@@ -117,7 +117,7 @@ def command(
         raise UsageError(Problem("RG500", text))
     if output is not None:
         check_page(output)
-    loaded = [options.load(pipeline=name, **selection) for name in pipelines]
+    loaded = [_load(name, pipelines, selection) for name in pipelines]
     check_limits(thresholds, loaded[0].catalog.extensions)
     bar = Bar("steps")
     found = compare(
@@ -146,6 +146,31 @@ def command(
         say(text)
     if beyond:
         raise click.exceptions.Exit(BEYOND)
+
+
+def _load(name: str, names: Sequence[str], selection: Mapping[str, Any]) -> rg.Pipeline:
+    """One of the pipelines; an -s that does not fit it and may be meant for another says how to do that.
+
+    Raises:
+        InputError: with every mistake found on the way.
+    """
+    try:
+        return options.load(pipeline=name, **selection)
+    except InputError as error:
+        others = [other for other in names if other != name]
+        if not others:
+            raise
+        way = f"-s holds for all pipelines; for one alone: rendergraph compare {others[0]} --reference {name} -s …"
+        raise InputError(
+            [
+                replace(problem, text=f"in {name}: {problem.text}; {way}") if _of_setting(problem) else problem
+                for problem in error.problems
+            ]
+        ) from None
+
+
+def _of_setting(problem: Problem) -> bool:
+    return problem.place is not None and problem.place.file.startswith("--set ")
 
 
 def load_reference(reference: str | None, selection: Mapping[str, Any]) -> Path | rg.Pipeline | None:

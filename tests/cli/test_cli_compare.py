@@ -64,6 +64,12 @@ def test_beyond_a_threshold_is_exit_code_4(cli: Any) -> None:
         (("compare", "forward", "forward", "-o", "page.pdf"), 2, "name it 'page.html'"),
         (("compare", "forward", "forward", "-o", "none/page.html"), 3, "there is no folder 'none'"),
         (("compare", "forward", "--reference", "missing.png"), 3, "RG350"),
+        (
+            ("compare", "forward", "deferred", "-s", "gbuffer.oct_bits=8"),
+            3,
+            "--set gbuffer.oct_bits=8: RG109 in forward: there is no node 'gbuffer'; there is display, light, shadows, sun; "
+            "-s holds for all pipelines; for one alone: rendergraph compare deferred --reference forward -s …",
+        ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
         (("sweep", "forward", "-x", "shadows.taps=1"), 2, "Missing option".lower()),
         (("sweep", "forward", "-x", "shadows.taps=", "-o", "out"), 2, "axis 'shadows.taps' has no values"),
