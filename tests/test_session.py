@@ -11,6 +11,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.gl.raw import RawGL
+from rendergraph.resources import shipped_pipelines
 
 FLAT = """
 from rendergraph.api import Any, Node, Output
@@ -104,6 +105,9 @@ def test_what_a_notebook_gives_is_understood_or_refused_in_words(gl: rg.Session)
     assert pipeline.set("display.exposure", values[1]).sets == ("display.exposure=0.5",)
     assert pipeline.set("light.ambient", values).sets == ("light.ambient=[0.0, 0.5, 1.0]",)
     assert list(gl.render(pipeline, outputs="image", taps="gbuffer.depth")) == ["image", "gbuffer.depth"]
+    for source in ("deferred", shipped_pipelines()["deferred"]):
+        np.testing.assert_array_equal(gl.render(source, (8, 8))["image"], gl.render(pipeline)["image"])
+    assert gl.render(pipeline, size=(4, 4)).size == (4, 4)
     for frames in (5, range(0), range(3)):
         with pytest.raises(UsageError, match="it is a range of numbers from 1"):
             gl.render(pipeline, frames=frames)  # type: ignore[arg-type]  # a mistake

@@ -102,8 +102,9 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         """Write an output; the extension chooses the format and, without a name, the output.
 
         Raises:
-            InputError: there is no such output.
-            RenderError: the file cannot be written.
+            UsageError: pictures are not written with that extension.
+            InputError: there is no such output, or the folder cannot be written to.
+            RenderError: the file cannot be written, or its format cannot hold the texture.
         """
         from rendergraph.images import output_for, save_output
 

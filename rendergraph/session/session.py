@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import ImageSource, Scene
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.kept import Kept
-from rendergraph.session.pipeline import Pipeline
+from rendergraph.session.pipeline import Pipeline, load
 from rendergraph.textures import FORMATS, TextureDesc
 
 if TYPE_CHECKING:
@@ -101,7 +102,8 @@ class Session:
 
     def render(
         self,
-        pipeline: Pipeline,
+        pipeline: Pipeline | str | Path,
+        size: tuple[int, int] | None = None,
         *,
         frames: range | None = None,
         outputs: Sequence[str] | None = None,
@@ -113,11 +115,15 @@ class Session:
         on_frame: Callable[[Frame], None] | None = None,
         warm_up: bool = True,
     ) -> Frame:
-        """Draw a pipeline and return the last frame; see `Pipeline.render`.
+        """Draw a pipeline, or the one of a name or a file, and return the last frame; see `Pipeline.render`.
 
         `warm_up` draws the first frame once more beforehand, unmeasured, and starts history afresh after it.
         """
         self._check_usable()
+        if isinstance(pipeline, str | Path):
+            pipeline = load(pipeline)
+        if size is not None:
+            pipeline = pipeline.with_size(size)
         wanted = pipeline.wanted(outputs, taps)
         frames = range(1, 2) if frames is None else frames
         if not isinstance(frames, range) or not frames or min(frames) < 1:
