@@ -23,6 +23,12 @@ VERBS = (
 )  # fmt: skip
 """In the order of `--help`; verb `x-y` is the function `command` in `rendergraph.cli.x_y`."""
 
+_MEANT = {
+    "render": "run", "draw": "run", "lint": "check", "validate": "check", "show": "graph", "list": "nodes",
+    "benchmark": "bench", "profile": "bench", "help": "explain",
+}  # fmt: skip
+"""Words that other programs have for our verbs."""
+
 INTERRUPTED, TERMINATED = 130, 143
 
 
@@ -46,7 +52,9 @@ class _Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
-            ctx.fail(f"there is no verb '{args[0]}'{suggestion(args[0], VERBS)}")
+            meant = _MEANT.get(args[0].lower())
+            hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
+            ctx.fail(f"there is no verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
 
 

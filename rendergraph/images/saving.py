@@ -121,7 +121,8 @@ def extension(path: Path) -> str:
     if found in EXTENSIONS:
         return found
     what = f"'{path.suffix}' files are not written" if found else f"'{path}' has no extension to choose the format by"
-    raise UsageError(Problem("RG501", f"{what}{suggestion(found, EXTENSIONS)}"))
+    hint = suggestion(found, EXTENSIONS) if found else f"; name it '{path}.png'"
+    raise UsageError(Problem("RG501", f"{what}{hint}"))
 
 
 def output_for(path: Path, outputs: Collection[str]) -> str:

@@ -68,6 +68,7 @@ def test_version(cli: Any) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (["render", "forward"], "RG500 there is no verb 'render'; did you mean 'run'?; see 'rendergraph --help'"),
         (["rum"], "RG500 there is no verb 'rum'; did you mean 'run'?; see 'rendergraph --help'"),
         (
             ["run", "x", "--siez", "1x1"],
