@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rendergraph.catalog import find, modules
@@ -26,10 +27,13 @@ class Catalog:
         listed: Mapping[str, Sequence[Listed]],
         types: Mapping[str, NodeType] | None = None,
         extensions: Extensions = NO_EXTENSIONS,
+        notes: tuple[Problem, ...] = (),
     ) -> None:
         self._listed = {name: tuple(found) for name, found in listed.items()}
         self._types = dict(types or {})
         self._loaded: dict[tuple[str, tuple[Listed, ...]], NodeType] = {}
+        self.notes = notes
+        """Warnings: what the environment names and is not there, as a folder of PATH need not be."""
         self.extensions = extensions
         """What plugins add beside node types, imported when the first name is asked for."""
 
@@ -46,7 +50,7 @@ class Catalog:
                 says, it stands in for an installed copy of the package.
 
         Raises:
-            InputError: a plugin path does not exist, or the settings file is malformed.
+            InputError: a plugin path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
         """
         from importlib.metadata import entry_points
 
@@ -58,10 +62,16 @@ class Catalog:
             if entry.dist is not None and plain(entry.dist.name) in own:
                 continue
             _add(listed, find.package(entry.name, entry.value.partition(":")[0]))
+        notes = []
         for plugin in named.values():
-            _add(listed, find.loose(plugin.path, plugin.place, plugin.where))
+            try:
+                _add(listed, find.loose(plugin.path, plugin.place, plugin.where))
+            except InputError as error:
+                if not plugin.where or plugin.path.exists():
+                    raise
+                notes += [replace(problem, severity="warning") for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
-        return cls(listed, extensions=extensions(folders, installed=installed, without=own))
+        return cls(listed, extensions=extensions(folders, installed=installed, without=own), notes=tuple(notes))
 
     def with_file(self, name: str, file: Path) -> Catalog:
         """The same with one shader file under the name, which is most likely its path."""
@@ -71,7 +81,7 @@ class Catalog:
         """The same with shader files that a pipeline file names; what has been loaded is shared."""
         listed = {name: list(those) for name, those in self._listed.items()}
         _add(listed, found)
-        more = Catalog(listed, self._types, self.extensions)
+        more = Catalog(listed, self._types, self.extensions, self.notes)
         more._loaded = self._loaded
         return more
 

@@ -43,6 +43,7 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
     from rendergraph.catalog import SHADERS, Catalog
 
     catalog = Catalog.discover(plugins)
+    warn(catalog.notes)
     if topic.endswith(SHADERS):
         catalog = catalog.with_file(topic, Path(topic))
     if topic not in catalog:

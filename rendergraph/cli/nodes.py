@@ -29,6 +29,7 @@ def command(family: str | None, plugins: tuple[Path, ...], as_json: bool) -> Non
     from rendergraph.catalog import Catalog
 
     catalog = Catalog.discover(plugins)
+    warn(catalog.notes)
     families = catalog.families()
     if family is not None and family not in families:
         text = f"there is no family of nodes '{family}'{suggestion(family, filter(None, families))}"

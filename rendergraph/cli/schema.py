@@ -29,6 +29,7 @@ def command(plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> No
     from rendergraph.schema import schema
 
     catalog = Catalog.discover(plugins)
+    warn(catalog.notes)
     text = json.dumps(schema(catalog), indent=2, ensure_ascii=False)
     warn([replace(problem, severity="warning") for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)

@@ -37,7 +37,7 @@ class Plugins:
         self.missing: list[str] = []
         self.unrun: dict[str, str] = {}
         self.written: dict[str, Value] = {}
-        self.notes: list[Problem] = []
+        self.notes: list[Problem] = list(catalog.notes)
         self._say = say
         self._home = Path.cwd()
         self._roots = Roots(())

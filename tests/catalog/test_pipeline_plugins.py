@@ -201,8 +201,13 @@ def test_a_missing_folder_says_who_names_it(write: Write, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match=r"rendergraph.toml: RG011 there is no plugin '.*gone'$"):
         Catalog.discover()
     (folder / "rendergraph.toml").unlink()
-    monkeypatch.setenv("RENDERGRAPH_PATH", "nowhere")
-    with pytest.raises(InputError, match=r"RG011 there is no plugin 'nowhere', which RENDERGRAPH_PATH names$"):
+    monkeypatch.setenv("RENDERGRAPH_PATH", "nowhere")  # as PATH may name what is not there
+    (note,) = resolve("forward", catalog=Catalog.discover()).notes
+    assert str(note) == "warning: RG011 there is no plugin 'nowhere', which RENDERGRAPH_PATH names"
+    with pytest.raises(InputError, match=r"RG011 there is no plugin 'nowhere'$"):
+        Catalog.discover([Path("nowhere")])
+    (folder / "nowhere").write_text("")
+    with pytest.raises(InputError, match=r"RG011 there is no plugin in '.*nowhere', which RENDERGRAPH_PATH names; one"):
         Catalog.discover()
 
 
