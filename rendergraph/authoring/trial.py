@@ -205,10 +205,10 @@ class Trial:
             runner.run(frame, (frame - 1) / 30, 1 / 30, scene, camera)
         runner.check()
         drawn = {}
-        for name, resource in plan.schedule.wanted.items():
+        for name, shown in plan.schedule.wanted.items():
             own = f"{self.type.name}.{name.removeprefix('to_')}"  # the bytes themselves, instead of what shows some
             is_buffer = own in plan.placement and isinstance(plan.resources[own].desc, BufferDesc)
-            drawn[name] = runner.read(own if is_buffer else resource)
+            drawn[name] = runner.read(own if is_buffer else shown)
         return drawn
 
     # Looking ----------------------------------------------------------------------------------------------------------
@@ -243,8 +243,8 @@ class Trial:
             if count and not any(problem.code == "RG454" for problem in self.problems):
                 text = f"{count} of {total} texels of '{port}' are not written; write them all, or declare `clear=`"
                 if one[name].ndim == 1:
-                    text = f"{count} of {total} bytes of '{port}' are not written, or added to what nobody has cleared; " \
-                           "write them all, or declare `clear=0`"  # fmt: skip
+                    text = f"{count} of {total} bytes of '{port}' are not written, or added to what nobody has cleared"
+                    text += "; write them all, or declare `clear=0`"
                 self.say(Problem("RG454", text, self.port_place(port)))
             elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():
                 bad = int(_texels(~np.isfinite(one[name]), one[name]).sum())

@@ -202,7 +202,8 @@ class Infer:
             for part in param.data if isinstance(param.data, list) else [param]:
                 if f"'{part.data}'" in message:
                     value, key = part, False
-        problem = value.problem("RG209", f"{node_named(bound.spec.id, bound.type.name)}: {shown(message, 200)}", key=key)
+        who = node_named(bound.spec.id, bound.type.name)
+        problem = value.problem("RG209", f"{who}: {shown(message, 200)}", key=key)
         if problem not in self.problems:
             self.problems.append(problem)
 
