@@ -50,7 +50,7 @@ class Catalog:
                 says, it stands in for an installed copy of the package.
 
         Raises:
-            InputError: a plugin path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
+            InputError: a path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
         """
         from importlib.metadata import entry_points
 
@@ -65,7 +65,8 @@ class Catalog:
         notes = []
         for plugin in named.values():
             try:
-                _add(listed, find.loose(plugin.path, plugin.place, plugin.where))
+                found = find.loose(plugin.path, plugin.place, plugin.where)
+                _add(listed, ((name, replace(one, named=plugin.words)) for name, one in found))
             except InputError as error:
                 if not plugin.where or plugin.path.exists():
                     raise
@@ -148,7 +149,7 @@ class Catalog:
     def _load(self, name: str, found: Sequence[Listed]) -> NodeType:
         listed = found[0]
         if len(found) > 1:
-            plugins = " and ".join(f"'{other.plugin}' ({shown_file(other.file)})" for other in found)
+            plugins = " and ".join(f"'{other.plugin}' ({shown_file(other.file)}{other.named})" for other in found)
             text = f"node type '{name}' comes from {plugins}; rename one"
             raise InputError(Problem("RG493", text, Place(shown_file(listed.file))))
         if listed.module:

@@ -32,6 +32,11 @@ class Named:
     place: Place | None = None
     where: str = ""
 
+    @property
+    def words(self) -> str:
+        """Who names it, behind its file."""
+        return self.where or (f", which {self.place.file} names" if self.place is not None else ", given as a plugin")
+
 
 def surroundings() -> Iterator[Named]:
     """What the settings of the project around the current folder name, then what the environment names.

@@ -57,10 +57,14 @@ def node_word(name: str) -> str:
 
 @dataclass(frozen=True)
 class Listed:
-    """A module, or a shader file, that has been seen but not loaded; `module` is empty for a shader file."""
+    """A module, or a shader file, that has been seen but not loaded; `module` is empty for a shader file.
+
+    `named` says in words where its plugin is named by path.
+    """
 
     module: str
     family: str
     file: Path
     shaders: Path
     plugin: str
+    named: str = ""

@@ -235,6 +235,19 @@ def test_two_of_one_name_are_both_named(write: Write) -> None:
     )
 
 
+def test_of_two_of_one_name_it_is_said_who_names_them(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = dict.fromkeys(("a/glow.frag", "b/glow.frag", "c/glow.frag"), EFFECT)
+    folder = write({**files, "rendergraph.toml": 'plugins = ["a"]\n'})
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("RENDERGRAPH_PATH", "b")
+    with pytest.raises(InputError) as caught:
+        Catalog.discover([Path("c")]).get("glow")
+    assert caught.value.problems[0].text == (
+        "node type 'glow' comes from 'a' (a/glow.frag, which rendergraph.toml names) and 'b' (b/glow.frag, which "
+        "RENDERGRAPH_PATH names) and 'c' (c/glow.frag, given as a plugin); rename one"
+    )
+
+
 def test_a_broken_type_hides_no_other(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
     folder = write({"fx/wrong.frag": "uniform mat4 m;", "fx/right.frag": EFFECT})
     assert main(["nodes", "--plugin", str(folder / "fx"), "--json"]) == 3
