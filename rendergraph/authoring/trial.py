@@ -261,7 +261,9 @@ class Trial:
             return replace(problem, text=text, place=self.port_place(found[1]), line_text="")
         if problem.place is not None and not Path(problem.place.file).resolve().is_relative_to(self.folder.resolve()):
             return problem
-        place = line_through(error, self.type.file) if error else Place(self.shown)
+        if error is None:
+            return replace(problem, place=None, line_text="")
+        place = line_through(error, self.type.file)
         found = re.search(rf"{re.escape(self.shown)}:(\d+): ", problem.text)
         if found:  # a step's own line stands in the text, and once is enough
             place = Place(self.shown, int(found[1]), 1)

@@ -36,9 +36,7 @@ def extensions(
     return Extensions(lambda: _sources(named, installed, without))
 
 
-def _sources(
-    folders: Iterable[tuple[str, Path]], installed: bool, without: Collection[str]
-) -> Iterator[Source]:
+def _sources(folders: Iterable[tuple[str, Path]], installed: bool, without: Collection[str]) -> Iterator[Source]:
     from importlib.metadata import entry_points
 
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.value) if installed else ():
