@@ -72,6 +72,24 @@ def test_a_graph_of_typed_nodes(toy_catalog: Catalog) -> None:
         graph.dag.add_node("other")
 
 
+def test_a_function_where_a_texture_is_due_names_textures(toy_catalog: Catalog) -> None:
+    text = FORWARD.replace("radiance: light.radiance}}", "radiance: shadows.lookup}}")
+    (problem,) = problems(text, toy_catalog)
+    assert problem.startswith("RG201 'display.radiance' takes a texture2d, but 'shadows.lookup'")
+    assert problem.endswith("is a function; 'light.radiance' would fit")
+
+
+def test_a_node_that_a_file_takes_away_is_named_with_the_line_that_does(toy_catalog: Catalog, tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text(FORWARD)
+    (tmp_path / "mine.yaml").write_text("extends: ./base.yaml\nnodes:\n  prepass: null\n")
+    with pytest.raises(InputError) as caught:
+        link(resolve(tmp_path / "mine.yaml", catalog=toy_catalog), toy_catalog, (SUN,))
+    assert {problem.code for problem in caught.value.problems} == {"RG109"}
+    for problem in caught.value.problems:
+        assert "there is no node 'prepass', " in problem.text
+        assert "mine.yaml:3 removes it; link to another node here, or to null" in problem.text
+
+
 def test_an_image_that_is_light_is_warned_about(toy_catalog: Catalog) -> None:
     assert linked(FORWARD, toy_catalog).warnings == ()
     (warning,) = linked(FORWARD.replace("image: display.color", "image: light.radiance"), toy_catalog).warnings

@@ -239,8 +239,7 @@ class _Linker:
             text = f"'{bound.spec.id}.{group}' is a group, it takes a node's id and no port"
             self._say(value.problem("RG113", text))
         elif not names.is_known(scope, node):
-            text = f"there is no node '{node}'{suggestion(node, names.nodes_of(scope))}"
-            self._say(value.problem("RG109", text))
+            self._say(names.no_node(scope, node, value))
         else:
             offered = names.outputs_of(scope, node)
             lacking = []

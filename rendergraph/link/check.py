@@ -111,7 +111,25 @@ class Checker:
         self, bound: Bound, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
     ) -> None:  # fmt: skip
         text = f"'{bound.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
-        self.problems.append(link.value.problem(code, text + (self._neighbour(port, link) or self._converters(hint))))
+        way = self._neighbour(port, link) or self._converters(hint)
+        if not way and code == "RG201":
+            way = self._elsewhere(bound, port)
+        self.problems.append(link.value.problem(code, text + way))
+
+    def _elsewhere(self, bound: Bound, port: Port) -> str:
+        """Ports of other nodes that would fit."""
+        if not isinstance(port, Input) or isinstance(port.semantic, Signature):
+            return ""
+        fit = [
+            f"'{node}.{name}'"
+            for node, other in self.nodes.items()
+            for name, made in other.type.cls.outputs().items()
+            if other is not bound
+            and (info := self.infer.info(Endpoint(node, name))) is not None
+            and kind_of(made, info) == port.kind
+            and _means(port, info.semantic)
+        ]
+        return f"; {' or '.join(fit[:3])} would fit" if fit else ""
 
     def _neighbour(self, port: Port, link: Link) -> str:
         """Another port of the same node that would fit."""

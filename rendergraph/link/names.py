@@ -125,6 +125,13 @@ class Names:
         """Whether a scope has a node or sub-pipeline of that name."""
         return f"{scope}{name}" in self.spec.nodes or f"{scope}{name}/" in self.spec.scopes
 
+    def no_node(self, scope: str, name: str, value: Value) -> Problem:
+        """What is said of a link to nobody: who took the node away, or who else may be meant."""
+        hint = suggestion(name, self.nodes_of(scope))
+        if not scope and (removed := self.spec.removed.get(name)) is not None:
+            hint = f", {line_of(removed.key_place, value.place)} removes it; link to another node here, or to null"
+        return value.problem("RG109", f"there is no node '{name}'{hint}")
+
     def nodes_of(self, scope: str) -> list[str]:
         """Names that can be linked to in a scope, not all of very many: the nearest is searched among them."""
         names = [node.id for node in self.spec.nodes.values() if node.scope == scope]
@@ -150,8 +157,7 @@ class Names:
         if node is None and (("nodes", name) in self.spec.dropped or not self.spec.nodes):
             raise Wrong(None)
         if node is None:
-            text = f"there is no node '{name}'{suggestion(name, self.nodes_of(scope))}"
-            raise Wrong(value.problem("RG109", text))
+            raise Wrong(self.no_node(scope, name, value))
         node_type = self.types.get(node.id)
         if node_type is None:
             raise Wrong(None)

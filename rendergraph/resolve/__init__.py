@@ -92,6 +92,7 @@ def resolve(
         notes=(*files.notes, *files.plugins.notes),
         problems=tuple(files.problems),
         dropped=frozenset(files.dropped),
+        removed=files.removed,
         catalog=files.catalog,
         missing=tuple(files.plugins.missing),
         unrun=files.plugins.unrun,

@@ -29,6 +29,7 @@ class Files:
         self.problems: list[Problem] = []
         self.notes: list[Problem] = []
         self.dropped: set[tuple[str, ...]] = set()
+        self.removed: dict[str, Value] = {}
         self._roots: dict[Source, Roots] = {}
         self._open: list[Path] = []
         self._trees: dict[Path, Value | None] = {}
@@ -63,7 +64,10 @@ class Files:
         self.bring(document.root)
 
     def bring(self, tree: Value) -> None:
-        """Add the node types that a file's `plugins` name."""
+        """Add the node types that a file's `plugins` name, and remember what nodes it takes away."""
+        nodes = tree.get("nodes")
+        if nodes is not None and isinstance(nodes.data, dict):
+            self.removed |= {name: node for name, node in nodes.data.items() if node.data is None}
         named = tree.get("plugins")
         for value in named.data if named is not None and isinstance(named.data, list) else ():
             self.plugins.add(value, self.beside(value), self.roots_of(value))

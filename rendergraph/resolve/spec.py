@@ -92,6 +92,7 @@ class PipelineSpec:
         notes: warnings: what was dropped, what is unused.
         problems: mistakes found so far. `link` raises them together with its own, so that a user sees all at once.
         dropped: paths of what was left out because of them.
+        removed: the `null` of each node that a file takes away from what it extends.
         catalog: the node types, with the shader files that the pipeline brings along.
         missing: packages that it needs and that are not installed.
         unrun: types whose Python stands in a folder that only a pipeline file names, and what `--plugin` takes for it.
@@ -111,6 +112,7 @@ class PipelineSpec:
     notes: tuple[Problem, ...] = ()
     problems: tuple[Problem, ...] = ()
     dropped: frozenset[tuple[str, ...]] = frozenset()
+    removed: Mapping[str, Value] = field(default_factory=dict, repr=False)
     catalog: Catalog | None = field(default=None, repr=False)
     missing: tuple[str, ...] = ()
     unrun: Mapping[str, str] = field(default_factory=dict)
