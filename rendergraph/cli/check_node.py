@@ -34,7 +34,7 @@ def command(
     \b
     Examples:
       rendergraph check-node vignette.py
-      rendergraph check-node vignette.frag --json
+      rendergraph check-node grain.frag --json
     """
     from rendergraph.authoring import Limits, check_node
 

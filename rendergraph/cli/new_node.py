@@ -23,7 +23,7 @@ def command(name: str, kind: str, package: bool, as_json: bool) -> None:
     \b
     Examples:
       rendergraph new-node vignette
-      rendergraph new-node vignette --kind shader-only
+      rendergraph new-node grain --kind shader-only
       rendergraph new-node histogram --kind compute --package
     """
     from rendergraph.authoring import new_node
