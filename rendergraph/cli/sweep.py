@@ -103,7 +103,7 @@ def command(
     chart = out / "quality.svg"
     options.write(quality_svg(found.comparison), chart)
     if found.timed:
-        say(f"{amount(found.timed, 'run')} measured again: fewer than {amount(frames or 5, 'frame')} had been")
+        say(f"{amount(found.timed, 'run')} drawn before, measured now over {amount(frames or 5, 'frame')}")
     if found.redrawn:
         say(f"{amount(found.redrawn, 'run')} drawn again: what they are drawn from has changed, or their pictures have")
     if found.torn:

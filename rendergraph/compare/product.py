@@ -14,7 +14,7 @@ from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import Progress, light_error, opened
 from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, unique_names
-from rendergraph.compare.runs import NO_TIMES, Run, found_again, keep, key_of, restored, settle
+from rendergraph.compare.runs import NO_TIMES, RUN, Run, found_again, keep, key_of, restored, settle
 from rendergraph.compare.sources import file_digest
 from rendergraph.compare.study import begin, open_folder, study_of
 from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw, measure
@@ -160,7 +160,7 @@ def sweep(
             work.device = record["device"]
     resumed = sum(map(work.is_done, range(len(runs))))
     timed = len(work.results) - resumed
-    redrawn = sum(number not in work.results and run.folder.exists() for number, run in enumerate(runs))
+    redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))
     if work.missing or other:
         with opened(session, device) as session:
             begin(out, study)
