@@ -34,7 +34,7 @@ def study_of(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
         "size": f"{width}x{height}",
         "frame": frame,
         "reference": reference,
-        _VALUES: spec.to_yaml(origins=False),
+        _VALUES: json.loads(json.dumps(spec.tree.plain(), default=str)),
     }
 
 
@@ -54,7 +54,9 @@ def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[L
     before = _study_in(out)
     if before is not None and (differing := [key for key in study if before.get(key) != study[key]]):
         named = [f"{key} {before.get(key)}, not {study[key]}" for key in differing if key != _VALUES]
-        what = "; ".join(named) or "other values (-s, -p or the pipeline's file)"
+        what = (
+            "; ".join(named) or f"other values (-s, -p or the file): {_first_change(before[_VALUES], study[_VALUES])}"
+        )
         raise _refused(out, f"it has results of another study: {what}; name another folder: -o {out}-2")
     records, torn = ledger.read()
     return ledger, {record["key"]: record for record in records if "key" in record}, torn
@@ -73,12 +75,22 @@ def kept_runs(out: Path) -> int:
     return sum(1 for _ in out.glob(f"*/{RUN}"))
 
 
+def _first_change(old: Any, new: Any, path: str = "") -> str:
+    """The first value that two resolved files do not share, as one has it and as the other."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [*old, *(key for key in new if key not in old)]:
+            if old.get(key) != new.get(key):
+                return _first_change(old.get(key), new.get(key), f"{path}.{key}" if path else str(key))
+    told = [json.dumps(value, ensure_ascii=False) if value is not None else "none" for value in (old, new)]
+    return f"{path} {told[0]}, not {told[1]}"
+
+
 def _study_in(out: Path) -> dict[str, Any] | None:
     try:
         found = json.loads((out / STUDY).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) else None
+    return found if isinstance(found, dict) and _VALUES in found else None
 
 
 def _refused(out: Path, text: str) -> InputError:
