@@ -14,7 +14,7 @@ from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recorder, now
 from rendergraph.expand.rules import cleared_to, filter_of, view_table
-from rendergraph.expand.targets import feedback, misfit, no_image, overlap, parts_written, target_size
+from rendergraph.expand.targets import feedback, misfit, no_image, onto_nothing, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -258,6 +258,9 @@ class Numbering:
             text = feedback(request, write, reads)
             if text is not None:
                 raise self._refused(recorder, request, "RG422", text)
+        text = onto_nothing(request, writes)
+        if text is not None:
+            raise self._refused(recorder, request, "RG429", text)
         if len(writes) > 1 or any(read.use == "depth_test" for read in reads):
             text = misfit(self.resources, writes, reads)
             if text is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from rendergraph.declare import Part
-from rendergraph.steps import Read, Request, Resource, Write
+from rendergraph.steps import Read, Request, Resource, State, Write
 from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
 
 
@@ -73,6 +73,23 @@ def misfit(resources: Mapping[str, Resource], writes: Sequence[Write], reads: It
     depths = list(dict.fromkeys(depths))
     if len(depths) > 1:
         return f"'{depths[0]}' and '{depths[1]}' are both depth; one step has one"
+    return None
+
+
+def onto_nothing(request: Request, writes: Iterable[Write]) -> str | None:
+    """Which target a draw blends onto, or tests against, before anything is in it."""
+    state = request.options.get("state")
+    if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):
+        return None
+    colors = [write for write in writes if write.use == "color"]
+    blends = state.blend if isinstance(state.blend, tuple) else (state.blend,) * len(colors)
+    for write, blend in zip(colors, blends, strict=False):
+        if write.load == "discard" and blend is not None and blend.takes_destination:
+            return f"it blends onto '{write.resource}', which holds nothing yet; declare it with `clear=`"
+    tested = request.kind != "fullscreen" if state.depth_test is None else state.depth_test
+    for write in writes:
+        if write.use == "depth" and write.load == "discard" and tested and state.depth_func != "always":
+            return f"it tests depth against '{write.resource}', which holds nothing yet; declare it with `clear=1.0`"
     return None
 
 

@@ -54,6 +54,17 @@ class Blend:
                 _one_of("Blend", name, value, BlendFactor)
         _one_of("Blend", "op", self.op, BlendOp)
 
+    @property
+    def takes_destination(self) -> bool:
+        """Whether what is in the target shows in what comes out."""
+        factors = [name or "" for name in (self.src, self.dst, self.src_alpha, self.dst_alpha)]
+        dst_alpha = self.dst if self.dst_alpha is None else self.dst_alpha
+        return (
+            (self.dst, dst_alpha) != ("zero", "zero")
+            or self.op in ("min", "max")
+            or any("dst" in name for name in factors)
+        )
+
 
 ADD = Blend("one", "one")
 ALPHA = Blend("src_alpha", "one_minus_src_alpha", "one", "one_minus_src_alpha")

@@ -11,6 +11,7 @@ source = Input(AnyTexel, optional=True, doc="Source.")
 color = Output(Radiance, doc="Colour.")
 small = Internal(Radiance, size=0.5)
 chain = Internal(Radiance, mips=0)
+nearest = Internal(Depth, format="depth32f")
 numbers = Internal(kind="buffer", bytes=64)
 given = Input(AnyTexel, kind="buffer", optional=True, doc="Numbers of another.")
 views = Views(count=2, doc="Two views.")
@@ -99,7 +100,7 @@ CALLS = {
     'steps.geometry("wrong.frag", order="back to front")':
         "RG423 order is 'back to front'; did you mean 'back_to_front'?",
     'steps.geometry("wrong.frag", per_light=-1)': "RG423 per_light is -1, not a whole number from 0",
-    'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; there is chain, color, given, numbers, small, source, views",
+    'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; there is chain, color, given, nearest, numbers, small, source, views",
     'steps.geometry("wrong.frag", view=self.color)':
         "RG423 view is the Output 'color'; it is a Views port or an input that carries views",
     'steps.geometry("wrong.frag", view=self.views, view_index=2)':
@@ -174,6 +175,10 @@ CALLS = {
     'steps.fullscreen("wrong.frag", source=self.color, out=self.color)':
         "RG422 it samples 'a.color' in the step that writes it; blend, sample another mip or layer, or go through an "
         "`Internal`",
+    'steps.fullscreen("wrong.frag", out=self.color, state=State(blend=(Blend("dst_color", "zero"),)))':
+        "RG429 it blends onto 'a.color', which holds nothing yet; declare it with `clear=`",
+    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))':
+        "RG429 it tests depth against 'a.nearest', which holds nothing yet; declare it with `clear=1.0`",
     # Python's own
     'steps.fulscreen("wrong.frag")': "RG420 AttributeError: 'Steps' object has no attribute 'fulscreen'; did "
         "you mean 'fullscreen'?",

@@ -12,7 +12,7 @@ import yaml
 
 import rendergraph as rg
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Depth, Frame, Input, Internal, Node, Output, Radiance, Steps, Views
+from rendergraph.api import ADD, Depth, Frame, Input, Internal, Node, Output, Radiance, State, Steps, Views
 from rendergraph.errors import InputError, RendergraphError
 from rendergraph.resources import folder
 
@@ -120,6 +120,15 @@ class Stores(Node):
         steps.fullscreen("a.frag", depth=self.depth, out=self.color)
 
 
+class Adds(Node):
+    """Adds to nothing."""
+
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("a.frag", out=self.color, state=State(blend=ADD))
+
+
 class Early(Node):
     """Reads before it writes."""
 
@@ -146,7 +155,8 @@ class Unfilled(Node):
     ("code", "node"),
     [
         ("RG420", Broken), ("RG421", Backwards), ("RG422", Feedback), ("RG423", Quoted), ("RG424", Borrower),
-        ("RG425", Both), ("RG426", Stores), ("RG433", Viewless), ("RG601", Early), ("RG603", Unfilled),
+        ("RG425", Both), ("RG426", Stores), ("RG429", Adds), ("RG433", Viewless), ("RG601", Early),
+        ("RG603", Unfilled),
     ],
 )  # fmt: skip
 def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
