@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 import rendergraph as rg
-from rendergraph.api import Any as AnyTexel
 from rendergraph.api import ADD, Depth, Frame, Input, Internal, Node, Output, Radiance, State, Steps, Views
+from rendergraph.api import Any as AnyTexel
 from rendergraph.errors import InputError, RendergraphError
 from rendergraph.resources import folder
 
