@@ -10,8 +10,8 @@ out float rough;
 
 const vec2 GOLDEN = vec2(-0.73736888, 0.67549029);  // cosine and sine of the golden angle: no two arms in line
 
-// A large disc hides less than its parts would. All are as large as if there were this many of them, so that how dark it
-// is does not depend on how many samples are taken.
+// A large disc hides less than its parts would. All are as large as if there were this many of them, so that how dark
+// it is does not depend on how many samples are taken.
 const float DISCS = 512.0;
 
 // Even over any few neighbours, without a period that shows (J. Jimenez, "Next Generation Post Processing in Call of

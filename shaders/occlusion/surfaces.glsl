@@ -2,8 +2,8 @@
 // view axis in metres, 0 where nothing is. The picture may be smaller than the screen; each of its texels then holds
 // the surface of one of the screen's, not a mean of several.
 
-// The texel of a picture of size `screen` that a texel of a picture of size `small` stands for; without REDUCED they are
-// of one size, and whole numbers need not be divided.
+// The texel of a picture of size `screen` that a texel of a picture of size `small` stands for; without REDUCED they
+// are of one size, and whole numbers need not be divided.
 ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
 #ifdef REDUCED
     return ((2 * texel + 1) * screen) / (2 * small);

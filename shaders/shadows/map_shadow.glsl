@@ -22,12 +22,14 @@ uniform float normal_offset;  // factor on what the slope asks for
 
 // Where a moved point lies in one layer, in clip space; `half_sides` are half the map's sides, in metres at w = 1.
 #ifdef MAP_PARALLEL
-// The light lies along the view's z axis: what a normal has across it is its lean, and the point is moved in clip space.
+// The light lies along the view's z axis: what a normal has across it is its lean, and the point is moved in clip
+// space.
 vec4 moved_in_layer(View view, vec3 position, vec3 normal, vec2 half_sides, float texel) {
     mat3 turned = mat3(view.view_projection);
     vec3 along = turned * normal;
     float lean = dot(abs(along.xy), half_sides);
-    vec3 clip = turned * position + view.view_projection[3].xyz + along * (texel * normal_offset * MAP_HALF_WIDTH * lean);
+    float offset = texel * normal_offset * MAP_HALF_WIDTH * lean;
+    vec3 clip = turned * position + view.view_projection[3].xyz + along * offset;
     clip.z += texel * bias * view.projection[2][2];
     return vec4(clip, 1.0);
 }
