@@ -5,11 +5,11 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
 from rendergraph.catalog import NodeType
+from rendergraph.declare import raised_at
 from rendergraph.errors import Place, shown_file
 
 
@@ -45,9 +45,5 @@ def causes(error: BaseException) -> Iterator[BaseException]:
 
 def line_through(error: BaseException, file: Path) -> Place:
     """The innermost line of a file that an error, or what caused it, came through."""
-    line = 0
-    for cause in causes(error):
-        for frame in traceback.extract_tb(cause.__traceback__):
-            if frame.filename == str(file):
-                line = frame.lineno or line
-    return Place(shown_file(file), line, 1 if line else 0)
+    found = [place for cause in causes(error) if (place := raised_at(cause, file)) is not None]
+    return found[-1] if found else Place(shown_file(file))

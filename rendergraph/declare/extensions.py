@@ -231,7 +231,7 @@ def _absolute(choice: Choice | str | Path, folder: Path) -> Choice:
 
 
 def raised_at(error: BaseException, folder: Path) -> Place | None:
-    """The innermost line in a folder that an exception came through, or that a syntax error is in."""
+    """The innermost line in a folder, or in one file, that an exception came through, or that a syntax error is in."""
     if isinstance(error, SyntaxError) and error.filename and Path(error.filename).is_relative_to(folder):
         return Place(shown_file(error.filename), error.lineno or 1, 1)
     for frame in reversed(traceback.extract_tb(error.__traceback__)):

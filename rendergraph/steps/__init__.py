@@ -6,9 +6,10 @@ A node's `record` fills a `Steps` without GL, so what a pass does can be read, t
 
 from __future__ import annotations
 
+from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Frame, FrameScene, ViewMatrices
 from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, UniformValue, Write
-from rendergraph.steps.recorder import Recorder, Request, Steps, Target, define_text
+from rendergraph.steps.recorder import Recorder, Request, Steps, Target
 from rendergraph.steps.state import (
     ADD,
     ALPHA,

@@ -127,15 +127,18 @@ def macro(name: str, value: object) -> str:
     """
     if not isinstance(name, str) or not _MACRO.match(name):
         raise Misuse(f"defines has the name {shown(name)}, which cannot be a macro's")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise Misuse(f"defines gives {name} the value {value}, which GLSL cannot write")
+    if not isinstance(value, int | float | str) or "\n" in str(value):
+        raise Misuse(f"defines gives {name} the value {shown(value)}; a macro is a number, True, False or text")
+    return define_text(value)
+
+
+def define_text(value: object) -> str:
+    """A Python value as macro text."""
     if isinstance(value, bool):
         return "1" if value else "0"
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise Misuse(f"defines gives {name} the value {value}, which GLSL cannot write")
-        return repr(value)
-    if isinstance(value, int | str) and "\n" not in str(value):
-        return str(value)
-    raise Misuse(f"defines gives {name} the value {shown(value)}; a macro is a number, True, False or text")
+    return repr(value) if isinstance(value, float) else str(value)
 
 
 def shader_files(files: Mapping[str, object], required: str) -> tuple[tuple[str, str], ...]:

@@ -374,10 +374,3 @@ class Steps:
 
 def _texels(desc: TextureDesc, part: Part) -> tuple[int, int, int]:
     return *desc.mip_size(part.mip or 0), 1 if part.layer is not None else desc.layers
-
-
-def define_text(value: object) -> str:
-    """A Python value as macro text."""
-    if isinstance(value, bool):
-        return "1" if value else "0"
-    return repr(value) if isinstance(value, float) else str(value)
