@@ -25,10 +25,18 @@ version = release = rendergraph.__version__
 extensions = ["myst_parser"]
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build", "_generate", "examples", "reference/generated/scene-keys.md",
-                    "reference/generated/pipeline-keys.md", "reference/generated/shipped-scenes.md",
-                    "reference/generated/limits.md", "reference/generated/semantics-table.md",
-                    "reference/generated/functions-table.md", "reference/generated/formats-table.md"]  # fmt: skip
+exclude_patterns = [
+    "_build",
+    "_generate",
+    "examples",
+    "reference/generated/scene-keys.md",
+    "reference/generated/pipeline-keys.md",
+    "reference/generated/shipped-scenes.md",
+    "reference/generated/limits.md",
+    "reference/generated/semantics-table.md",
+    "reference/generated/functions-table.md",
+    "reference/generated/formats-table.md",
+]
 suppress_warnings = ["misc.highlighting_failure"]  # GLSL with our own directives, and wrong text on error pages
 
 html_theme = "furo"

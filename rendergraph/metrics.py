@@ -200,7 +200,9 @@ def description() -> dict[str, Any]:
         "psnr": {"peak": 1.0},
         "ssim": {"window": _WINDOW, "sigma": _SIGMA, "k1": 0.01, "k2": 0.03, "channels": "mean of R, G, B"},
         "flip": {
-            "library": f"OpenImageIO {version('OpenImageIO')}", "pixels_per_degree": PIXELS_PER_DEGREE,
-            "hdr_max_luminance": 0.0, "mean": "over pixels",
+            "library": f"OpenImageIO {version('OpenImageIO')}",
+            "pixels_per_degree": PIXELS_PER_DEGREE,
+            "hdr_max_luminance": 0.0,
+            "mean": "over pixels",
         },
-    }  # fmt: skip
+    }

@@ -21,8 +21,17 @@ NODE_KEYS = ("type", "inputs", "params")
 PARAMETER_KEYS = ("default", "min", "max", "doc")
 INPUT_KEYS = ("semantic", "optional", "doc")
 TOP_KEYS = (
-    "rendergraph", "description", "extends", "size", "scene", "plugins", "parameters", "inputs", "nodes", "outputs",
-)  # fmt: skip
+    "rendergraph",
+    "description",
+    "extends",
+    "size",
+    "scene",
+    "plugins",
+    "parameters",
+    "inputs",
+    "nodes",
+    "outputs",
+)
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")
 """Node ids, output names, parameter names; long ones make messages and the search for the nearest name long."""

@@ -47,36 +47,48 @@ def schema(catalog: Catalog) -> Schema:
         "rendergraph": {"const": VERSION, "description": "Version of the format."},
         "description": {"type": "string", "description": "What the pipeline shows, in a line."},
         "extends": _one_of(shipped_pipelines(), "A shipped pipeline or a file; the rest is a merge patch on it."),
-        "size": {"type": "array", "items": [_SIDE, _SIDE], "minItems": 2, "maxItems": 2,
-                 "description": "Width and height in pixels."},
+        "size": {
+            "type": "array",
+            "items": [_SIDE, _SIDE],
+            "minItems": 2,
+            "maxItems": 2,
+            "description": "Width and height in pixels.",
+        },
         "scene": _one_of(shipped_scenes(), "A shipped scene, a scene file, .obj, .gltf or .glb."),
         "plugins": {
-            "type": "array", "items": {"type": "string"},
+            "type": "array",
+            "items": {"type": "string"},
             "description": "Folders of shader nodes, and installed packages that the pipeline needs.",
         },
         "parameters": _mapping({"$ref": "#/definitions/parameter"}, "Knobs of the whole pipeline, used as $name."),
         "inputs": _mapping({"$ref": "#/definitions/input"}, "What the file takes as the type of a node."),
         "nodes": _mapping({"$ref": "#/definitions/node"}, "Nodes by id."),
         "outputs": _mapping(_LINK, "Output name to `node.port`."),
-    }  # fmt: skip
+    }
     found = {
         "$schema": "http://json-schema.org/draft-07/schema#",
         **_object(TOP_KEYS, properties),
         "definitions": {
-            "parameter": _object(PARAMETER_KEYS, {
-                "default": {"description": "Its value where nothing sets it."},
-                "min": {"type": "number", "description": "Least legal value."},
-                "max": {"type": "number", "description": "Greatest legal value."},
-                "doc": {"type": "string", "description": "What it does, in a line."},
-            }),
-            "input": _object(INPUT_KEYS, {
-                "semantic": {"type": "string", "description": "What its texels mean, such as `radiance`."},
-                "optional": {"type": "boolean", "description": "Whether it may stay unconnected."},
-                "doc": {"type": "string", "description": "What it is for, in a line."},
-            }),
+            "parameter": _object(
+                PARAMETER_KEYS,
+                {
+                    "default": {"description": "Its value where nothing sets it."},
+                    "min": {"type": "number", "description": "Least legal value."},
+                    "max": {"type": "number", "description": "Greatest legal value."},
+                    "doc": {"type": "string", "description": "What it does, in a line."},
+                },
+            ),
+            "input": _object(
+                INPUT_KEYS,
+                {
+                    "semantic": {"type": "string", "description": "What its texels mean, such as `radiance`."},
+                    "optional": {"type": "boolean", "description": "Whether it may stay unconnected."},
+                    "doc": {"type": "string", "description": "What it is for, in a line."},
+                },
+            ),
             "node": _node(types, catalog.extensions),
         },
-    }  # fmt: skip
+    }
     marked: Schema = _as_markdown(found)
     return marked
 
@@ -124,11 +136,20 @@ def _node(types: Mapping[str, type[Node] | None], extensions: Extensions) -> Sch
         {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's; a shader."},
         {"$ref": "#"},
     ]
-    found = _object(NODE_KEYS, {
-        "type": {"anyOf": [*known, *elsewhere, {"type": "null"}], "description": "A node type, or a pipeline file."},
-        "inputs": {"type": "object", "description": "Input to `node.port`, to a node's id, or to null for nothing."},
-        "params": {"type": "object", "description": "Parameter to value; null is its default."},
-    })  # fmt: skip
+    found = _object(
+        NODE_KEYS,
+        {
+            "type": {
+                "anyOf": [*known, *elsewhere, {"type": "null"}],
+                "description": "A node type, or a pipeline file.",
+            },
+            "inputs": {
+                "type": "object",
+                "description": "Input to `node.port`, to a node's id, or to null for nothing.",
+            },
+            "params": {"type": "object", "description": "Parameter to value; null is its default."},
+        },
+    )
     found["allOf"] = [
         {
             "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
@@ -216,9 +237,12 @@ def _param(found: Schema) -> Schema:
     if kind in _WORDS:  # said without alternatives: editors then name the limit that is broken
         message = f"This is {_WORDS[kind]}, or $name for a parameter of the pipeline."
         return {
-            **about, **own, "type": [kind, "string", "null"], "pattern": _REFERENCE["pattern"],
+            **about,
+            **own,
+            "type": [kind, "string", "null"],
+            "pattern": _REFERENCE["pattern"],
             "patternErrorMessage": message,
-        }  # fmt: skip
+        }
     alternatives = own.pop("anyOf", None)
     if alternatives:  # limits beside alternatives hold for those that are numbers
         limits = {key: own.pop(key) for key in ("minimum", "maximum") if key in own}

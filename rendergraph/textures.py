@@ -119,9 +119,23 @@ View = Semantic("view", "Matrices and size that geometry is drawn with.")
 SceneRef = Semantic("scene", "The scene that is drawn.")
 
 SEMANTICS: tuple[Semantic, ...] = (
-    Radiance, DisplayColor, Albedo, Emissive, Normal, Material, Depth, LinearDepth, ShadowMap, Visibility, Occlusion,
-    Luminance, IrradianceSH, Any, View, SceneRef,
-)  # fmt: skip
+    Radiance,
+    DisplayColor,
+    Albedo,
+    Emissive,
+    Normal,
+    Material,
+    Depth,
+    LinearDepth,
+    ShadowMap,
+    Visibility,
+    Occlusion,
+    Luminance,
+    IrradianceSH,
+    Any,
+    View,
+    SceneRef,
+)
 
 
 @dataclass(frozen=True)

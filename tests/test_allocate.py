@@ -28,12 +28,14 @@ def chain(*descs: TextureDesc | BufferDesc, roles: dict[int, str] | None = None)
     }
     steps = tuple(
         Step(
-            f"n{n}", 0, "fullscreen",
+            f"n{n}",
+            0,
+            "fullscreen",
             reads=(Read("source", f"n{n - 1}.x", 1),) if n else (),
             writes=(Write("x", f"n{n}.x", 1),),
         )
         for n in range(len(descs))
-    )  # fmt: skip
+    )
     last = f"n{len(descs) - 1}.x"
     whole = {last, *(id for id, resource in resources.items() if resource.role == "history")}
     return Schedule(steps, resources, {"image": last}, {}, 0, "n1", 0, True, whole_frame=frozenset(whole))
@@ -138,9 +140,15 @@ def test_reasons_of_the_lonely() -> None:
 def test_figures_are_the_schedule_s() -> None:
     plan = allocate(replace(chain(RGBA8, RGBA8), lower_bound_bytes=7, proven=False))
     assert plan.memory.as_json() == {
-        "no_reuse_bytes": 2 * UNIT, "allocated_bytes": 2 * UNIT, "lower_bound_bytes": 7, "peak_node": "n1",
-        "proven": False, "tier": "descriptor", "next_tier": None, "next_tier_bytes": None,
-    }  # fmt: skip
+        "no_reuse_bytes": 2 * UNIT,
+        "allocated_bytes": 2 * UNIT,
+        "lower_bound_bytes": 7,
+        "peak_node": "n1",
+        "proven": False,
+        "tier": "descriptor",
+        "next_tier": None,
+        "next_tier_bytes": None,
+    }
 
 
 def test_an_empty_frame_needs_nothing() -> None:

@@ -107,12 +107,16 @@ def test_two_of_one_name(plugin: Path, tmp_path: Path) -> None:
         ("def f(:\n", r"odd.py:1:1: RG491 node type 'odd' cannot be imported: SyntaxError"),
         ("import nonexistent_module\n", r"odd.py:1:1: RG491 .*ModuleNotFoundError"),
         ("x = 1\n", r"odd.py: RG492 the module of node type 'odd' must define one Node class, it has none"),
-        (GOOD.replace("._shared import SIZE", "math import pi as SIZE") + "\nclass Other(Good):\n    '''More.'''\n",
-         r"odd.py: RG492 .* it has Good, Other"),
-        (GOOD.replace("._shared import SIZE", "math import pi as SIZE").replace("radiance =", "filter ="),
-         r"odd.py:\d+:5: RG490 node type 'odd': 'filter' is reserved"),
+        (
+            GOOD.replace("._shared import SIZE", "math import pi as SIZE") + "\nclass Other(Good):\n    '''More.'''\n",
+            r"odd.py: RG492 .* it has Good, Other",
+        ),
+        (
+            GOOD.replace("._shared import SIZE", "math import pi as SIZE").replace("radiance =", "filter ="),
+            r"odd.py:\d+:5: RG490 node type 'odd': 'filter' is reserved",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_module_is_told_with_its_file(tmp_path: Path, text: str, message: str) -> None:
     folder = tmp_path / "wrong"
     folder.mkdir()

@@ -156,8 +156,10 @@ def test_of_equal_candidates_the_one_with_the_same_readers_is_taken(make: Maker)
     nodes = BASE | {"one": blur, "two": blur}
     shown = OUTPUTS | {"first": "one.blurred", "second": "two.blurred"}
     other = {"one": "uno", "two": "due"}
-    found = diff(make(nodes, shown), make(renamed(nodes, {"one": "due", "two": "uno"}), shown | {
-        "first": "uno.blurred", "second": "due.blurred"}))  # fmt: skip
+    found = diff(
+        make(nodes, shown),
+        make(renamed(nodes, {"one": "due", "two": "uno"}), shown | {"first": "uno.blurred", "second": "due.blurred"}),
+    )
     assert dict(found.renamed) == other
     assert not found.outputs
 

@@ -38,8 +38,11 @@ def _parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 def test_values_and_places() -> None:
     document = parse(TEXT, "f.yaml")
     assert document.value == {
-        "a": 1, "list": ["x", {"deep": "no"}], "again": {"b": 0.001}, "used": {"b": 0.001},
-    }  # fmt: skip
+        "a": 1,
+        "list": ["x", {"deep": "no"}],
+        "again": {"b": 0.001},
+        "used": {"b": 0.001},
+    }
     assert document.place(("a",)) == Place("f.yaml", 1, 4)
     assert document.place(("a",), key=True) == Place("f.yaml", 1, 1)
     assert document.place(("list", 1, "deep")) == Place("f.yaml", 2, 18)
@@ -66,15 +69,42 @@ def test_of_a_long_line_a_message_shows_what_is_around_the_place() -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("null", None), ("~", None), ("Null", None), ("", None), ("true", True), ("False", False), ("yes", "yes"),
-        ("no", "no"), ("on", "on"), ("y", "y"), ("12", 12), ("+12", 12), ("-0", 0), ("010", 10), ("0o14", 12),
-        ("0x1F", 31), ("1_000", "1_000"), ("12:30", "12:30"), ("2001-01-01", "2001-01-01"), ("1e3", 1e3),
+        ("null", None),
+        ("~", None),
+        ("Null", None),
+        ("", None),
+        ("true", True),
+        ("False", False),
+        ("yes", "yes"),
+        ("no", "no"),
+        ("on", "on"),
+        ("y", "y"),
+        ("12", 12),
+        ("+12", 12),
+        ("-0", 0),
+        ("010", 10),
+        ("0o14", 12),
+        ("0x1F", 31),
+        ("1_000", "1_000"),
+        ("12:30", "12:30"),
+        ("2001-01-01", "2001-01-01"),
+        ("1e3", 1e3),
         ("1e-3", 0.001),
-        ("1.0e3", 1000.0), (".5", 0.5), ("5.", 5.0), ("+.5e-1", 0.05), (".inf", math.inf), ("-.INF", -math.inf),
-        ("'1'", "1"), ('"null"', "null"), ("0x", "0x"), ("-", [None]), ("1.2.3", "1.2.3"), ("inf", "inf"),
+        ("1.0e3", 1000.0),
+        (".5", 0.5),
+        ("5.", 5.0),
+        ("+.5e-1", 0.05),
+        (".inf", math.inf),
+        ("-.INF", -math.inf),
+        ("'1'", "1"),
+        ('"null"', "null"),
+        ("0x", "0x"),
+        ("-", [None]),
+        ("1.2.3", "1.2.3"),
+        ("inf", "inf"),
         ("9223372036854775807", 2**63 - 1),
     ],
-)  # fmt: skip
+)
 def test_scalars_are_those_of_yaml_1_2(text: str, value: object) -> None:
     found = parse(f"{text}\n").value
     assert found == value

@@ -23,8 +23,19 @@ LIGHTS = (LightFacts("key", "directional"), LightFacts("lamp", "spot"))
 MODULES = ("document", "settings", "catalog", "read", "resolve", "link")
 PAGES = {path.name[:5]: path for path in sorted(folder("rendergraph.errors").glob("RG*.yaml"))}
 ELSEWHERE = (  # need several files or a GPU
-    "RG018", "RG131", "RG152", "RG204", "RG205", "RG206", "RG493", "RG494", "RG495", "RG496", "RG497", "RG498",
-)  # fmt: skip
+    "RG018",
+    "RG131",
+    "RG152",
+    "RG204",
+    "RG205",
+    "RG206",
+    "RG493",
+    "RG494",
+    "RG495",
+    "RG496",
+    "RG497",
+    "RG498",
+)
 
 
 def own_codes() -> set[str]:

@@ -53,8 +53,11 @@ def test_lines_know_their_file_and_line(shaders: Path) -> None:
         (line, o.file.name, o.line) for line, o in zip(source.lines, source.origins, strict=True) if line and o.file
     ]
     assert rows == [
-        ("int one;", "a.frag", 1), ("int two;", "b.glsl", 1), ("int three;", "b.glsl", 2), ("int four;", "a.frag", 3)
-    ]  # fmt: skip
+        ("int one;", "a.frag", 1),
+        ("int two;", "b.glsl", 1),
+        ("int three;", "b.glsl", 2),
+        ("int four;", "a.frag", 3),
+    ]
 
 
 def test_a_file_is_compiled_once_a_stage(shaders: Path) -> None:
@@ -162,9 +165,29 @@ void main() { made = vec4(color, 1.0); }
 
 def test_declared_names() -> None:
     assert declared(TEXT) == {
-        "SCALE", "TWICE", "map", "color", "tints", "box_block", "low", "high", "named_block", "named", "target", "list",
-        "entries", "Hit", "table", "before", "after", "v_uv", "v_material", "made", "area", "main",
-    }  # fmt: skip
+        "SCALE",
+        "TWICE",
+        "map",
+        "color",
+        "tints",
+        "box_block",
+        "low",
+        "high",
+        "named_block",
+        "named",
+        "target",
+        "list",
+        "entries",
+        "Hit",
+        "table",
+        "before",
+        "after",
+        "v_uv",
+        "v_material",
+        "made",
+        "area",
+        "main",
+    }
 
 
 def test_renaming_leaves_members_alone() -> None:
@@ -186,10 +209,14 @@ def test_calls() -> None:
 @pytest.mark.parametrize(
     ("node", "expected"),
     [
-        ("shadows", "shadows_"), ("glow/blur", "glowZsblur_"), ("a-b", "aZdb_"), ("a_b", "aZub_"), ("Z", "ZZ_"),
+        ("shadows", "shadows_"),
+        ("glow/blur", "glowZsblur_"),
+        ("a-b", "aZdb_"),
+        ("a_b", "aZub_"),
+        ("Z", "ZZ_"),
         ("gl", "Zgl_"),
     ],
-)  # fmt: skip
+)
 def test_prefixes_are_identifiers(node: str, expected: str) -> None:
     assert prefix(node) == expected
 
@@ -268,10 +295,11 @@ def fragment(folder: Path, given: Step) -> StageText:
 @pytest.fixture
 def folder(shaders: Path) -> Path:
     write(
-        shaders, shadow__glsl=SHADOW,
+        shaders,
+        shadow__glsl=SHADOW,
         kernel__glsl="const float WIDTH = 2.0;\nfloat kernel(float s) { return s * WIDTH; }\n",
         light__frag="out vec4 made;\nvoid main() { made = vec4(shadow(3, vec3(0.0), vec3(1.0))); }\n",
-    )  # fmt: skip
+    )
     return shaders
 
 

@@ -14,10 +14,25 @@ from rendergraph.scene.files import Reading, inside
 from rendergraph.scene.model import ImageSource
 
 KINDS = {
-    ".png": "uint8", ".jpg": "uint8", ".exr": "half", ".hdr": "float", ".bmp": "uint8", ".tga": "uint8",
-    ".gif": "uint8", ".tif": "uint8", ".webp": "uint8", ".ppm": "uint8", ".pgm": "uint8", ".pfm": "float",
-    ".dpx": "uint16", ".sgi": "uint8", ".ico": "uint8", ".jp2": "uint8", ".iff": "uint8", ".rla": "uint8",
-}  # fmt: skip
+    ".png": "uint8",
+    ".jpg": "uint8",
+    ".exr": "half",
+    ".hdr": "float",
+    ".bmp": "uint8",
+    ".tga": "uint8",
+    ".gif": "uint8",
+    ".tif": "uint8",
+    ".webp": "uint8",
+    ".ppm": "uint8",
+    ".pgm": "uint8",
+    ".pfm": "float",
+    ".dpx": "uint16",
+    ".sgi": "uint8",
+    ".ico": "uint8",
+    ".jp2": "uint8",
+    ".iff": "uint8",
+    ".rla": "uint8",
+}
 
 
 def verdicts(path: Path) -> tuple[str, str]:
@@ -61,11 +76,17 @@ def test_check_takes_the_kinds_that_are_decoded(suffix: str, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("names", "code"),
     [
-        (("R", "G", "B"), "fine"), (("R", "G", "B", "A"), "fine"), (("Y",), "fine"), (("A", "Y"), "fine"),
-        (("R", "G", "B", "Z"), "fine"), (("N.X", "N.Y", "N.Z"), "RG354"), (("R", "G"), "RG354"),
-        (("Y", "RY", "BY"), "RG354"), (("Z",), "RG354"),
+        (("R", "G", "B"), "fine"),
+        (("R", "G", "B", "A"), "fine"),
+        (("Y",), "fine"),
+        (("A", "Y"), "fine"),
+        (("R", "G", "B", "Z"), "fine"),
+        (("N.X", "N.Y", "N.Z"), "RG354"),
+        (("R", "G"), "RG354"),
+        (("Y", "RY", "BY"), "RG354"),
+        (("Z",), "RG354"),
     ],
-)  # fmt: skip
+)
 def test_check_asks_for_the_channels_that_are_decoded(names: tuple[str, ...], code: str, tmp_path: Path) -> None:
     path = tmp_path / "image.exr"
     assert written(path, len(names), "half", names)

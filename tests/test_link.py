@@ -58,8 +58,9 @@ def test_a_graph_of_typed_nodes(toy_catalog: Catalog) -> None:
     graph = linked(FORWARD, toy_catalog)
     assert [node.id for node in graph.nodes] == ["sun", "prepass", "shadows", "light", "display"]
     assert graph["light"].inputs == {
-        "visibility": (Endpoint("shadows", "visibility"),), "depth": (Endpoint("prepass", "depth"),),
-    }  # fmt: skip
+        "visibility": (Endpoint("shadows", "visibility"),),
+        "depth": (Endpoint("prepass", "depth"),),
+    }
     assert graph["shadows"].inputs["depth"] == (Endpoint("prepass", "depth"),)
     assert graph["light"].node.model_dump()["ambient"] == 1
     assert graph["sun"].type.name == "shadow_map"
@@ -116,8 +117,10 @@ outputs: {radiance: light.radiance}
 
 def test_a_group_takes_a_node_and_an_explicit_port_wins(toy_catalog: Catalog) -> None:
     assert linked(DEFERRED, toy_catalog)["light"].inputs == {
-        "albedo": (Endpoint("b", "blurred"),), "normal": (Endpoint("g", "normal"),), "depth": (Endpoint("g", "depth"),),
-    }  # fmt: skip
+        "albedo": (Endpoint("b", "blurred"),),
+        "normal": (Endpoint("g", "normal"),),
+        "depth": (Endpoint("g", "depth"),),
+    }
 
 
 def test_null_beside_a_group_leaves_one_out(toy_catalog: Catalog) -> None:
@@ -219,9 +222,7 @@ def test_rules_may_ask_what_is_connected_without_asking_for_more(toy_catalog: Ca
         """Asks about an input that comes from its own last frame."""
 
         last = Input(Radiance, size="any", optional=True, doc="Then.")
-        radiance = Output(
-            Radiance, size=lambda node, facts: (4, 4) if facts.connected("last") else (2, 2), doc="Now."
-        )  # fmt: skip
+        radiance = Output(Radiance, size=lambda node, facts: (4, 4) if facts.connected("last") else (2, 2), doc="Now.")
 
     catalog = Catalog.of(Asking)
     text = (
@@ -284,8 +285,9 @@ def test_a_sub_pipeline_is_unfolded(glowing: Path, toy_catalog: Catalog) -> None
     assert graph["other"].inputs == {"radiance": (Endpoint("glow/blur", "blurred", previous=True),)}
     assert graph.outputs["glow"] == Endpoint("glow/blur", "blurred")
     assert graph.aliases == {
-        "glow.radiance": Endpoint("glow/blur", "blurred"), "glow.through": Endpoint("sky", "radiance"),
-    }  # fmt: skip
+        "glow.radiance": Endpoint("glow/blur", "blurred"),
+        "glow.through": Endpoint("sky", "radiance"),
+    }
 
 
 def test_a_resolved_file_links_to_the_same(glowing: Path, toy_catalog: Catalog) -> None:
@@ -338,8 +340,16 @@ outputs: {image: e.color}
 """
     found = problems(text, toy_catalog)
     assert [message[:5] for message in found] == [
-        "RG101", "RG015", "RG002", "RG102", "RG110", "RG104", "RG103", "RG113", "RG109",
-    ]  # fmt: skip
+        "RG101",
+        "RG015",
+        "RG002",
+        "RG102",
+        "RG110",
+        "RG104",
+        "RG103",
+        "RG113",
+        "RG109",
+    ]
 
 
 def test_a_broken_plugin_is_told_once(tmp_path: Path) -> None:

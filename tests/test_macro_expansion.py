@@ -34,22 +34,26 @@ BOMBS = {
     "a doubling call inside itself": "#define D(x) x x\nfloat y = " + "D(" * 40 + "a" + ")" * 40 + ";",
     "over several lines": "#define D(x) x x\nfloat y = " + "D(\n" * 40 + "a" + ")" * 40 + ";",
     "a call that is handed on": "#define D(x) x x\n#define AP(f, x) f(x)\nfloat y = "
-    + "AP(D, " * 40 + "a" + ")" * 40 + ";",
-    "all of each other": "\n".join(
-        f"#define M{i} " + " ".join(f"M{j}" for j in range(12) if j != i) for i in range(12)
-    ) + "\nM0;",
+    + "AP(D, " * 40
+    + "a"
+    + ")" * 40
+    + ";",
+    "all of each other": "\n".join(f"#define M{i} " + " ".join(f"M{j}" for j in range(12) if j != i) for i in range(12))
+    + "\nM0;",
     "in a condition": f"{chain(40, 'A{0} + A{0}')}\n#if A40 > 3\n#endif",
     "only where the driver has an extension": f"{chain(40)}\n#define B 1\n#ifdef GL_EXT_some\n#undef B\n"
     "#define B A40\n#endif\nfloat y = B;",
     "only where it has not": f"{chain(40)}\n#if !defined(GL_EXT_some) && 2 * 3 == 0x6\nfloat y = A40;\n#endif",
     "continued lines": chain(40).replace("#define A40 ", "#define A40 \\\n") + "\nfloat y \\\n = A40;",
     "calls that do not end": "#define D(x) x\n" + "D(" * 100_000,
-    "names pasted together": chain(40).replace("#define A40", "#define A4") + "\n#define P(a, b) a##b\nfloat y = P(A, 4);",
+    "names pasted together": chain(40).replace("#define A40", "#define A4")
+    + "\n#define P(a, b) a##b\nfloat y = P(A, 4);",
     "a word that doubles": "#define D(a) a##a\n#define E(a) D(a)\n" + "E(" * 22 + "x" + ")" * 22 + ";",
     "one after the other, each hidden in all that follow": chain(3000, "A{0}") + "\nfloat y = A3000;",
-    "the same around words of others": "#define F(x) x\n" + chain(900, "A{0}").replace("A0 x", "A0 " + "F(y) " * 90_000)
+    "the same around words of others": "#define F(x) x\n"
+    + chain(900, "A{0}").replace("A0 x", "A0 " + "F(y) " * 90_000)
     + "\nA900",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BOMBS)
@@ -97,10 +101,20 @@ def test_many_names_of_the_driver_are_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("1 + 2 * 3 == 7 && ! 0", 1), ("0x10 - 020", 0), ("( 1 < 2 ) || 5 / 0", 1), ("- 7 % 4", -3), ("7 / - 2", -3),
-        ("1 << 31", -(2**31)), ("~ 0 == - 1", 1), ("unknown", 0), ("2 >= 3 || 3 <= 2", 0), ("", 0), ("6 & 3 | 8 ^ 1", 11), ("\u0663 + 1", 1),
+        ("1 + 2 * 3 == 7 && ! 0", 1),
+        ("0x10 - 020", 0),
+        ("( 1 < 2 ) || 5 / 0", 1),
+        ("- 7 % 4", -3),
+        ("7 / - 2", -3),
+        ("1 << 31", -(2**31)),
+        ("~ 0 == - 1", 1),
+        ("unknown", 0),
+        ("2 >= 3 || 3 <= 2", 0),
+        ("", 0),
+        ("6 & 3 | 8 ^ 1", 11),
+        ("\u0663 + 1", 1),
     ],
-)  # fmt: skip
+)
 def test_conditions(text: str, expected: int) -> None:
     assert Condition(text.split()).value() == expected
 

@@ -111,8 +111,9 @@ def test_similarity_is_scikit_images() -> None:
 def test_flip_is_the_authors_own(encoding: metrics.Encoding) -> None:
     evaluator = pytest.importorskip("flip_evaluator")
     a, b = (from_srgb(noise(seed=seed)) for seed in (1, 2))
-    found = metrics.flip(to_srgb(a), to_srgb(b)) if encoding == "display" else metrics.flip(
-        4 * a, 4 * b, encoding="linear")  # fmt: skip
+    found = (
+        metrics.flip(to_srgb(a), to_srgb(b)) if encoding == "display" else metrics.flip(4 * a, 4 * b, encoding="linear")
+    )
     scale, kind = (1, "LDR") if encoding == "display" else (4, "HDR")
     _, mean, _ = evaluator.evaluate(
         (scale * b).astype(np.float32), (scale * a).astype(np.float32), kind, inputsRGB=False

@@ -86,8 +86,11 @@ def expansions(draw: st.DrawFn, most: int = 12) -> Expansion:
 
 def needed(expansion: Expansion) -> set[tuple[str, int]]:
     """Keys of the steps something wanted depends on, by repeated passes over all of them."""
-    last = {write.resource: max(w.version for s in expansion.steps for w in s.writes if w.resource == write.resource)
-            for step in expansion.steps for write in step.writes}  # fmt: skip
+    last = {
+        write.resource: max(w.version for s in expansion.steps for w in s.writes if w.resource == write.resource)
+        for step in expansion.steps
+        for write in step.writes
+    }
     states = {(id, last[id]) for id in expansion.wanted.values()}
     keys: set[tuple[str, int]] = set()
     while True:

@@ -167,8 +167,10 @@ def test_unknown_shipped_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, t
 def test_retyping_drops_what_the_new_type_lacks_and_says_so(folder: Path, toy_catalog: Catalog) -> None:
     spec = resolve(folder / "forward.yaml", catalog=toy_catalog, sets=["shadows.type=shadow_vsm"])
     assert nodes_of(spec)["shadows"] == {
-        "type": "shadow_vsm", "inputs": {"shadow_map": "sun.shadow_map"}, "params": {"bias": 2},
-    }  # fmt: skip
+        "type": "shadow_vsm",
+        "inputs": {"shadow_map": "sun.shadow_map"},
+        "params": {"bias": 2},
+    }
     note, unused = spec.notes
     assert str(note) == (
         "--set shadows.type=shadow_vsm: warning: RG150 node 'shadows' is now 'shadow_vsm', which has no param 'taps' "
@@ -229,12 +231,18 @@ def test_null_disconnects_one_member_of_a_group(toy_catalog: Catalog) -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("light.ambient=0.1", 0.1), ("light.ambient=1e-3", 0.001), ("light.ambient=[0.1, 0.2, 0.3]", [0.1, 0.2, 0.3]),
-        ("light.ambient=$softness", 2), ("light.ambient=no", "no"), ("light.ambient='1'", "1"),
-        ("light.ambient=#ff0000", "#ff0000"), ("light.ambient=a=b", "a=b"), (" light.ambient = 5", 5),
+        ("light.ambient=0.1", 0.1),
+        ("light.ambient=1e-3", 0.001),
+        ("light.ambient=[0.1, 0.2, 0.3]", [0.1, 0.2, 0.3]),
+        ("light.ambient=$softness", 2),
+        ("light.ambient=no", "no"),
+        ("light.ambient='1'", "1"),
+        ("light.ambient=#ff0000", "#ff0000"),
+        ("light.ambient=a=b", "a=b"),
+        (" light.ambient = 5", 5),
         ("light.ambient={a: 1}", {"a": 1}),
     ],
-)  # fmt: skip
+)
 def test_values_are_yaml(folder: Path, toy_catalog: Catalog, text: str, value: object) -> None:
     spec = resolve(folder / "forward.yaml", catalog=toy_catalog, sets=[text])
     assert nodes_of(spec)["light"]["params"] == {"ambient": value}
@@ -331,9 +339,7 @@ def test_too_many_nodes_from_small_files(folder: Path, toy_catalog: Catalog) -> 
 
 @pytest.mark.parametrize("name", ["forward", "prepass", "glowing"])
 @pytest.mark.parametrize("origins", [False, True])
-def test_the_resolved_file_reads_back_to_the_same(
-    folder: Path, toy_catalog: Catalog, name: str, origins: bool
-) -> None:  # fmt: skip
+def test_the_resolved_file_reads_back_to_the_same(folder: Path, toy_catalog: Catalog, name: str, origins: bool) -> None:
     sets = ["softness=5", "light.ambient=[0.1, 1e-7, 3]"] + (["glow/again.radius=9"] if name == "glowing" else [])
     spec = resolve(folder / f"{name}.yaml", catalog=toy_catalog, sets=sets, size=(20, 10))
     text = spec.to_yaml(origins)

@@ -266,7 +266,7 @@ WRONG = {
         step("fog", (), ("light.radiance:2",)),
     ),
     "RG606": Expansion((step("peel"),) * 20_000, {}, {}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("code", sorted(WRONG))

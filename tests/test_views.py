@@ -95,19 +95,28 @@ def plan() -> ResourcePlan:
     resources = {
         id: Resource(id, desc, role)  # type: ignore[arg-type]
         for id, desc, role in (
-            ("a.x", half, "transient"), ("b.x", small, "transient"), ("c.x", half, "internal"),
-            ("d.x", small, "output"), ("d.past", small, "history"), ("lost.x", half, "transient"),
+            ("a.x", half, "transient"),
+            ("b.x", small, "transient"),
+            ("c.x", half, "internal"),
+            ("d.x", small, "output"),
+            ("d.past", small, "history"),
+            ("lost.x", half, "transient"),
         )
-    }  # fmt: skip
+    }
     steps = (
         Step("a", 0, "geometry", writes=(Write("x", "a.x", 1),)),
         Step("b", 0, "fullscreen", reads=(Read("s", "a.x", 1),), writes=(Write("x", "b.x", 1),)),
         Step("lost", 0, "fullscreen", reads=(Read("s", "a.x", 1),), writes=(Write("x", "lost.x", 1),)),
         Step("c", 0, "fullscreen", reads=(Read("s", "b.x", 1),), writes=(Write("x", "c.x", 1),)),
-        Step("d", 0, "fullscreen", reads=(Read("s", "c.x", 1), Read("p", "d.past", 1, previous=True)),
-             writes=(Write("x", "d.x", 1),)),
+        Step(
+            "d",
+            0,
+            "fullscreen",
+            reads=(Read("s", "c.x", 1), Read("p", "d.past", 1, previous=True)),
+            writes=(Write("x", "d.x", 1),),
+        ),
         Step("d", 1, "fullscreen", reads=(Read("s", "c.x", 1),), writes=(Write("past", "d.past", 1),)),
-    )  # fmt: skip
+    )
     return allocate(schedule(Expansion(steps, resources, {"image": "d.x"})))
 
 

@@ -33,7 +33,7 @@ from rendergraph.api import (
     define,
     param,
     structural,
-)  # fmt: skip
+)
 from rendergraph.catalog import Catalog
 
 ViewNormal = Semantic("normal", "Unit normal in view space.", space="view")
@@ -56,9 +56,15 @@ class LightDepth(Node):
 
     views = Views(count=lambda node, facts: len(_cast(node, facts)), lights=_cast, doc="The lights' views.")
     shadow_map = Output(
-        ShadowMap, kind="texture2d_array", format="depth32f", layers=lambda node, facts: len(_cast(node, facts)),
-        size=lambda node, facts: (node.resolution, node.resolution), view="views", lights="views", doc="Depth.",
-    )  # fmt: skip
+        ShadowMap,
+        kind="texture2d_array",
+        format="depth32f",
+        layers=lambda node, facts: len(_cast(node, facts)),
+        size=lambda node, facts: (node.resolution, node.resolution),
+        view="views",
+        lights="views",
+        doc="Depth.",
+    )
     light: str = structural(default="auto", doc="Which light.")
     resolution: int = structural(default=1024, unit="texels", min=16, max=32768, doc="Side.")
 
@@ -69,9 +75,15 @@ class ShadowPcf(Node):
     shadow_map = Input(ShadowMap, kind="texture2d_array", size="any", compare=True, doc="Depth from lights.")
     depth = Input(Depth, optional=True, doc="Depth of the picture.")
     visibility = Output(
-        Visibility, kind="texture2d_array", format="r8", size="depth", lights="shadow_map", needs=("depth",),
-        layers=lambda node, facts: len(facts.input("shadow_map").lights), doc="1 lit, 0 shadowed.",
-    )  # fmt: skip
+        Visibility,
+        kind="texture2d_array",
+        format="r8",
+        size="depth",
+        lights="shadow_map",
+        needs=("depth",),
+        layers=lambda node, facts: len(facts.input("shadow_map").lights),
+        doc="1 lit, 0 shadowed.",
+    )
     lookup = Function(ShadowLookup, "shadow_pcf.glsl", reads=("shadow_map",), doc="To call.")
     taps: int = define(default=4, min=1, max=8, doc="Taps along a side.")
     bias: float = param(default=1.0, unit="texels", min=0, max=10, doc="Offset.")
@@ -318,7 +330,35 @@ class UnknownFormat(Node):
 
 
 CATALOG = Catalog.of(
-    ShadowPcf, ShadowVsm, DepthPrepass, ForwardLighting, Gbuffer, MsaaGbuffer, Resolve, DeferredLighting, Ssao, Tonemap,
-    Blur, Half, Upsample, Sky, Fog, Temporal, Histogram, Exposure, NormalsInView, NormalsToWorld, Painting, Cube,
-    ObjectIds, WindField, Colored, TwoSizes, TooManyMips, FailingRule, Growing, UnknownFormat, shadow_map=LightDepth,
-)  # fmt: skip
+    ShadowPcf,
+    ShadowVsm,
+    DepthPrepass,
+    ForwardLighting,
+    Gbuffer,
+    MsaaGbuffer,
+    Resolve,
+    DeferredLighting,
+    Ssao,
+    Tonemap,
+    Blur,
+    Half,
+    Upsample,
+    Sky,
+    Fog,
+    Temporal,
+    Histogram,
+    Exposure,
+    NormalsInView,
+    NormalsToWorld,
+    Painting,
+    Cube,
+    ObjectIds,
+    WindField,
+    Colored,
+    TwoSizes,
+    TooManyMips,
+    FailingRule,
+    Growing,
+    UnknownFormat,
+    shadow_map=LightDepth,
+)

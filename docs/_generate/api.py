@@ -18,8 +18,24 @@ from rendergraph.textures import Semantic, Signature
 
 from .markdown import block, code, page, prose, table
 
-FIRST = ("Node", "Input", "Output", "InOut", "Internal", "History", "Views", "Function", "Part", "param", "define",
-         "structural", "Steps", "State", "Frame", "Facts")  # fmt: skip
+FIRST = (
+    "Node",
+    "Input",
+    "Output",
+    "InOut",
+    "Internal",
+    "History",
+    "Views",
+    "Function",
+    "Part",
+    "param",
+    "define",
+    "structural",
+    "Steps",
+    "State",
+    "Frame",
+    "Facts",
+)
 
 
 def pages() -> Iterator[tuple[str, str]]:

@@ -12,10 +12,14 @@ from rendergraph.resources import folder
 from .markdown import block, page, prose, table
 
 GROUPS = {
-    "RG0": "Text and files", "RG1": "Names, links and parameters", "RG2": "Types at ports, sizes and formats",
-    "RG3": "Scenes, meshes and images", "RG4": "Nodes and shaders", "RG5": "The command line",
+    "RG0": "Text and files",
+    "RG1": "Names, links and parameters",
+    "RG2": "Types at ports, sizes and formats",
+    "RG3": "Scenes, meshes and images",
+    "RG4": "Nodes and shaders",
+    "RG5": "The command line",
     "RG6": "Order, limits, memory and devices",
-}  # fmt: skip
+}
 # The index lists them. Rows of a menu that every page repeats, they were most of the time of a build.
 _NOT_IN_THE_TREE = "---\norphan: true\n---\n\n"
 LANGUAGES = {"pipeline": "yaml", "scene": "yaml", "node": "python", "shader": "glsl", "compute": "glsl"}

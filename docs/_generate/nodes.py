@@ -69,12 +69,16 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         ("parameter", "value", "default", "range", "as", ""),
         [
             (
-                code(p["name"]), code(p["type"]), _value(p["default"], p["unit"]), _range(p), STEPS[p["role"]],
+                code(p["name"]),
+                code(p["type"]),
+                _value(p["default"], p["unit"]),
+                _range(p),
+                STEPS[p["role"]],
                 prose(p["doc"]),
             )
             for p in node["parameters"]
         ],
-    )  # fmt: skip
+    )
     return page(
         f"`{found.name}`",
         f"*{found.family}* — {prose(first)}",

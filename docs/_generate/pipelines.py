@@ -28,11 +28,14 @@ def pages(studio: Studio) -> Iterator[tuple[str, str]]:
     )
     scenes = [
         _entry(
-            file, f"rendergraph run forward --scene {file.stem}", rg.load("forward").with_scene(file.stem), studio,
+            file,
+            f"rendergraph run forward --scene {file.stem}",
+            rg.load("forward").with_scene(file.stem),
+            studio,
             graph=False,
         )
         for file in shipped(scenes=True)
-    ]  # fmt: skip
+    ]
     yield "shipped-scenes.md", "\n\n".join(scenes) + "\n"
 
 

@@ -26,11 +26,15 @@ def pages() -> Iterator[tuple[str, str]]:
     ]
     functions = [
         (
-            f"`{s.declaration}`", prose(s.doc), code(s.neutral), code(s.combine), _linked(types, s.name, "outputs"),
+            f"`{s.declaration}`",
+            prose(s.doc),
+            code(s.neutral),
+            code(s.combine),
+            _linked(types, s.name, "outputs"),
             _linked(types, s.name, "inputs"),
         )
         for s in SIGNATURES
-    ]  # fmt: skip
+    ]
     formats = [
         (code(f.name), f.family.replace("_", " and "), f.components, f.bytes, f.view_class if not f.is_depth else "")
         for f in FORMATS.values()

@@ -15,7 +15,7 @@ from rendergraph.api import (
     full_mip_count,
     param,
     structural,
-)  # fmt: skip
+)
 
 from ._exposure import ExposureGain, half_of_radiance
 

@@ -23,9 +23,11 @@ class Exposure(Node):
 
     radiance = Input(Radiance, size="any", doc="Scene-linear radiance; alpha is coverage.")
     before = Input(
-        Luminance, size="any", optional=True,
+        Luminance,
+        size="any",
+        optional=True,
         doc="What the eye is adapted to: this node's `luminance@previous`; unconnected it adapts at once.",
-    )  # fmt: skip
+    )
     luminance = Output(Luminance, format="r32f", size=(1, 1), doc="Luminance the eye is adapted to; one texel.")
     gain = Output(ExposureGain, format="r32f", size=(1, 1), doc="`key / luminance`; one texel.")
     logarithms = Internal(format="rg32f", size=half_of_radiance, mips=0)

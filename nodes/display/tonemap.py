@@ -26,9 +26,9 @@ class Tonemap(Node):
     color = Output(DisplayColor, format="rgba8", doc="Display-referred colour, sRGB encoded; alpha is 1.")
 
     exposure: float = param(default=0.0, unit="EV", min=-32, max=32, doc="Stops added before the curve.")
-    curve: Literal[
-        "neutral", "aces", "reinhard", "reinhard_luminance", "reinhard_extended", "hable", "none"
-    ] | str = define(default="neutral", doc="Shoulder after exposure.", choices="curve")  # fmt: skip
+    curve: Literal["neutral", "aces", "reinhard", "reinhard_luminance", "reinhard_extended", "hable", "none"] | str = (
+        define(default="neutral", doc="Shoulder after exposure.", choices="curve")
+    )
     white: float = param(
         default=4.0, min=0.01, doc="Luminance after exposure that `reinhard_extended` maps to white; more clips."
     )

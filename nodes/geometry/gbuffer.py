@@ -21,7 +21,7 @@ from rendergraph.api import (
     Steps,
     View,
     structural,
-)  # fmt: skip
+)
 
 _MOST_TARGETS = 8  # what every OpenGL 4.5 device draws to at once
 
@@ -50,18 +50,24 @@ class GBuffer(Node):
         doc="Unit normal for shading, world space; 0 where nothing is.",
     )
     material = Output(
-        Material, format=_format("rgba16"), clear=0.0,
+        Material,
+        format=_format("rgba16"),
+        clear=0.0,
         doc="Metallic, roughness, occlusion, and 1 for surfaces that lights reach, 0 for unlit ones.",
-    )  # fmt: skip
+    )
     emissive = Output(Emissive, format=_format("r11f_g11f_b10f"), clear=0.0, doc="Emitted radiance.")
     specular = Output(
-        Any, format=_format("rgba8"), clear=0.0,
+        Any,
+        format=_format("rgba8"),
+        clear=0.0,
         doc="Of what is not metal: root of the reflectance at normal incidence, and at grazing incidence in alpha.",
-    )  # fmt: skip
+    )
     grain = Output(
-        Any, format=_format("rgba16_snorm"), clear=0.0,
+        Any,
+        format=_format("rgba16_snorm"),
+        clear=0.0,
         doc="For the anisotropic model: unit direction of the grain, world space, and its strength in alpha.",
-    )  # fmt: skip
+    )
     phong_diffuse = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of kd of the empirical models.")
     phong_specular = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of ks of the empirical models.")
     phong_ambient = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of ka of the empirical models.")

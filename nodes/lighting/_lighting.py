@@ -21,7 +21,7 @@ from rendergraph.api import (
     define,
     param,
     structural,
-)  # fmt: skip
+)
 
 Color = float | tuple[float, float, float]
 
@@ -32,9 +32,11 @@ class Lighting(Node):
     lookup = Input(ShadowLookup, kind="function", many=True, optional=True, doc="Shadows to look up in place.")
 
     shading: Literal["unlit", "phong", "blinn_phong", "anisotropic", "pbr"] | str = define(
-        default="pbr", doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model.",
-        choices="shading", needs=("phong", "grain"),
-    )  # fmt: skip
+        default="pbr",
+        doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model.",
+        choices="shading",
+        needs=("phong", "grain"),
+    )
     smith: Literal["exact", "fast"] = define(
         default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots. `anisotropic` always has Smith's."
     )
@@ -49,10 +51,17 @@ class Lighting(Node):
         return self.shading != "unlit" and self.terms in ("all", "diffuse", "specular")
 
     def blend(
-        self, steps: Steps, out: dict[str, Port], shadows: Port, depth: Port | Part | None = None,
-        view: Port | None = None, *, fragment: str = "forward_transparent.frag", vertex: str = "<geometry.vert>",
+        self,
+        steps: Steps,
+        out: dict[str, Port],
+        shadows: Port,
+        depth: Port | Part | None = None,
+        view: Port | None = None,
+        *,
+        fragment: str = "forward_transparent.frag",
+        vertex: str = "<geometry.vert>",
         geometry: str | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Light surfaces with alpha blending and lay them over the picture, far to near.
 
         Args:
@@ -67,9 +76,16 @@ class Lighting(Node):
         if self.wants_lights or not reads:  # a step that names nothing would read everything
             reads["lookup"] = shadows
         steps.geometry(
-            fragment, vertex=vertex, geometry=geometry, out=out, objects="transparent", order="back_to_front",
-            view=view, state=State(blend=PREMULTIPLIED, depth_write=False), **reads,
-        )  # fmt: skip
+            fragment,
+            vertex=vertex,
+            geometry=geometry,
+            out=out,
+            objects="transparent",
+            order="back_to_front",
+            view=view,
+            state=State(blend=PREMULTIPLIED, depth_write=False),
+            **reads,
+        )
 
 
 class SurfaceLighting(Lighting):
@@ -83,9 +99,12 @@ class SurfaceLighting(Lighting):
     )
     occlusion = Input(Occlusion, optional=True, doc="Scales the ambient light: 1 open, 0 closed.")
     blended_lookup = Input(
-        ShadowLookup, kind="function", many=True, optional=True,
+        ShadowLookup,
+        kind="function",
+        many=True,
+        optional=True,
         doc="Shadows on surfaces with alpha blending, where those on the others are not looked up.",
-    )  # fmt: skip
+    )
 
     blended: bool = structural(
         default=True, doc="Draw surfaces with alpha blending too; otherwise a `forward_transparent` may."

@@ -23,9 +23,10 @@ class DeferredStencilLights(ImageLighting):
     """
 
     radiance = Output(
-        Radiance, format="rgba32f",
+        Radiance,
+        format="rgba32f",
         doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
-    )  # fmt: skip
+    )
     marks = Internal(Depth, format="depth32f_stencil8", clear=1.0)
 
     def record(self, steps: Steps) -> None:
@@ -42,9 +43,11 @@ class DeferredStencilLights(ImageLighting):
         # The stencil needs a depth of its own: a texture must not be attached and sampled at once.
         steps.fullscreen("copy_depth.frag", out=self.marks, depth=self.depth)
         marking = State(
-            cull="none", depth_write=False, depth_clamp=True,
+            cull="none",
+            depth_write=False,
+            depth_clamp=True,
             stencil=Stencil(StencilFace(depth_fail="decr_wrap"), StencilFace(depth_fail="incr_wrap")),
-        )  # fmt: skip
+        )
         marked = StencilFace(func="notequal", depth_pass="zero")
         lighting = State(
             cull="front", depth_test=False, depth_write=False, depth_clamp=True, blend=ADD, stencil=Stencil(marked)
@@ -52,11 +55,23 @@ class DeferredStencilLights(ImageLighting):
         shape = {"SEGMENTS": _SEGMENTS, "RINGS": _RINGS}
         for light in local:
             steps.draw(
-                None, vertex="light_volume.vert", vertices=_VERTICES, out=self.marks, state=marking, defines=shape,
-                light=light, depth=self.depth,
-            )  # fmt: skip
+                None,
+                vertex="light_volume.vert",
+                vertices=_VERTICES,
+                out=self.marks,
+                state=marking,
+                defines=shape,
+                light=light,
+                depth=self.depth,
+            )
             steps.draw(
-                "deferred_stencil_lights.frag", vertex="light_volume.vert", vertices=_VERTICES,
-                out={"radiance": self.radiance, "marks": self.marks}, state=lighting, defines=shape, light=light,
-                **surface, **shadows,
-            )  # fmt: skip
+                "deferred_stencil_lights.frag",
+                vertex="light_volume.vert",
+                vertices=_VERTICES,
+                out={"radiance": self.radiance, "marks": self.marks},
+                state=lighting,
+                defines=shape,
+                light=light,
+                **surface,
+                **shadows,
+            )

@@ -22,9 +22,11 @@ class ForwardLighting(GeometryLighting):
     """
 
     radiance = Output(
-        Radiance, format="rgba16f", clear=lambda node: (*node.background_rgb, 0.0),
+        Radiance,
+        format="rgba16f",
+        clear=lambda node: (*node.background_rgb, 0.0),
         doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",
-    )  # fmt: skip
+    )
     surface_depth = Output(
         Depth, format="depth32f", clear=1.0, doc="Depth of the nearest opaque surface, where no pre-pass is connected."
     )
@@ -46,8 +48,13 @@ class ForwardLighting(GeometryLighting):
             # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
             nearer = (0.0, -8.0)
         steps.geometry(
-            fragment, vertex=vertex, geometry=geometry, out=out, objects="opaque", state=State(polygon_offset=nearer),
+            fragment,
+            vertex=vertex,
+            geometry=geometry,
+            out=out,
+            objects="opaque",
+            state=State(polygon_offset=nearer),
             **self.opaque_reads(steps),
-        )  # fmt: skip
+        )
         blended = "forward_transparent.frag" if self.evaluate == "fragment" else fragment
         self.blend_after(steps, out, fragment=blended, vertex=vertex, geometry=geometry)

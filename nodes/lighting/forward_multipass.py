@@ -16,9 +16,11 @@ class ForwardMultipass(GeometryLighting):
     """
 
     radiance = Output(
-        Radiance, format="rgba32f", clear=lambda node: (*node.background_rgb, 0.0),
+        Radiance,
+        format="rgba32f",
+        clear=lambda node: (*node.background_rgb, 0.0),
         doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
-    )  # fmt: skip
+    )
     surface_depth = Output(
         Depth, format="depth32f", clear=1.0, doc="Depth of the nearest opaque surface, where no pre-pass is connected."
     )

@@ -59,9 +59,13 @@ class ScreenSpaceOcclusion(Node):
         """Bring normals and distances into `surfaces`."""
         size = steps.desc(self.surfaces).size
         steps.fullscreen(
-            "surfaces.frag", out=self.surfaces, depth=self.depth, normal=self.normal, reduced=size,
+            "surfaces.frag",
+            out=self.surfaces,
+            depth=self.depth,
+            normal=self.normal,
+            reduced=size,
             defines=self.sizes(steps),
-        )  # fmt: skip
+        )
 
     def target(self, steps: Steps, small: Port) -> Port:
         """Where the last pass at reduced size goes: `occlusion` itself where nothing is reduced, else `small`."""
@@ -71,6 +75,11 @@ class ScreenSpaceOcclusion(Node):
         """Bring a reduced occlusion to full size."""
         if source is not self.occlusion:
             steps.fullscreen(
-                "upsample.frag", out=self.occlusion, source=source, surfaces=self.surfaces, depth=self.depth,
-                normal=self.normal, defines=self.sizes(steps),
-            )  # fmt: skip
+                "upsample.frag",
+                out=self.occlusion,
+                source=source,
+                surfaces=self.surfaces,
+                depth=self.depth,
+                normal=self.normal,
+                defines=self.sizes(steps),
+            )

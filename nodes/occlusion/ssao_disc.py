@@ -29,7 +29,11 @@ class SSAODisc(ScreenSpaceOcclusion):
         steps.fullscreen("ssao_disc.frag", out=self.rough, surfaces=self.surfaces, screen=screen, defines=sizes)
         target = self.target(steps, self.together)
         steps.fullscreen(
-            "neighbours_mean.frag", out=target, rough=self.rough, surfaces=self.surfaces, screen=screen,
+            "neighbours_mean.frag",
+            out=target,
+            rough=self.rough,
+            surfaces=self.surfaces,
+            screen=screen,
             defines=sizes,
-        )  # fmt: skip
+        )
         self.finish(steps, target)

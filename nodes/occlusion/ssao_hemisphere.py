@@ -37,15 +37,25 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
         self.see(steps)
         steps.fullscreen("noise.frag", out=self.noise)
         steps.fullscreen(
-            "ssao_hemisphere.frag", out=self.rough, surfaces=self.surfaces, noise=self.noise, kernel=self.kernel,
-            screen=screen, defines=sizes,
-        )  # fmt: skip
+            "ssao_hemisphere.frag",
+            out=self.rough,
+            surfaces=self.surfaces,
+            noise=self.noise,
+            kernel=self.kernel,
+            screen=screen,
+            defines=sizes,
+        )
         target = self.target(steps, self.blurred)
         for source, out, axis in ((self.rough, self.across, (1, 0)), (self.across, target, (0, 1))):
             steps.fullscreen(
-                "bilateral_blur.frag", source=source, out=out, surfaces=self.surfaces, axis=axis, screen=screen,
+                "bilateral_blur.frag",
+                source=source,
+                out=out,
+                surfaces=self.surfaces,
+                axis=axis,
+                screen=screen,
                 defines=sizes,
-            )  # fmt: skip
+            )
         self.finish(steps, target)
 
     def update(self, frame: Frame) -> None:

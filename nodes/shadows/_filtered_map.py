@@ -22,9 +22,13 @@ class FilteredMap(MapTechnique):
     texel: ClassVar[str] = "rg32f"
 
     filtered = Internal(
-        kind="texture2d_array", format=lambda node, facts: node.texel, size="shadow_map", layers=map_layers,
-        view="shadow_map", lights="shadow_map",
-    )  # fmt: skip
+        kind="texture2d_array",
+        format=lambda node, facts: node.texel,
+        size="shadow_map",
+        layers=map_layers,
+        view="shadow_map",
+        lights="shadow_map",
+    )
     covered = Internal(kind="texture2d_array", format="r16", size="shadow_map", layers=map_layers)
     rows = Internal(format=lambda node, facts: node.texel, size="shadow_map")
     covered_rows = Internal(format="r16", size="shadow_map")
@@ -37,13 +41,17 @@ class FilteredMap(MapTechnique):
         """Two steps a layer, which share the texture between them."""
         for layer in range(steps.desc(self.filtered).layers):
             steps.fullscreen(
-                self.across, out={"filtered": self.rows, "covered": self.covered_rows},
-                shadow_map=self.shadow_map.layer(layer).sampled(), defines={"LAYER": layer},
-            )  # fmt: skip
+                self.across,
+                out={"filtered": self.rows, "covered": self.covered_rows},
+                shadow_map=self.shadow_map.layer(layer).sampled(),
+                defines={"LAYER": layer},
+            )
             steps.fullscreen(
-                "filtered_map_up.frag", rows=self.rows, covered_rows=self.covered_rows,
+                "filtered_map_up.frag",
+                rows=self.rows,
+                covered_rows=self.covered_rows,
                 out={"filtered": self.filtered.layer(layer), "covered": self.covered.layer(layer)},
-            )  # fmt: skip
+            )
         super().record(steps)
 
 

@@ -30,16 +30,22 @@ class MapTechnique(Node):
     depth = Input(Depth, optional=True, doc="Depth of the picture, for `visibility`.")
     lookup: ClassVar[Function]
     visibility = Output(
-        Visibility, kind="texture2d_array", format="r16", layers=lambda node, facts: len(shadowed_lights(facts)),
-        lights=lambda node, facts: shadowed_lights(facts), needs=("depth",),
+        Visibility,
+        kind="texture2d_array",
+        format="r16",
+        layers=lambda node, facts: len(shadowed_lights(facts)),
+        lights=lambda node, facts: shadowed_lights(facts),
+        needs=("depth",),
         doc="1 lit, 0 shadowed, one layer a light.",
-    )  # fmt: skip
+    )
 
     bias: float = param(default=0.5, unit="texels", min=0, max=64, doc="How far a point is moved towards the light.")
     normal_offset: float = param(
-        default=1.0, min=0, max=64,
+        default=1.0,
+        min=0,
+        max=64,
         doc="How far a point is moved along its normal: 1 is just enough for a flat surface at any slope.",
-    )  # fmt: skip
+    )
 
     def record(self, steps: Steps) -> None:
         """Evaluate the function at every pixel, where anybody looks at that."""
@@ -47,6 +53,9 @@ class MapTechnique(Node):
             return
         for layer, light in enumerate(shadowed_lights(steps.facts)):
             steps.fullscreen(
-                "map_visibility.frag", out={"visibility": self.visibility.layer(layer)}, depth=self.depth,
-                shadow=self.lookup, defines={"LIGHT": light},
-            )  # fmt: skip
+                "map_visibility.frag",
+                out={"visibility": self.visibility.layer(layer)},
+                depth=self.depth,
+                shadow=self.lookup,
+                defines={"LIGHT": light},
+            )

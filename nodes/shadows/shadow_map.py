@@ -26,10 +26,16 @@ class ShadowMapNode(Node):
     scene = Input(SceneRef, kind="scene", optional=True, doc="What casts; the pipeline's scene by default.")
     views = Views(count=_layers, lights=_lights, doc="The lights' views, one a layer.")
     shadow_map = Output(
-        ShadowMap, kind="texture2d_array", format="depth32f", layers=_layers, lights=_lights, view="views", clear=1.0,
+        ShadowMap,
+        kind="texture2d_array",
+        format="depth32f",
+        layers=_layers,
+        lights=_lights,
+        view="views",
+        clear=1.0,
         size=lambda node, facts: (node.resolution, node.resolution),
         doc="Window depth from each light, 1 where nothing is.",
-    )  # fmt: skip
+    )
 
     light: str | tuple[str, ...] = structural(
         default="auto",
@@ -46,9 +52,15 @@ class ShadowMapNode(Node):
         offset = (self.slope_bias, 0.0) if self.slope_bias else None
         for layer in range(_layers(self, steps.facts)):
             steps.geometry(
-                "<depth.frag>", vertex="<depth.vert>", out=self.shadow_map.layer(layer), view=self.views,
-                view_index=layer, objects="casters", materials="alpha", state=State(polygon_offset=offset),
-            )  # fmt: skip
+                "<depth.frag>",
+                vertex="<depth.vert>",
+                out=self.shadow_map.layer(layer),
+                view=self.views,
+                view_index=layer,
+                objects="casters",
+                materials="alpha",
+                state=State(polygon_offset=offset),
+            )
 
     def update(self, frame: Frame) -> None:
         """Fit the views to where the lights and the camera are now."""

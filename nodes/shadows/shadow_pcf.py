@@ -47,8 +47,10 @@ class ShadowPCF(MapTechnique):
             tiles = steps.desc(self.edges)
             for layer in range(tiles.layers):
                 steps.fullscreen(
-                    "shadow_pcf_edges.frag", out=self.edges.layer(layer), defines={"REACH": self.taps // 2 + 2},
+                    "shadow_pcf_edges.frag",
+                    out=self.edges.layer(layer),
+                    defines={"REACH": self.taps // 2 + 2},
                     shadow_map=self.shadow_map.layer(layer).sampled(),
                     tiles=(float(tiles.width), float(tiles.height)),
-                )  # fmt: skip
+                )
         super().record(steps)

@@ -145,7 +145,7 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> R
         released={position: tuple(ids) for position, ids in sorted(released.items())},
         memory=_memory(schedule, lifetimes, shareable, physicals, better),
         reasons=_reasons(schedule, lifetimes, physicals, placement, alias=alias, views=views),
-    )  # fmt: skip
+    )
 
 
 def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:

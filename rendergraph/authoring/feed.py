@@ -160,10 +160,16 @@ def _source(name: str, port: Input | InOut, folder: Path) -> type[Node] | None:
             steps.fullscreen(shader, out={"made": target})
 
     made = Output(
-        meaning, kind=port.kind, format=format, layers=layers if port.kind == "texture2d_array" else None,
-        size=(24, 24) if port.kind == "texture_cube" else None, samples=samples, view="views",
-        lights=_first_light if _has_lights(meaning) else None, doc="A pattern.",
-    )  # fmt: skip
+        meaning,
+        kind=port.kind,
+        format=format,
+        layers=layers if port.kind == "texture2d_array" else None,
+        size=(24, 24) if port.kind == "texture_cube" else None,
+        samples=samples,
+        view="views",
+        lights=_first_light if _has_lights(meaning) else None,
+        doc="A pattern.",
+    )
     views = Views(count=layers, public=False, doc="The camera's view for each layer.")
     return _node("Pattern", made=made, views=views, record=record, update=_camera("views", layers))
 
@@ -229,8 +235,9 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
     if getattr(port, "kind", "") == "buffer":
         (folder / "use_buffer.frag").write_text(
             "layout(std430) readonly buffer read { uint words[]; };\nout vec4 made;\n"
-            "void main() { made = vec4(words[uint(gl_FragCoord.x) % uint(words.length())]); }\n", encoding="utf-8",
-        )  # fmt: skip
+            "void main() { made = vec4(words[uint(gl_FragCoord.x) % uint(words.length())]); }\n",
+            encoding="utf-8",
+        )
         semantic = getattr(port, "semantic", None) or AnyTexel
         read = Input(semantic, kind="buffer", doc="What is read.")
         return _node("Words", read=read, made=value, shader="use_buffer.frag")

@@ -12,9 +12,13 @@ from rendergraph.gl.surroundings import Surroundings
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Program", "Query", "Renderbuffer")
 _KEPT = {
-    "_enabled": "what is enabled", "_indexed": "blending or the scissor test", "_units": "bound textures and samplers",
-    "_images": "bound images", "_blocks": "bound blocks", "_settings": "settings such as the depth function",
-}  # fmt: skip
+    "_enabled": "what is enabled",
+    "_indexed": "blending or the scissor test",
+    "_units": "bound textures and samplers",
+    "_images": "bound images",
+    "_blocks": "bound blocks",
+    "_settings": "settings such as the depth function",
+}
 """What `Surroundings` holds, in words."""
 
 

@@ -173,11 +173,12 @@ def _schema(files: Mapping[str, str], *, by_path: bool) -> str:
 
 def _refuse_existing(where: Path, paths: list[str] | Mapping[str, str]) -> None:
     problems = [
-        Problem("RG531", f"'{path}' exists already and is left as it is; move it away or choose another name",
-                Place(path))
+        Problem(
+            "RG531", f"'{path}' exists already and is left as it is; move it away or choose another name", Place(path)
+        )
         for path in paths
         if (where / path).exists() or (where / path).is_symlink()
-    ]  # fmt: skip
+    ]
     if problems:
         raise InputError(problems)
 

@@ -27,8 +27,11 @@ def declared_at(file: Path, name: str) -> Place:
     """The first line of a file that declares a name, or else mentions it."""
     lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
     for pattern in (
-        rf"^\s*{name}\s*[:=]", rf"\bdef {name}\b", rf"\b(?:in|out|uniform|buffer)\b.*\b{name}\b", rf"\b{name}\b",
-    ):  # fmt: skip
+        rf"^\s*{name}\s*[:=]",
+        rf"\bdef {name}\b",
+        rf"\b(?:in|out|uniform|buffer)\b.*\b{name}\b",
+        rf"\b{name}\b",
+    ):
         for number, line in enumerate(lines, start=1):
             if found := re.search(pattern, line):
                 return Place(shown_file(file), number, found.start() + len(found[0]) - len(found[0].lstrip()) + 1)

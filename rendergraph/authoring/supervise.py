@@ -69,9 +69,11 @@ def check_node(
     if not file.is_file():
         raise InputError(Problem("RG011", f"there is no file '{file}'"))
     asked = {
-        "file": str(file.resolve()), "plugins": [str(plugin.resolve()) for plugin in plugins],
-        "scene": str(Path(scene).resolve()) if scene and re.search(r"[./]", scene) else scene, "memory": limits.memory,
-    }  # fmt: skip
+        "file": str(file.resolve()),
+        "plugins": [str(plugin.resolve()) for plugin in plugins],
+        "scene": str(Path(scene).resolve()) if scene and re.search(r"[./]", scene) else scene,
+        "memory": limits.memory,
+    }
     with _Child(asked, limits) as child:
         return child.report()
 
@@ -93,10 +95,15 @@ class _Child:
         program = "from rendergraph.authoring.child import main; main()"
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", program, words], pass_fds=(child_end, self._trace.fileno()),
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
-                text=True, errors="replace",
-            )  # fmt: skip
+                [sys.executable, "-P", "-c", program, words],
+                pass_fds=(child_end, self._trace.fileno()),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                text=True,
+                errors="replace",
+            )
         finally:
             os.close(child_end)
         self._reader = threading.Thread(target=self._drain, daemon=True)

@@ -33,9 +33,14 @@ from rendergraph.textures import FORMATS, BufferDesc
 SCENE = str(Path(__file__).parent / "scene.yaml")
 FRAMES = 2
 _POISON = {  # by family, two values that a texel may hold before a pass; what differs afterwards was never written
-    "float": (float("nan"), 0.7319), "unorm": (0.25, 0.75), "snorm": (-0.25, 0.75), "depth": (0.25, 0.75),
-    "depth_stencil": (0.25, 0.75), "uint": (7.0, 2_000_000_011.0), "int": (-7.0, 2_000_000_011.0),
-}  # fmt: skip
+    "float": (float("nan"), 0.7319),
+    "unorm": (0.25, 0.75),
+    "snorm": (-0.25, 0.75),
+    "depth": (0.25, 0.75),
+    "depth_stencil": (0.25, 0.75),
+    "uint": (7.0, 2_000_000_011.0),
+    "int": (-7.0, 2_000_000_011.0),
+}
 _MOST_NAMES = 8192
 _MOST_BYTES = 64 << 20
 _MOST_STEPS = 256

@@ -24,9 +24,12 @@ _IMAGE = re.compile(r"[iu]?image(2D|2DArray)\Z")
 _SCALAR: dict[str, type] = {"float": float, "int": int, "uint": int, "bool": bool}
 _VECTOR = re.compile(r"([iu]?)vec([234])\Z")
 _KINDS: dict[str, str] = {
-    "2D": "texture2d", "2DArray": "texture2d_array", "Cube": "texture_cube", "2DMS": "texture2d",
+    "2D": "texture2d",
+    "2DArray": "texture2d_array",
+    "Cube": "texture_cube",
+    "2DMS": "texture2d",
     "2DMSArray": "texture2d_array",
-}  # fmt: skip
+}
 _INTEGER_FORMATS = {"uint": "r32ui", "uvec2": "rg32ui", "uvec3": "rgba32ui", "uvec4": "rgba32ui", "int": "r32i"}
 _GIVEN = ("v_uv",)
 """Varyings of the full-screen vertex shader."""

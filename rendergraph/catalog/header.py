@@ -195,23 +195,46 @@ def _choices(value: Value) -> str | None:
 
 
 INPUT_KEYS: dict[str, Check] = {
-    "doc": _text, "semantic": _name, "kind": _one_of("function", "view"), "optional": _flag, "many": _flag,
-    "size": _one_of("same", "any"), "filter": _one_of(*get_args(Filter)), "wrap": _one_of(*get_args(Wrap)),
-    "anisotropy": _count(16), "group": _name,
-}  # fmt: skip
+    "doc": _text,
+    "semantic": _name,
+    "kind": _one_of("function", "view"),
+    "optional": _flag,
+    "many": _flag,
+    "size": _one_of("same", "any"),
+    "filter": _one_of(*get_args(Filter)),
+    "wrap": _one_of(*get_args(Wrap)),
+    "anisotropy": _count(16),
+    "group": _name,
+}
 OUTPUT_KEYS: dict[str, Check] = {
-    "doc": _text, "semantic": _name, "like": _name, "format": _format, "size": _size, "mips": _mips,
-    "layers": _count(2048), "samples": _count(16), "clear": _clear, "first": _number, "bytes": _count(1 << 30),
-}  # fmt: skip
+    "doc": _text,
+    "semantic": _name,
+    "like": _name,
+    "format": _format,
+    "size": _size,
+    "mips": _mips,
+    "layers": _count(2048),
+    "samples": _count(16),
+    "clear": _clear,
+    "first": _number,
+    "bytes": _count(1 << 30),
+}
 PARAM_KEYS: dict[str, Check] = {
-    "doc": _text, "default": _default, "unit": _text, "min": _number, "max": _number,
-    "role": _one_of("param", "define", "structural"), "choices": _choices,
-}  # fmt: skip
+    "doc": _text,
+    "default": _default,
+    "unit": _text,
+    "min": _number,
+    "max": _number,
+    "role": _one_of("param", "define", "structural"),
+    "choices": _choices,
+}
 TOP_KEYS = ("doc", "inputs", "outputs", "params", "threads")
 
 _SECTIONS = {
-    "inputs": ("an input", INPUT_KEYS), "outputs": ("an output", OUTPUT_KEYS), "params": ("a parameter", PARAM_KEYS),
-}  # fmt: skip
+    "inputs": ("an input", INPUT_KEYS),
+    "outputs": ("an output", OUTPUT_KEYS),
+    "params": ("a parameter", PARAM_KEYS),
+}
 
 
 class _Reader:

@@ -27,9 +27,14 @@ class Parameter:
     """
 
     def __init__(
-        self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, known: Globals,
+        self,
+        name: str,
+        entry: Mapping[str, Value],
+        named: Value | None,
+        found: Global | None,
+        known: Globals,
         words: Set[str],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Args are the name, the header's keys, its entry where there is one, the declaration with its file's, and
         all words of the text.
         """

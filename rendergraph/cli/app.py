@@ -18,15 +18,35 @@ from rendergraph.cli.words import click
 from rendergraph.errors import Problem, RendergraphError, suggestion
 
 VERBS = (
-    "run", "check", "plan", "graph", "config", "diff", "compare", "sweep", "bench", "nodes", "explain", "schema",
-    "new-node", "check-node", "doctor",
-)  # fmt: skip
+    "run",
+    "check",
+    "plan",
+    "graph",
+    "config",
+    "diff",
+    "compare",
+    "sweep",
+    "bench",
+    "nodes",
+    "explain",
+    "schema",
+    "new-node",
+    "check-node",
+    "doctor",
+)
 """In the order of `--help`; verb `x-y` is the function `command` in `rendergraph.cli.x_y`."""
 
 _MEANT = {
-    "render": "run", "draw": "run", "lint": "check", "validate": "check", "show": "graph", "list": "nodes",
-    "benchmark": "bench", "profile": "bench", "help": "explain",
-}  # fmt: skip
+    "render": "run",
+    "draw": "run",
+    "lint": "check",
+    "validate": "check",
+    "show": "graph",
+    "list": "nodes",
+    "benchmark": "bench",
+    "profile": "bench",
+    "help": "explain",
+}
 """Words that other programs have for our verbs."""
 
 INTERRUPTED, TERMINATED = 130, 143

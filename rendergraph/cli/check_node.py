@@ -16,9 +16,12 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb.")
 @click.option(
-    "--limit", "limits", multiple=True, type=options.LIMIT,
+    "--limit",
+    "limits",
+    multiple=True,
+    type=options.LIMIT,
     help="Allow it more or less: import-seconds (10), pass-seconds (30), memory in MiB (2048).",
-)  # fmt: skip
+)
 @options.plugin_option
 @options.json_option
 def command(

@@ -237,10 +237,20 @@ def summary_rows(results: Sequence[Result]) -> list[tuple[object, ...]]:
         spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
         size = megabytes(int(str(result.memory["allocated_bytes"])))
         rows.append(
-            (result.name, f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}",
-             *(f"{m.plugins.get(name, math.nan):.4g}" for name in plugins), gpu, spread,
-             f"{times.cpu_ms.median:.2f}", result.pass_count, size)
-        )  # fmt: skip
+            (
+                result.name,
+                f"{m.flip:.4f}",
+                f"{m.rmse:.4f}",
+                psnr,
+                f"{m.ssim:.4f}",
+                *(f"{m.plugins.get(name, math.nan):.4g}" for name in plugins),
+                gpu,
+                spread,
+                f"{times.cpu_ms.median:.2f}",
+                result.pass_count,
+                size,
+            )
+        )
     return rows
 
 

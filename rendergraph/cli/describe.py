@@ -73,8 +73,14 @@ def _output(name: str, port: Any) -> dict[str, Any]:
     from rendergraph.declare import Function, InOut, Views
 
     if isinstance(port, InOut) and not port.optional:  # its texture is what is connected
-        return {"name": name, "kind": port.kind, "semantic": port.semantic and port.semantic.name, "like": port.like,
-                "continues": True, "doc": port.doc}  # fmt: skip
+        return {
+            "name": name,
+            "kind": port.kind,
+            "semantic": port.semantic and port.semantic.name,
+            "like": port.like,
+            "continues": True,
+            "doc": port.doc,
+        }
     if isinstance(port, Views):
         return {"name": name, "kind": "view", "semantic": "view", "doc": port.doc}
     if isinstance(port, Function):

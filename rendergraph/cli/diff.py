@@ -15,9 +15,12 @@ from rendergraph.cli.words import click
 @click.argument("b")
 @options.selection_options
 @click.option(
-    "--svg", "picture", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    "--svg",
+    "picture",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
     help="Draw both graphs with the difference coloured.",
-)  # fmt: skip
+)
 @options.json_option
 def command(a: str, b: str, picture: Path | None, as_json: bool, **selection: Any) -> None:
     """Show what differs between two pipelines.

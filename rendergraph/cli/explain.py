@@ -129,9 +129,14 @@ def _value_words(key: Any) -> str:
 
 
 _KINDS = {
-    "flag": "true | false", "map": "mapping", "link": "name", "integer": "whole number",
-    "color": "[r, g, b]", "scale": "number | [x, y, z]", "file": "path",
-}  # fmt: skip
+    "flag": "true | false",
+    "map": "mapping",
+    "link": "name",
+    "integer": "whole number",
+    "color": "[r, g, b]",
+    "scale": "number | [x, y, z]",
+    "file": "path",
+}
 
 
 def _pipeline_keys() -> list[dict[str, Any]]:

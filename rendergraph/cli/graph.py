@@ -15,9 +15,12 @@ _FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".sv
 @click.command("graph", no_args_is_help=True)
 @options.pipeline_options
 @click.option(
-    "-f", "--format", "format_name", type=click.Choice(["text", "dot", "mermaid", "svg"]),
+    "-f",
+    "--format",
+    "format_name",
+    type=click.Choice(["text", "dot", "mermaid", "svg"]),
     help="What to draw it as; by default what the file's extension says, else text.",
-)  # fmt: skip
+)
 @click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
 def command(format_name: str | None, output: Path | None, as_json: bool, **selection: Any) -> None:

@@ -136,12 +136,20 @@ def selection_options(function: F) -> F:
             click.option("--environment", metavar="FILE", help="Light it by this picture of the sky (.hdr, .exr)."),
             click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
             click.option(
-                "-s", "--set", "sets", multiple=True, type=SETTING,
+                "-s",
+                "--set",
+                "sets",
+                multiple=True,
+                type=SETTING,
                 help="Set a parameter, rewire an input, swap a type: ao.radius=0.5, light.lookup=null, sun.type=T.",
             ),
             click.option("-p", "--patch", "patches", multiple=True, type=_PATH, help="Apply a merge patch file."),
             click.option(
-                "--asset-root", "asset_roots", multiple=True, type=_PATH, metavar="DIR",
+                "--asset-root",
+                "asset_roots",
+                multiple=True,
+                type=_PATH,
+                metavar="DIR",
                 help="A further folder that files may be read from.",
             ),
             click.option(
@@ -149,7 +157,7 @@ def selection_options(function: F) -> F:
             ),
             plugin_option,
         ]
-    ):  # fmt: skip
+    ):
         function = decorate(function)
     return function
 
@@ -201,9 +209,17 @@ def make(
     import rendergraph as rg
 
     return rg.load(
-        pipeline, scene=scene, camera=camera, environment=environment, size=size, sets=list(sets),
-        patches=list(patches), asset_roots=list(asset_roots), limits=dict(limits), plugins=list(plugins),
-    )  # fmt: skip
+        pipeline,
+        scene=scene,
+        camera=camera,
+        environment=environment,
+        size=size,
+        sets=list(sets),
+        patches=list(patches),
+        asset_roots=list(asset_roots),
+        limits=dict(limits),
+        plugins=list(plugins),
+    )
 
 
 def words(**selection: Any) -> list[str]:

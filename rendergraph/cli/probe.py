@@ -58,9 +58,11 @@ def devices() -> list[dict[str, Any]]:
         extensions = (text(handle, _EXTENSIONS) or b"").decode("ascii", "replace").split()
         entry: dict[str, Any] = {"number": index, "extensions": extensions}
         for key, name, needed in (
-            ("vendor", _VENDOR, "EGL_EXT_device_persistent_id"), ("renderer", _RENDERER, "EGL_EXT_device_query_name"),
-            ("drm", _DRM, "EGL_EXT_device_drm"), ("render_node", _RENDER_NODE, "EGL_EXT_device_drm_render_node"),
-        ):  # fmt: skip
+            ("vendor", _VENDOR, "EGL_EXT_device_persistent_id"),
+            ("renderer", _RENDERER, "EGL_EXT_device_query_name"),
+            ("drm", _DRM, "EGL_EXT_device_drm"),
+            ("render_node", _RENDER_NODE, "EGL_EXT_device_drm_render_node"),
+        ):
             value = text(handle, name) if needed in extensions else None
             if value:
                 entry[key] = value.decode("utf-8", "replace")

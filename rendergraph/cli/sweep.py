@@ -31,9 +31,14 @@ AXIS = options.Parsed("PATH=V,V,…", _axis)
 @click.argument("pipeline")
 @click.option("-x", "--axis", "axes", multiple=True, type=AXIS, help="Go through these values of a path that -s takes.")
 @click.option(
-    "-o", "--output", "out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", required=True,
+    "-o",
+    "--output",
+    "out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    required=True,
     help="A folder for the runs, results.jsonl and report.html.",
-)  # fmt: skip
+)
 @click.option("--resume", is_flag=True, help="Keep the runs that DIR has already.")
 @shared.reference_option
 @options.selection_options
@@ -153,9 +158,7 @@ def _text(found: Sweep) -> str:
 
     comparison = found.comparison
     front = {result.name for result in pareto(comparison.results)}
-    rows = [
-        (*row, "front" if row[0] in front else "") for row in shared.summary_rows(comparison.results)
-    ]  # fmt: skip
+    rows = [(*row, "front" if row[0] in front else "") for row in shared.summary_rows(comparison.results)]
     heads = (*shared.heads(comparison.results), "Pareto")
     lines = [
         f"{amount(len(rows), 'run')} against {comparison.reference.name}: "

@@ -128,11 +128,21 @@ def _result(
         )
     light = None if reference.kind == "file" else base.frame.get("radiance")
     return Result(
-        name=name, source=drawn.pipeline.source, pixels=pixels, encoding=reference.encoding, metrics=found,
-        times=times, memory=drawn.plan.memory.as_json(), pass_count=len(passes(drawn.plan)),
-        radiance_rmse=light_error(drawn.frame.get("radiance"), light), flip_map=map_, graph=graph, plan=drawn.plan,
-        difference=diff(base.pipeline.graph, graph), first=first,
-    )  # fmt: skip
+        name=name,
+        source=drawn.pipeline.source,
+        pixels=pixels,
+        encoding=reference.encoding,
+        metrics=found,
+        times=times,
+        memory=drawn.plan.memory.as_json(),
+        pass_count=len(passes(drawn.plan)),
+        radiance_rmse=light_error(drawn.frame.get("radiance"), light),
+        flip_map=map_,
+        graph=graph,
+        plan=drawn.plan,
+        difference=diff(base.pipeline.graph, graph),
+        first=first,
+    )
 
 
 @contextmanager

@@ -267,8 +267,17 @@ def _compared(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None
         )
     plan = run.pipeline.plan()
     return Result(
-        name=run.name, source=run.pipeline.source, pixels=pixels, encoding=reference.encoding, metrics=found,
-        times=NO_TIMES, memory=plan.memory.as_json(), pass_count=len(passes(plan)), settings=run.settings,
+        name=run.name,
+        source=run.pipeline.source,
+        pixels=pixels,
+        encoding=reference.encoding,
+        metrics=found,
+        times=NO_TIMES,
+        memory=plan.memory.as_json(),
+        pass_count=len(passes(plan)),
+        settings=run.settings,
         radiance_rmse=light_error(own, light),
-        flip_map=map_, graph=run.pipeline.graph, plan=plan,
-    )  # fmt: skip
+        flip_map=map_,
+        graph=run.pipeline.graph,
+        plan=plan,
+    )

@@ -154,19 +154,24 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
 
     plan = run.pipeline.plan()
     return Result(
-        name=run.name, source=run.pipeline.source, pixels=read(run.picture), encoding=encoding,
+        name=run.name,
+        source=run.pipeline.source,
+        pixels=read(run.picture),
+        encoding=encoding,
         metrics=_metrics(record),
-        times=Times.from_json(record) if record["frames"] else NO_TIMES, memory=plan.memory.as_json(),
-        pass_count=len(passes(plan)), settings=run.settings, radiance_rmse=record["radiance_rmse"],
-        graph=run.pipeline.graph, plan=plan,
-    )  # fmt: skip
+        times=Times.from_json(record) if record["frames"] else NO_TIMES,
+        memory=plan.memory.as_json(),
+        pass_count=len(passes(plan)),
+        settings=run.settings,
+        radiance_rmse=record["radiance_rmse"],
+        graph=run.pipeline.graph,
+        plan=plan,
+    )
 
 
 def _metrics(record: Mapping[str, Any]) -> Metrics:
     plugins = {name: _number(value) for name, value in record.get("plugin_metrics", {}).items()}
-    return Metrics(
-        _number(record["rmse"]), record["psnr"], _number(record["ssim"]), _number(record["flip"]), plugins
-    )  # fmt: skip
+    return Metrics(_number(record["rmse"]), record["psnr"], _number(record["ssim"]), _number(record["flip"]), plugins)
 
 
 def _digest(path: Path) -> str:

@@ -83,9 +83,14 @@ class Difference:
     def as_json(self) -> dict[str, Any]:
         """Everything but the texels."""
         return {
-            "node": self.node, "base_node": self.base_node, "port": self.port, "most": self.most, "share": self.share,
-            "causes": list(self.causes), "added": list(self.added),
-        }  # fmt: skip
+            "node": self.node,
+            "base_node": self.base_node,
+            "port": self.port,
+            "most": self.most,
+            "share": self.share,
+            "causes": list(self.causes),
+            "added": list(self.added),
+        }
 
 
 @dataclass(frozen=True, eq=False)

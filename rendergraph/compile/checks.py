@@ -47,8 +47,10 @@ def check_uniforms(
         elif uniform.opaque and name not in images and name not in sampled:
             slot = name.endswith("_texture") and step.kind == "geometry"
             guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
-            text = (f"{files} samples '{name}', but the step reads no texture of that name; "
-                    f"it reads {', '.join(sorted(sampled)) or 'none'}{guard}")  # fmt: skip
+            text = (
+                f"{files} samples '{name}', but the step reads no texture of that name; "
+                f"it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
+            )
             problems.append(_placed(step.problem("RG430", text), name, texts))
         elif not uniform.opaque and (wrong := misfit(uniform, uniforms[name])) is not None:
             problems.append(_placed(step.problem("RG436", f"{files} {wrong}"), name, texts))

@@ -26,9 +26,14 @@ from rendergraph.scene.selection import selected
 from rendergraph.steps import Step, ViewMatrices
 
 COMMAND = np.dtype(
-    [("count", np.uint32), ("instances", np.uint32), ("first_index", np.uint32), ("base_vertex", np.int32),
-     ("base_instance", np.uint32)]
-)  # fmt: skip
+    [
+        ("count", np.uint32),
+        ("instances", np.uint32),
+        ("first_index", np.uint32),
+        ("base_vertex", np.int32),
+        ("base_instance", np.uint32),
+    ]
+)
 """DrawElementsIndirectCommand."""
 
 
@@ -209,9 +214,11 @@ def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str]
     if level == "none":
         return defines, {}
     masked = material.alpha_mode == "mask"
-    slots = material.textures if level == "full" else {
-        slot: texture for slot, texture in material.textures.items() if masked and slot == "base_color"
-    }  # fmt: skip
+    slots = (
+        material.textures
+        if level == "full"
+        else {slot: texture for slot, texture in material.textures.items() if masked and slot == "base_color"}
+    )
     found: dict[str, Texture] = {}
     for slot, texture in slots.items():
         if (mesh.uv1 if texture.uv else mesh.uv0) is None:

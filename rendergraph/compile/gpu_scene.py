@@ -24,14 +24,28 @@ from rendergraph.textures import TextureDesc, full_mip_count
 Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
 """Image to (height, width, 4) uint8 or float32, top row first; the flag says that colours are sRGB."""
 
-_MIN = {"nearest": 0x2600, "linear": 0x2601, "nearest_mipmap_nearest": 0x2700, "linear_mipmap_nearest": 0x2701,
-        "nearest_mipmap_linear": 0x2702, "linear_mipmap_linear": 0x2703}  # fmt: skip
+_MIN = {
+    "nearest": 0x2600,
+    "linear": 0x2601,
+    "nearest_mipmap_nearest": 0x2700,
+    "linear_mipmap_nearest": 0x2701,
+    "nearest_mipmap_linear": 0x2702,
+    "linear_mipmap_linear": 0x2703,
+}
 _MAG = {"nearest": 0x2600, "linear": 0x2601}
 _WRAP = {"repeat": 0x2901, "mirror": 0x8370, "clamp": 0x812F}
 SCENE_ATTRIBUTES = {
-    "in_position": "3f", "in_normal": "3f", "in_tangent": "4f", "in_uv0": "2f", "in_uv1": "2f", "in_color": "4f",
-    "in_object0": "4f", "in_object1": "4f", "in_object2": "4f", "in_ids": "2i",
-}  # fmt: skip
+    "in_position": "3f",
+    "in_normal": "3f",
+    "in_tangent": "4f",
+    "in_uv0": "2f",
+    "in_uv1": "2f",
+    "in_color": "4f",
+    "in_object0": "4f",
+    "in_object1": "4f",
+    "in_object2": "4f",
+    "in_ids": "2i",
+}
 """What a vertex shader that draws the scene may read, with moderngl's formats."""
 _ABSENT = {"in_tangent": (0.0, 0.0, 0.0, 0.0), "in_uv0": (0.0, 0.0), "in_uv1": (0.0, 0.0), "in_color": (1.0,) * 4}
 """What an attribute holds that no mesh of the scene has; `pack` fills the same in for a mesh that lacks it."""
@@ -61,10 +75,13 @@ class GpuScene:
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed
         for name, array, layout in (
-            ("in_position", packed.positions, "3f"), ("in_normal", packed.normals, "3f"),
-            ("in_tangent", packed.tangents, "4f"), ("in_uv0", packed.uv0, "2f"), ("in_uv1", packed.uv1, "2f"),
+            ("in_position", packed.positions, "3f"),
+            ("in_normal", packed.normals, "3f"),
+            ("in_tangent", packed.tangents, "4f"),
+            ("in_uv0", packed.uv0, "2f"),
+            ("in_uv1", packed.uv1, "2f"),
             ("in_color", packed.colors, "4f"),
-        ):  # fmt: skip
+        ):
             if array is not None and array.size:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
         self._indices = ctx.buffer(packed.indices.tobytes() or bytes(4))

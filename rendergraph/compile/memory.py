@@ -18,8 +18,13 @@ from rendergraph.steps import Read, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 _TEXTURE_LABEL = 0x1702
-_STATUS = {0x8CD6: "INCOMPLETE_ATTACHMENT", 0x8CD7: "MISSING_ATTACHMENT", 0x8CDD: "UNSUPPORTED",
-           0x8D56: "INCOMPLETE_MULTISAMPLE", 0x8DA8: "INCOMPLETE_LAYER_TARGETS"}  # fmt: skip
+_STATUS = {
+    0x8CD6: "INCOMPLETE_ATTACHMENT",
+    0x8CD7: "MISSING_ATTACHMENT",
+    0x8CDD: "UNSUPPORTED",
+    0x8D56: "INCOMPLETE_MULTISAMPLE",
+    0x8DA8: "INCOMPLETE_LAYER_TARGETS",
+}
 
 
 @dataclass(frozen=True)
@@ -147,8 +152,10 @@ class Memory:
         if status != 0x8CD5:
             made.release()
             every = " with ".join(str(target) for target in (*colors, depth) if target is not None)
-            text = (f"the driver does not draw to {every} ({_STATUS.get(status, hex(status))}); "
-                    "a float format of the same channels may do")  # fmt: skip
+            text = (
+                f"the driver does not draw to {every} ({_STATUS.get(status, hex(status))}); "
+                "a float format of the same channels may do"
+            )
             raise RenderError(Problem("RG617", text))
         made.viewport = (0, 0, *size)
         if colors:
@@ -209,9 +216,13 @@ class ClearTarget:
     """Clears one attachment of a bound framebuffer, colour or depth, prepared once."""
 
     def __init__(
-        self, device: Device, framebuffer: moderngl.Framebuffer, index: int | None, format: str,
+        self,
+        device: Device,
+        framebuffer: moderngl.Framebuffer,
+        index: int | None,
+        format: str,
         value: float | tuple[float, ...],
-    ) -> None:  # fmt: skip
+    ) -> None:
         raw, glo, family = device.raw, framebuffer.glo, FORMATS[format].family
         self._args: tuple[int | float, ...]
         dtype = {"uint": np.uint32, "int": np.int32}.get(family, np.float32)

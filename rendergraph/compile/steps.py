@@ -41,10 +41,13 @@ from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
 _TOPOLOGY = {
-    "points": moderngl.POINTS, "lines": moderngl.LINES, "line_strip": moderngl.LINE_STRIP,
-    "triangles": moderngl.TRIANGLES, "triangle_strip": moderngl.TRIANGLE_STRIP,
+    "points": moderngl.POINTS,
+    "lines": moderngl.LINES,
+    "line_strip": moderngl.LINE_STRIP,
+    "triangles": moderngl.TRIANGLES,
+    "triangle_strip": moderngl.TRIANGLE_STRIP,
     "triangles_adjacency": moderngl.TRIANGLES_ADJACENCY,
-}  # fmt: skip
+}
 _ALL_BARRIERS = 0xFFFFFFFF
 _TEXTURE_2D = 0x0DE1
 
@@ -126,9 +129,14 @@ class _Compiler:
     def _step(self, step: Step, position: int, parity: int) -> CompiledStep:
         compiled = CompiledStep(step)
         {
-            "fullscreen": self._fullscreen, "geometry": self._geometry, "draw": self._draw, "compute": self._compute,
-            "clear": self._transfer, "mipmaps": self._transfer, "copy": self._transfer,
-        }[step.kind](step, compiled, parity)  # fmt: skip
+            "fullscreen": self._fullscreen,
+            "geometry": self._geometry,
+            "draw": self._draw,
+            "compute": self._compute,
+            "clear": self._transfer,
+            "mipmaps": self._transfer,
+            "copy": self._transfer,
+        }[step.kind](step, compiled, parity)
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
             clear_buffer(self.device, self.memory, write)

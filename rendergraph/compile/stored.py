@@ -34,9 +34,10 @@ def check_stored(
     only_read = {
         before + read.name: "image" if read.use == "image" else "buffer"
         for before, read in named
-        if read.use in ("image", "buffer") and before + read.name not in written
+        if read.use in ("image", "buffer")
+        and before + read.name not in written
         and before + read.name in (program.uniforms if read.use == "image" else program.storage)
-    }  # fmt: skip
+    }
     uses: list[tuple[str, Read | Write]] = [*named, *(("", write) for write in step.writes)]
     short = {}
     for before, use in uses:

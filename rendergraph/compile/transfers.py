@@ -44,10 +44,16 @@ def image_calls(device: Device, memory: Memory, step: Step, parity: int) -> tupl
         layered = touched.layer is None and texture.desc.kind != "texture2d"
         calls.append(
             partial(
-                device.raw.glBindImageTexture, unit, texture.glo, touched.mip or 0, int(layered), touched.layer or 0,
-                _READ_WRITE, FORMATS[texture.desc.format].gl,
+                device.raw.glBindImageTexture,
+                unit,
+                texture.glo,
+                touched.mip or 0,
+                int(layered),
+                touched.layer or 0,
+                _READ_WRITE,
+                FORMATS[texture.desc.format].gl,
             )
-        )  # fmt: skip
+        )
     written = [write for write in step.writes if write.use == "image" and write.load == "clear"]
     calls += [_clear(device, memory, write, parity) for write in written]
     return calls, {touched.name: unit for unit, touched in enumerate(images)}
@@ -65,8 +71,21 @@ def _copy(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]
     source, target = memory.texture(read.resource, parity), memory.texture(write.resource, parity)
     return [
         partial(
-            device.raw.glCopyImageSubData, source.glo, source.target, mip, 0, 0, 0, target.glo, target.target, mip,
-            0, 0, 0, *source.desc.mip_size(mip), source.desc.layers,
+            device.raw.glCopyImageSubData,
+            source.glo,
+            source.target,
+            mip,
+            0,
+            0,
+            0,
+            target.glo,
+            target.target,
+            mip,
+            0,
+            0,
+            0,
+            *source.desc.mip_size(mip),
+            source.desc.layers,
         )
         for mip in range(source.desc.mips)
-    ]  # fmt: skip
+    ]

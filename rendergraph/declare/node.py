@@ -51,8 +51,12 @@ class Node(BaseModel):
     """
 
     model_config = ConfigDict(
-        frozen=True, strict=True, extra="forbid", ignored_types=PORT_TYPES, protected_namespaces=(),
-    )  # fmt: skip
+        frozen=True,
+        strict=True,
+        extra="forbid",
+        ignored_types=PORT_TYPES,
+        protected_namespaces=(),
+    )
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

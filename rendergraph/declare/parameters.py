@@ -16,8 +16,9 @@ def _parameter(
     return Field(default=default, description=doc, json_schema_extra={"role": role, "unit": unit} | limits | extra)
 
 
-def param(*, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None,
-          glsl: str = "") -> Any:  # fmt: skip
+def param(
+    *, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None, glsl: str = ""
+) -> Any:
     """A parameter that becomes a uniform: changing it rebuilds nothing.
 
     Args:
@@ -30,8 +31,16 @@ def param(*, default: Any, doc: str, unit: str = "", min: float | None = None, m
     return _parameter("param", default, unit, doc, min, max, {"glsl": glsl} if glsl else {})
 
 
-def define(*, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None,
-           choices: str = "", needs: tuple[str, ...] = ()) -> Any:  # fmt: skip
+def define(
+    *,
+    default: Any,
+    doc: str,
+    unit: str = "",
+    min: float | None = None,
+    max: float | None = None,
+    choices: str = "",
+    needs: tuple[str, ...] = (),
+) -> Any:
     """A parameter that becomes program text: `#define NAME value`, and `#define NAME_CHOICE` for a choice.
 
     Numbers and switches become `#define SAMPLES 16`; a choice `curve: aces` becomes `#define CURVE CURVE_ACES`, where

@@ -14,6 +14,16 @@ from rendergraph.diff.structure import (
 )
 
 __all__ = [
-    "GraphDiff", "LinkChange", "OutputChange", "ParameterChange", "PlanFigures", "Retyped", "diff", "diff_json",
-    "diff_svg", "diff_text", "figures", "value_text",
-]  # fmt: skip
+    "GraphDiff",
+    "LinkChange",
+    "OutputChange",
+    "ParameterChange",
+    "PlanFigures",
+    "Retyped",
+    "diff",
+    "diff_json",
+    "diff_svg",
+    "diff_text",
+    "figures",
+    "value_text",
+]

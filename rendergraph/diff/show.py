@@ -93,12 +93,10 @@ def diff_json(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | No
         "renamed": dict(difference.renamed),
         "retyped": [asdict(change) for change in difference.retyped],
         "parameters": [asdict(change) for change in difference.parameters],
-        "links": [
-            {"node": c.node, "port": c.port, "old": list(c.old), "new": list(c.new)} for c in difference.links
-        ],
+        "links": [{"node": c.node, "port": c.port, "old": list(c.old), "new": list(c.new)} for c in difference.links],
         "outputs": [asdict(change) for change in difference.outputs],
         "sizes": None if difference.sizes is None else [list(size) for size in difference.sizes],
-    }  # fmt: skip
+    }
     if plans is not None:
         found["plan"] = {"a": asdict(plans[0]), "b": asdict(plans[1])}
     return found

@@ -85,5 +85,15 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
 
 
 __all__ = [
-    "BROKEN", "Document", "Limits", "Source", "Value", "kind_of", "load", "parse", "read_bytes", "scalar", "shown",
-]  # fmt: skip
+    "BROKEN",
+    "Document",
+    "Limits",
+    "Source",
+    "Value",
+    "kind_of",
+    "load",
+    "parse",
+    "read_bytes",
+    "scalar",
+    "shown",
+]

@@ -15,8 +15,14 @@ from rendergraph.expand.recording import record_all
 from rendergraph.link import Endpoint, Graph
 
 __all__ = [
-    "CAMERA", "Expansion", "ViewTable", "define_parameters", "expand", "is_empty", "param_uniforms",
-]  # fmt: skip
+    "CAMERA",
+    "Expansion",
+    "ViewTable",
+    "define_parameters",
+    "expand",
+    "is_empty",
+    "param_uniforms",
+]
 
 
 def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:

@@ -200,9 +200,16 @@ class Numbering:
         whole = part.layer is None
         kind = desc.kind if isinstance(desc, TextureDesc) and whole else "texture2d"
         return Read(
-            name, resource, at_end if version is None else version, use, sampler,  # type: ignore[arg-type]
-            part.mip, part.layer, end.previous, kind,
-        )  # fmt: skip
+            name,
+            resource,
+            at_end if version is None else version,
+            use,
+            sampler,  # type: ignore[arg-type]
+            part.mip,
+            part.layer,
+            end.previous,
+            kind,
+        )
 
     def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
         if resource in self.resources:
@@ -343,11 +350,15 @@ class Numbering:
         present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
         return [
             FunctionBinding(
-                port.signature.name, node.id, port.shader, tuple(reads),
-                (*present, *define_parameters(node.node, node.choices)), tuple(param_uniforms(node.node)),
+                port.signature.name,
+                node.id,
+                port.shader,
+                tuple(reads),
+                (*present, *define_parameters(node.node, node.choices)),
+                tuple(param_uniforms(node.node)),
                 _includes(node.choices),
             )
-        ]  # fmt: skip
+        ]
 
 
 def _includes(plugged: Mapping[str, Choice]) -> tuple[tuple[str, Path], ...]:

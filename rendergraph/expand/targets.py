@@ -33,8 +33,10 @@ def feedback(request: Request, write: Write, reads: Iterable[Read]) -> str | Non
         if read.resource != write.resource or read.previous or read.use != "sample":
             continue
         if read.mip in (None, write.mip or 0) and overlap((0, read.layer), (0, write.layer)):
-            return (f"it samples '{read.resource}' in the step that writes it; "
-                    "blend, sample another mip or layer, or go through an `Internal`")  # fmt: skip
+            return (
+                f"it samples '{read.resource}' in the step that writes it; "
+                "blend, sample another mip or layer, or go through an `Internal`"
+            )
     return None
 
 

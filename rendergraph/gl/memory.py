@@ -54,8 +54,9 @@ def free_on_device(device: Device) -> int | None:
     if device.software:
         return None
     for extension, parameter in (
-        ("GL_NVX_gpu_memory_info", _NVX_CURRENT_AVAILABLE), ("GL_ATI_meminfo", _ATI_TEXTURE_FREE),
-    ):  # fmt: skip
+        ("GL_NVX_gpu_memory_info", _NVX_CURRENT_AVAILABLE),
+        ("GL_ATI_meminfo", _ATI_TEXTURE_FREE),
+    ):
         if extension in device.ctx.extensions:
             kibibytes = (ctypes.c_int * 4)()  # the second answers with four numbers, of which the first is the total
             device.raw.glGetIntegerv(parameter, ctypes.byref(kibibytes))

@@ -26,23 +26,48 @@ _NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92
 _ACTIVE, _BUFFER_DATA_SIZE = 0x92F5, 0x9303
 
 _WRITERS: dict[int, tuple[str, Any, int]] = {  # GL type: raw function, NumPy type, numbers per element
-    0x1406: ("glProgramUniform1fv", np.float32, 1), 0x8B50: ("glProgramUniform2fv", np.float32, 2),
-    0x8B51: ("glProgramUniform3fv", np.float32, 3), 0x8B52: ("glProgramUniform4fv", np.float32, 4),
-    0x1404: ("glProgramUniform1iv", np.int32, 1), 0x8B53: ("glProgramUniform2iv", np.int32, 2),
-    0x8B54: ("glProgramUniform3iv", np.int32, 3), 0x8B55: ("glProgramUniform4iv", np.int32, 4),
-    0x1405: ("glProgramUniform1uiv", np.uint32, 1), 0x8DC6: ("glProgramUniform2uiv", np.uint32, 2),
-    0x8DC7: ("glProgramUniform3uiv", np.uint32, 3), 0x8DC8: ("glProgramUniform4uiv", np.uint32, 4),
-    0x8B56: ("glProgramUniform1iv", np.int32, 1), 0x8B57: ("glProgramUniform2iv", np.int32, 2),
-    0x8B58: ("glProgramUniform3iv", np.int32, 3), 0x8B59: ("glProgramUniform4iv", np.int32, 4),
-    0x8B5A: ("glProgramUniformMatrix2fv", np.float32, 4), 0x8B5B: ("glProgramUniformMatrix3fv", np.float32, 9),
+    0x1406: ("glProgramUniform1fv", np.float32, 1),
+    0x8B50: ("glProgramUniform2fv", np.float32, 2),
+    0x8B51: ("glProgramUniform3fv", np.float32, 3),
+    0x8B52: ("glProgramUniform4fv", np.float32, 4),
+    0x1404: ("glProgramUniform1iv", np.int32, 1),
+    0x8B53: ("glProgramUniform2iv", np.int32, 2),
+    0x8B54: ("glProgramUniform3iv", np.int32, 3),
+    0x8B55: ("glProgramUniform4iv", np.int32, 4),
+    0x1405: ("glProgramUniform1uiv", np.uint32, 1),
+    0x8DC6: ("glProgramUniform2uiv", np.uint32, 2),
+    0x8DC7: ("glProgramUniform3uiv", np.uint32, 3),
+    0x8DC8: ("glProgramUniform4uiv", np.uint32, 4),
+    0x8B56: ("glProgramUniform1iv", np.int32, 1),
+    0x8B57: ("glProgramUniform2iv", np.int32, 2),
+    0x8B58: ("glProgramUniform3iv", np.int32, 3),
+    0x8B59: ("glProgramUniform4iv", np.int32, 4),
+    0x8B5A: ("glProgramUniformMatrix2fv", np.float32, 4),
+    0x8B5B: ("glProgramUniformMatrix3fv", np.float32, 9),
     0x8B5C: ("glProgramUniformMatrix4fv", np.float32, 16),
-}  # fmt: skip
+}
 
 _GLSL = {
-    0x1406: "float", 0x8B50: "vec2", 0x8B51: "vec3", 0x8B52: "vec4", 0x1404: "int", 0x8B53: "ivec2", 0x8B54: "ivec3",
-    0x8B55: "ivec4", 0x1405: "uint", 0x8DC6: "uvec2", 0x8DC7: "uvec3", 0x8DC8: "uvec4", 0x8B56: "bool", 0x8B57: "bvec2",
-    0x8B58: "bvec3", 0x8B59: "bvec4", 0x8B5A: "mat2", 0x8B5B: "mat3", 0x8B5C: "mat4",
-}  # fmt: skip
+    0x1406: "float",
+    0x8B50: "vec2",
+    0x8B51: "vec3",
+    0x8B52: "vec4",
+    0x1404: "int",
+    0x8B53: "ivec2",
+    0x8B54: "ivec3",
+    0x8B55: "ivec4",
+    0x1405: "uint",
+    0x8DC6: "uvec2",
+    0x8DC7: "uvec3",
+    0x8DC8: "uvec4",
+    0x8B56: "bool",
+    0x8B57: "bvec2",
+    0x8B58: "bvec3",
+    0x8B59: "bvec4",
+    0x8B5A: "mat2",
+    0x8B5B: "mat3",
+    0x8B5C: "mat4",
+}
 
 ProgramError = moderngl.Error
 

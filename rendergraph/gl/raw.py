@@ -185,6 +185,13 @@ class RawGL:
         code = first
         while code:
             code = self.glGetError()
-        names = {0x500: "INVALID_ENUM", 0x501: "INVALID_VALUE", 0x502: "INVALID_OPERATION", 0x503: "STACK_OVERFLOW",
-                 0x504: "STACK_UNDERFLOW", 0x505: "OUT_OF_MEMORY", 0x506: "INVALID_FRAMEBUFFER_OPERATION"}  # fmt: skip
+        names = {
+            0x500: "INVALID_ENUM",
+            0x501: "INVALID_VALUE",
+            0x502: "INVALID_OPERATION",
+            0x503: "STACK_OVERFLOW",
+            0x504: "STACK_UNDERFLOW",
+            0x505: "OUT_OF_MEMORY",
+            0x506: "INVALID_FRAMEBUFFER_OPERATION",
+        }
         return names.get(first, hex(first)) if first else None

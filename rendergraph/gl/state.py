@@ -8,13 +8,38 @@ from functools import partial
 from rendergraph.gl.raw import RawGL
 from rendergraph.steps import Blend, State, StencilFace
 
-_COMPARE = {"never": 0x200, "less": 0x201, "equal": 0x202, "lequal": 0x203, "greater": 0x204, "notequal": 0x205,
-            "gequal": 0x206, "always": 0x207}  # fmt: skip
-_STENCIL_OP = {"keep": 0x1E00, "zero": 0, "replace": 0x1E01, "incr": 0x1E02, "incr_wrap": 0x8507, "decr": 0x1E03,
-               "decr_wrap": 0x8508, "invert": 0x150A}  # fmt: skip
-_FACTOR = {"zero": 0, "one": 1, "src_color": 0x300, "one_minus_src_color": 0x301, "src_alpha": 0x302,
-           "one_minus_src_alpha": 0x303, "dst_alpha": 0x304, "one_minus_dst_alpha": 0x305, "dst_color": 0x306,
-           "one_minus_dst_color": 0x307}  # fmt: skip
+_COMPARE = {
+    "never": 0x200,
+    "less": 0x201,
+    "equal": 0x202,
+    "lequal": 0x203,
+    "greater": 0x204,
+    "notequal": 0x205,
+    "gequal": 0x206,
+    "always": 0x207,
+}
+_STENCIL_OP = {
+    "keep": 0x1E00,
+    "zero": 0,
+    "replace": 0x1E01,
+    "incr": 0x1E02,
+    "incr_wrap": 0x8507,
+    "decr": 0x1E03,
+    "decr_wrap": 0x8508,
+    "invert": 0x150A,
+}
+_FACTOR = {
+    "zero": 0,
+    "one": 1,
+    "src_color": 0x300,
+    "one_minus_src_color": 0x301,
+    "src_alpha": 0x302,
+    "one_minus_src_alpha": 0x303,
+    "dst_alpha": 0x304,
+    "one_minus_dst_alpha": 0x305,
+    "dst_color": 0x306,
+    "one_minus_dst_color": 0x307,
+}
 _EQUATION = {"add": 0x8006, "min": 0x8007, "max": 0x8008, "subtract": 0x800A, "reverse_subtract": 0x800B}
 _CULL = {"front": 0x404, "back": 0x405}
 _BLEND, _CULL_FACE, _DEPTH_TEST, _STENCIL_TEST, _OFFSET, _CLAMP = 0x0BE2, 0x0B44, 0x0B71, 0x0B90, 0x8037, 0x864F
@@ -46,9 +71,9 @@ def pieces(
         return partial(raw.glDisable, capability)
 
     calls: Pieces = {}
-    calls["depth"] = (on(_DEPTH_TEST), partial(raw.glDepthFunc, _COMPARE[state.depth_func])) if depth_test else (
-        off(_DEPTH_TEST),
-    )  # fmt: skip
+    calls["depth"] = (
+        (on(_DEPTH_TEST), partial(raw.glDepthFunc, _COMPARE[state.depth_func])) if depth_test else (off(_DEPTH_TEST),)
+    )
     calls["cull"] = (on(_CULL_FACE), partial(raw.glCullFace, _CULL[cull])) if cull != "none" else (off(_CULL_FACE),)
     calls["front"] = (partial(raw.glFrontFace, 0x900 if clockwise else 0x901),)
     calls["blend"] = tuple(_blend(raw, state, targets))
@@ -93,11 +118,14 @@ def _stencil(raw: RawGL, state: State) -> list[Call]:
         calls += [
             partial(raw.glStencilFuncSeparate, face, _COMPARE[s.func], s.reference, s.read_mask),
             partial(
-                raw.glStencilOpSeparate, face, _STENCIL_OP[s.stencil_fail], _STENCIL_OP[s.depth_fail],
+                raw.glStencilOpSeparate,
+                face,
+                _STENCIL_OP[s.stencil_fail],
+                _STENCIL_OP[s.depth_fail],
                 _STENCIL_OP[s.depth_pass],
             ),
             partial(raw.glStencilMaskSeparate, face, s.write_mask),
-        ]  # fmt: skip
+        ]
     return calls
 
 

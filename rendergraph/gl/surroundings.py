@@ -142,15 +142,26 @@ _BLOCKS = (
 """Target, number of binding points; parameters for the buffer, its start and its size at each."""
 
 _TEXTURES = {
-    0x0DE0: 0x8068, 0x0DE1: 0x8069, 0x806F: 0x806A, 0x8C18: 0x8C1C, 0x8C1A: 0x8C1D, 0x84F5: 0x84F6, 0x8513: 0x8514,
-    0x9009: 0x900A, 0x8C2A: 0x8C2C, 0x9100: 0x9104, 0x9102: 0x9105,
-}  # fmt: skip
+    0x0DE0: 0x8068,
+    0x0DE1: 0x8069,
+    0x806F: 0x806A,
+    0x8C18: 0x8C1C,
+    0x8C1A: 0x8C1D,
+    0x84F5: 0x84F6,
+    0x8513: 0x8514,
+    0x9009: 0x900A,
+    0x8C2A: 0x8C2C,
+    0x9100: 0x9104,
+    0x9102: 0x9105,
+}
 """Texture target to the parameter that says what is bound to it."""
 
 _READERS: dict[tuple[str, bool], tuple[str, Any]] = {
-    ("i", False): ("glGetIntegerv", ctypes.c_int), ("f", False): ("glGetDoublev", ctypes.c_double),
-    ("i", True): ("glGetIntegeri_v", ctypes.c_int), ("f", True): ("glGetDoublei_v", ctypes.c_double),
-}  # fmt: skip
+    ("i", False): ("glGetIntegerv", ctypes.c_int),
+    ("f", False): ("glGetDoublev", ctypes.c_double),
+    ("i", True): ("glGetIntegeri_v", ctypes.c_int),
+    ("f", True): ("glGetDoublei_v", ctypes.c_double),
+}
 
 
 def settle(raw: RawGL) -> None:

@@ -62,8 +62,10 @@ def create(device: Device, desc: TextureDesc, label: str = "") -> GpuTexture:
     error = raw.error()
     if error:
         raw.delete("glDeleteTextures", glo)
-        text = (f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
-                f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})")  # fmt: skip
+        text = (
+            f"the driver could not allocate {label or 'a texture'}: {desc.width}x{desc.height} {desc.format}, "
+            f"{desc.layers} layers, {desc.samples} samples, {desc.bytes / 2**20:.0f} MiB ({error})"
+        )
         raise RenderError(Problem("RG612", text))
     device.textures_made += 1
     return GpuTexture(glo, target, desc)
@@ -184,9 +186,14 @@ class Clear:
     """A clear of a texture, one mip or one layer, prepared once and called in every frame."""
 
     def __init__(
-        self, device: Device, texture: GpuTexture, value: float | tuple[float, ...], *, mip: int | None = None,
+        self,
+        device: Device,
+        texture: GpuTexture,
+        value: float | tuple[float, ...],
+        *,
+        mip: int | None = None,
         layer: int | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         desc = texture.desc
         gl_format, gl_type, dtype, channels = transfer_format(desc.format)
         if FORMATS[desc.format].srgb or (dtype is np.uint8):
@@ -236,9 +243,15 @@ def create_sampler(device: Device, sampler: Sampler) -> int:
 
 
 def create_gl_sampler(
-    device: Device, min_filter: int, mag_filter: int, wrap_s: int, wrap_t: int, *, compare: bool = False,
+    device: Device,
+    min_filter: int,
+    mag_filter: int,
+    wrap_s: int,
+    wrap_t: int,
+    *,
+    compare: bool = False,
     anisotropy: int = 1,
-) -> int:  # fmt: skip
+) -> int:
     """A GL sampler object from GL enums."""
     raw = device.raw
     glo = raw.make("glCreateSamplers")

@@ -6,5 +6,12 @@ from rendergraph.glsl.names import declared
 from rendergraph.glsl.source import MAX_BYTES, MAX_DEPTH, Includes, Origin, SourceText, expand, strip_comments
 
 __all__ = [
-    "MAX_BYTES", "MAX_DEPTH", "Includes", "Origin", "SourceText", "declared", "expand", "strip_comments",
-]  # fmt: skip
+    "MAX_BYTES",
+    "MAX_DEPTH",
+    "Includes",
+    "Origin",
+    "SourceText",
+    "declared",
+    "expand",
+    "strip_comments",
+]

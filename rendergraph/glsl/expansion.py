@@ -158,8 +158,9 @@ class _Preprocessor:
     def _holds(self, word: str, rest: str) -> bool:
         if word != "if":
             return (rest.strip() in self.macros) == (word == "ifdef")
-        asked = re.sub(r"\bdefined\s*(?:\(\s*(\w+)\s*\)|(\w+))",
-                       lambda m: "1" if (m[1] or m[2]) in self.macros else "0", rest)  # fmt: skip
+        asked = re.sub(
+            r"\bdefined\s*(?:\(\s*(\w+)\s*\)|(\w+))", lambda m: "1" if (m[1] or m[2]) in self.macros else "0", rest
+        )
         return Condition(self._expand(_TOKEN.findall(asked))).value() != 0
 
     def _expand(self, words: list[str]) -> list[str]:
@@ -253,14 +254,25 @@ def _arguments(rest: list[_Token]) -> tuple[list[list[_Token]], frozenset[str]] 
 
 
 _BINARY: dict[str, tuple[int, Callable[[int, int], int]]] = {
-    "||": (1, lambda a, b: a or b), "&&": (2, lambda a, b: a and b), "|": (3, lambda a, b: a | b),
-    "^": (4, lambda a, b: a ^ b), "&": (5, lambda a, b: a & b), "==": (6, lambda a, b: a == b),
-    "!=": (6, lambda a, b: a != b), "<": (7, lambda a, b: a < b), ">": (7, lambda a, b: a > b),
-    "<=": (7, lambda a, b: a <= b), ">=": (7, lambda a, b: a >= b), "<<": (8, lambda a, b: a << (b & 31)),
-    ">>": (8, lambda a, b: a >> (b & 31)), "+": (9, lambda a, b: a + b), "-": (9, lambda a, b: a - b),
-    "*": (10, lambda a, b: a * b), "/": (10, lambda a, b: int(a / b) if b else 0),
+    "||": (1, lambda a, b: a or b),
+    "&&": (2, lambda a, b: a and b),
+    "|": (3, lambda a, b: a | b),
+    "^": (4, lambda a, b: a ^ b),
+    "&": (5, lambda a, b: a & b),
+    "==": (6, lambda a, b: a == b),
+    "!=": (6, lambda a, b: a != b),
+    "<": (7, lambda a, b: a < b),
+    ">": (7, lambda a, b: a > b),
+    "<=": (7, lambda a, b: a <= b),
+    ">=": (7, lambda a, b: a >= b),
+    "<<": (8, lambda a, b: a << (b & 31)),
+    ">>": (8, lambda a, b: a >> (b & 31)),
+    "+": (9, lambda a, b: a + b),
+    "-": (9, lambda a, b: a - b),
+    "*": (10, lambda a, b: a * b),
+    "/": (10, lambda a, b: int(a / b) if b else 0),
     "%": (10, lambda a, b: a - b * int(a / b) if b else 0),
-}  # fmt: skip
+}
 
 
 class Condition:

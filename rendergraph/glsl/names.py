@@ -16,11 +16,28 @@ _WORD = re.compile(r"[A-Za-z_]\w*\Z")
 _STORAGE: dict[str, Storage] = {"uniform": "uniform", "in": "in", "out": "out", "buffer": "buffer"}
 _QUALIFIERS = frozenset(
     [
-        "const", "inout", "shared", "flat", "smooth", "noperspective", "centroid", "sample", "patch", "invariant",
-        "precise", "coherent", "volatile", "restrict", "readonly", "writeonly", "highp", "mediump", "lowp",
+        "const",
+        "inout",
+        "shared",
+        "flat",
+        "smooth",
+        "noperspective",
+        "centroid",
+        "sample",
+        "patch",
+        "invariant",
+        "precise",
+        "coherent",
+        "volatile",
+        "restrict",
+        "readonly",
+        "writeonly",
+        "highp",
+        "mediump",
+        "lowp",
         "subroutine",
     ]
-)  # fmt: skip
+)
 _DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.MULTILINE)
 _MEMBERS = re.compile(
     r"\bstruct\s+\w+\s*\{([^{}]*)\}|\b(?:uniform|buffer|in|out)\s+\w+\s*\{([^{}]*)\}\s*[A-Za-z_]\w*\s*(?:\[[^\]]*\])?\s*;"

@@ -145,9 +145,15 @@ class Includes:
         return SourceText(tuple(lines), tuple(origins))
 
     def _file(
-        self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
+        self,
+        file: Path,
+        root: Path,
+        base: Origin,
+        stack: list[Path],
+        lines: list[str],
+        origins: list[Origin],
         depth: list[int],
-    ) -> None:  # fmt: skip
+    ) -> None:
         raw, stripped = _lines(file)
         stack = [*stack, self._resolve(file)]
         for number, line in enumerate(stripped, start=1):
@@ -200,9 +206,15 @@ class Includes:
         return self._resolved[path]
 
     def _include(
-        self, file: Path, root: Path, base: Origin, stack: list[Path], lines: list[str], origins: list[Origin],
+        self,
+        file: Path,
+        root: Path,
+        base: Origin,
+        stack: list[Path],
+        lines: list[str],
+        origins: list[Origin],
         depth: list[int],
-    ) -> None:  # fmt: skip
+    ) -> None:
         key = (self._resolve(file), base.prefix)
         if key in self._certain:
             return

@@ -21,7 +21,22 @@ from rendergraph.images.saving import (
 from rendergraph.images.view import from_srgb, to_srgb, viewable
 
 __all__ = [
-    "EXTENSIONS", "Limits", "PictureInfo", "Saved", "channel_names", "check_target", "decode", "from_srgb",
-    "is_numbered", "numbered", "output_for", "read", "read_metadata", "save_output", "save_outputs", "to_srgb",
-    "viewable", "write",
-]  # fmt: skip
+    "EXTENSIONS",
+    "Limits",
+    "PictureInfo",
+    "Saved",
+    "channel_names",
+    "check_target",
+    "decode",
+    "from_srgb",
+    "is_numbered",
+    "numbered",
+    "output_for",
+    "read",
+    "read_metadata",
+    "save_output",
+    "save_outputs",
+    "to_srgb",
+    "viewable",
+    "write",
+]

@@ -166,8 +166,13 @@ def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
 
 
 _FORMAT_NAMES = {
-    ".png": "png", ".jpg": "jpeg", ".exr": "openexr", ".hdr": "hdr", ".bmp": "bmp", ".tga": "targa",
-}  # fmt: skip
+    ".png": "png",
+    ".jpg": "jpeg",
+    ".exr": "openexr",
+    ".hdr": "hdr",
+    ".bmp": "bmp",
+    ".tga": "targa",
+}
 
 
 def _beginning(source: ImageSource) -> tuple[bytes, int]:

@@ -109,7 +109,7 @@ class Checker:
 
     def _say(
         self, bound: Bound, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
-    ) -> None:  # fmt: skip
+    ) -> None:
         text = f"'{bound.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
         way = self._neighbour(port, link) or self._converters(hint)
         if not way and code == "RG201":
@@ -214,19 +214,21 @@ class Checker:
 
     def _resolving(self, info: TextureInfo) -> Accepts:
         return lambda cls: any(
-            port.samples != "single" and _means(port, info.semantic, any_too=True)
+            port.samples != "single"
+            and _means(port, info.semantic, any_too=True)
             and any(_continues(out, port, info) and out.samples == 1 for out in _outputs(cls))
             for port in _only_input(cls)
-        )  # fmt: skip
+        )
 
     def _resizing(self, info: TextureInfo) -> Accepts:
         return lambda cls: any(
-            port.size == "any" and _means(port, info.semantic, any_too=True)
+            port.size == "any"
+            and _means(port, info.semantic, any_too=True)
             and any(
                 _continues(out, port, info) and out.like is None and out.size in (None, 1.0) for out in _outputs(cls)
             )
             for port in _only_input(cls)
-        )  # fmt: skip
+        )
 
 
 def kind_of(port: Port, info: TextureInfo) -> str:

@@ -24,7 +24,7 @@ from rendergraph.declare import (
     Port,
     TextureInfo,
     Views,
-)  # fmt: skip
+)
 from rendergraph.declare.blame import is_deliberate, what_happened
 from rendergraph.document import shown
 from rendergraph.errors import Problem, node_named
@@ -45,7 +45,7 @@ from rendergraph.textures import (
     TextureDesc,
     View,
     full_mip_count,
-)  # fmt: skip
+)
 
 CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
@@ -293,9 +293,7 @@ class Infer:
             raise _Unknown
         return tuple(given)
 
-    def _view(
-        self, end: Endpoint, bound: Bound, port: Made, semantic: Semantic
-    ) -> tuple[str | None, tuple[int, ...]]:  # fmt: skip
+    def _view(self, end: Endpoint, bound: Bound, port: Made, semantic: Semantic) -> tuple[str | None, tuple[int, ...]]:
         """The view table it is drawn with, and the light of each layer."""
         named: Port | None = bound.ports.get(port.view) if port.view else None
         view: str | None = None

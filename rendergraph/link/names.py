@@ -138,9 +138,7 @@ class Names:
         names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
         return [name.removeprefix(scope) for name in names[:500]] + (["inputs"] if scope else [])
 
-    def _follow(
-        self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int
-    ) -> Link | None:  # fmt: skip
+    def _follow(self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
         if depth > 100:
             raise Wrong(value.problem("RG117", f"'{shown(value.data)}' leads back to itself; link it to a node's port"))
         if name == "inputs" and scope:

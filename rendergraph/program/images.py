@@ -20,9 +20,25 @@ _IMAGE = re.compile(
     rf"(?P<type>[iu]?image\w+)\s+(?P<name>[A-Za-z_]\w*))"
 )
 _LAYOUT_FORMATS = frozenset(FORMATS) | {
-    "rg16_snorm", "r16_snorm", "rgba8_snorm", "rg8_snorm", "r8_snorm", "rgba32i", "rgba16i", "rgba8i", "rg32i", "rg16i",
-    "rg8i", "r16i", "r8i", "rgba16ui", "rgb10_a2ui", "rgba8ui", "rg16ui", "rg8ui",
-}  # fmt: skip
+    "rg16_snorm",
+    "r16_snorm",
+    "rgba8_snorm",
+    "rg8_snorm",
+    "r8_snorm",
+    "rgba32i",
+    "rgba16i",
+    "rgba8i",
+    "rg32i",
+    "rg16i",
+    "rg8i",
+    "r16i",
+    "r8i",
+    "rgba16ui",
+    "rgb10_a2ui",
+    "rgba8ui",
+    "rg16ui",
+    "rg8ui",
+}
 
 
 def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resource]) -> SourceText:

@@ -126,9 +126,16 @@ def read_defines(
 
 
 def _stage(
-    stage: str, name: str, step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable], macros: Mapping[str, str], wanted: Mapping[str, Signature], include_folder: Path,
-) -> StageText:  # fmt: skip
+    stage: str,
+    name: str,
+    step: Step,
+    types: Mapping[str, NodeType],
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
+    macros: Mapping[str, str],
+    wanted: Mapping[str, Signature],
+    include_folder: Path,
+) -> StageText:
     includes = Includes(include_folder)
     view = includes.expand(include_folder / "view.glsl")
     view = SourceText(view.lines, tuple(replace(origin, shared=True) for origin in view.origins))
@@ -170,9 +177,7 @@ def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
     return found, SourceText(lines, source.origins)
 
 
-def _read_declarations(
-    reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str
-) -> SourceText:  # fmt: skip
+def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str) -> SourceText:
     """Views and light tables of the textures read, where the text looks at them."""
     text = SourceText()
     for read in reads:
@@ -209,9 +214,14 @@ def _declared_signatures(node: NodeType) -> dict[str, Signature]:
 
 
 def _functions(
-    stage: str, signature: Signature, step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable], includes: Includes,
-) -> SourceText:  # fmt: skip
+    stage: str,
+    signature: Signature,
+    step: Step,
+    types: Mapping[str, NodeType],
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
+    includes: Includes,
+) -> SourceText:
     """The providers' texts with prefixed names, and the one function that joins them."""
     text = SourceText()
     factors: list[str] = []
@@ -251,9 +261,12 @@ def _screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read
     names = [
         name
         for name, port in node.cls.inputs().items()
-        if isinstance(port, Input) and port.kind in TEXTURE_KINDS and port.semantic is not None
-        and signature.texture is not None and port.semantic.name == signature.texture
-    ]  # fmt: skip
+        if isinstance(port, Input)
+        and port.kind in TEXTURE_KINDS
+        and port.semantic is not None
+        and signature.texture is not None
+        and port.semantic.name == signature.texture
+    ]
     wanted = re.compile(rf"(?:{'|'.join(names)})(?:_\d+)?\Z") if names else None
     return [read for read in step.reads if wanted and wanted.match(read.name) and read.use == "sample"]
 
@@ -273,9 +286,12 @@ def _screen_factors(read: Read, lights: tuple[int, ...], signature: Signature) -
 
 
 def provider_text(
-    binding: FunctionBinding, node: NodeType, resources: Mapping[str, Resource], views: Mapping[str, ViewTable],
+    binding: FunctionBinding,
+    node: NodeType,
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
     includes: Includes,
-) -> SourceText:  # fmt: skip
+) -> SourceText:
     """One provider's text with every name it declares, its inputs and its parameters prefixed.
 
     Raises:

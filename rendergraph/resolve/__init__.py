@@ -202,5 +202,13 @@ def _with_plugins(tree: Value, files: Files) -> Value:
 
 
 __all__ = [
-    "DEFAULT_SIZE", "MOST_SIDE", "NodeSpec", "Parameter", "PipelineSpec", "Scope", "diff", "merge_patch", "resolve",
-]  # fmt: skip
+    "DEFAULT_SIZE",
+    "MOST_SIDE",
+    "NodeSpec",
+    "Parameter",
+    "PipelineSpec",
+    "Scope",
+    "diff",
+    "merge_patch",
+    "resolve",
+]

@@ -63,9 +63,14 @@ class Flattener:
         self.files.notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
 
     def _node(
-        self, name: str, node: Value, scope: str, values: Mapping[str, Value | None], used: set[str],
+        self,
+        name: str,
+        node: Value,
+        scope: str,
+        values: Mapping[str, Value | None],
+        used: set[str],
         sets: Sequence[Setting],
-    ) -> Value:  # fmt: skip
+    ) -> Value:
         node_id = f"{scope}{name}"
         params: dict[str, Value] = {}
         for key, value in entries(node, "params").items():
@@ -93,9 +98,16 @@ class Flattener:
         return self._composite(name, node, node_type, sub, scope, params, inputs, sets)
 
     def _composite(
-        self, name: str, node: Value, node_type: Value, sub: Value, scope: str, params: Mapping[str, Value],
-        inputs: dict[str, Value], sets: Sequence[Setting],
-    ) -> Value:  # fmt: skip
+        self,
+        name: str,
+        node: Value,
+        node_type: Value,
+        sub: Value,
+        scope: str,
+        params: Mapping[str, Value],
+        inputs: dict[str, Value],
+        sets: Sequence[Setting],
+    ) -> Value:
         inside = f"{scope}{name}/"
         path = self.files.path_of(node_type)
         if path in self._open or len(self._open) >= MOST_NESTED:

@@ -102,9 +102,7 @@ def _differ(old: Value | None, new: Value) -> bool:
     return True
 
 
-def _drop(
-    name: str, node: Value, change: Value, new_type: Value, names: TypeNames, notes: list[Problem]
-) -> Value:  # fmt: skip
+def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNames, notes: list[Problem]) -> Value:
     parts = dict(_mapping(node))
     old, new = word(node, "type"), word(new_type) or "the new type"
     for part, known in (("params", names.params), ("inputs", names.inputs)):

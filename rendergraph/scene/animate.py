@@ -178,6 +178,9 @@ def _change_object(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
 
 
 _CHANGE = {
-    "objects": _change_object, "materials": _change_material, "lights": _change_light, "cameras": _change_camera,
+    "objects": _change_object,
+    "materials": _change_material,
+    "lights": _change_light,
+    "cameras": _change_camera,
     "environment": _change_environment,
-}  # fmt: skip
+}

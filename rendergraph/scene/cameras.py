@@ -38,12 +38,15 @@ def projection(camera: Camera, aspect: float) -> Matrix:
     if camera.type == "orthographic":
         half_height = camera.height / 2
         half_width = half_height * aspect
-        return np.array([
-            [1 / half_width, 0, 0, 0],
-            [0, 1 / half_height, 0, 0],
-            [0, 0, -2 / (far - near), -(far + near) / (far - near)],
-            [0, 0, 0, 1],
-        ], np.float64)  # fmt: skip
+        return np.array(
+            [
+                [1 / half_width, 0, 0, 0],
+                [0, 1 / half_height, 0, 0],
+                [0, 0, -2 / (far - near), -(far + near) / (far - near)],
+                [0, 0, 0, 1],
+            ],
+            np.float64,
+        )
     if camera.type == "frustum" and camera.frustum is not None:
         left, right, bottom, top = camera.frustum
     else:
@@ -54,12 +57,15 @@ def projection(camera: Camera, aspect: float) -> Matrix:
         z, w = INFINITE_EPSILON - 1, near * (INFINITE_EPSILON - 2)
     else:
         z, w = -(far + near) / (far - near), -2 * far * near / (far - near)
-    return np.array([
-        [2 * near / (right - left), 0, (right + left) / (right - left), 0],
-        [0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0],
-        [0, 0, z, w],
-        [0, 0, -1, 0],
-    ], np.float64)  # fmt: skip
+    return np.array(
+        [
+            [2 * near / (right - left), 0, (right + left) / (right - left), 0],
+            [0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0],
+            [0, 0, z, w],
+            [0, 0, -1, 0],
+        ],
+        np.float64,
+    )
 
 
 def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:

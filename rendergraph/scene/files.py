@@ -142,8 +142,9 @@ class Reading:
         try:
             return self.check_path(holder.parent / name, place)
         except (OSError, ValueError, RuntimeError) as problem:
-            raise self.error("RG301", f"'{shown(name)}' cannot be followed: {reason(problem)}", line=line,
-                             file=holder) from None  # fmt: skip
+            raise self.error(
+                "RG301", f"'{shown(name)}' cannot be followed: {reason(problem)}", line=line, file=holder
+            ) from None
 
     def read(self, path: Path, what: str, *, line: int = 0) -> bytes:
         """The bytes of a regular file within `file_bytes`.

@@ -65,9 +65,13 @@ def flat(mesh: Mesh) -> Mesh:
     normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
     split = {name: None if (v := getattr(mesh, name)) is None else v[corners] for name in ("uv0", "uv1", "colors")}
     return Mesh(
-        mesh.name, mesh.positions[corners], np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
-        np.repeat(normals, 3, axis=0).astype(np.float32), None, **split,
-    )  # fmt: skip
+        mesh.name,
+        mesh.positions[corners],
+        np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        np.repeat(normals, 3, axis=0).astype(np.float32),
+        None,
+        **split,
+    )
 
 
 def strip_triangles(indices: Indices) -> Indices:
@@ -108,11 +112,13 @@ def quaternion_matrix(x: float, y: float, z: float, w: float) -> Matrix:
     if not length:
         raise ValueError("a rotation of zero length")
     x, y, z, w = x / length, y / length, z / length, w / length
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def euler_matrix(degrees: Sequence[float]) -> Matrix:

@@ -23,11 +23,19 @@ from rendergraph.scene.gltf_materials import Materials
 from rendergraph.scene.gltf_meshes import Primitives
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Mesh, Object, Scene, Vec3
 
-_READ = frozenset({
-    "KHR_lights_punctual", "KHR_materials_unlit", "KHR_materials_emissive_strength", "KHR_materials_ior",
-    "KHR_materials_specular", "KHR_materials_anisotropy", "KHR_texture_transform", "KHR_mesh_quantization",
-    "EXT_mesh_gpu_instancing",
-})  # fmt: skip
+_READ = frozenset(
+    {
+        "KHR_lights_punctual",
+        "KHR_materials_unlit",
+        "KHR_materials_emissive_strength",
+        "KHR_materials_ior",
+        "KHR_materials_specular",
+        "KHR_materials_anisotropy",
+        "KHR_texture_transform",
+        "KHR_mesh_quantization",
+        "EXT_mesh_gpu_instancing",
+    }
+)
 
 
 def read_gltf(path: Path, reading: Reading) -> Scene:
@@ -152,9 +160,14 @@ class _Reader:
                 raise cone.wrong("needs 0 <= innerConeAngle < outerConeAngle <= pi/2")
         r, g, b = part.numbers("color", 3, (1.0, 1.0, 1.0))
         return Light(
-            part.text("name"), "spot" if kind == "spot" else "point" if kind == "point" else "directional",
-            color=(max(0.0, r), max(0.0, g), max(0.0, b)), intensity=intensity, range=reach, inner=inner, outer=outer,
-        )  # fmt: skip
+            part.text("name"),
+            "spot" if kind == "spot" else "point" if kind == "point" else "directional",
+            color=(max(0.0, r), max(0.0, g), max(0.0, b)),
+            intensity=intensity,
+            range=reach,
+            inner=inner,
+            outer=outer,
+        )
 
     def _node(self, part: Part, number: int, names: Names) -> _Node:
         camera = part.index("camera", len(self._cameras), "cameras")
@@ -170,8 +183,16 @@ class _Reader:
         if not given and camera is not None:
             given = self._cameras[camera].name
         children = part.indices("children", self._node_count, "nodes")
-        return _Node(part, names.unique(given, f"node_{number}"), self._local(part), children, mesh, camera, light,
-                     self._instances(part))  # fmt: skip
+        return _Node(
+            part,
+            names.unique(given, f"node_{number}"),
+            self._local(part),
+            children,
+            mesh,
+            camera,
+            light,
+            self._instances(part),
+        )
 
     def _local(self, part: Part) -> Matrix:
         if part.has("matrix"):
@@ -255,8 +276,16 @@ class _Reader:
             if node.camera is not None:
                 cameras[node.name] = _placed_camera(self._cameras[node.camera], node.name, world)
         meshes: tuple[Mesh, ...] = tuple(self._primitives.meshes)
-        return Scene(self._path.stem, self._path, tuple(objects), meshes, tuple(materials), tuple(lights), cameras,
-                     warnings=self._reading.warnings)  # fmt: skip
+        return Scene(
+            self._path.stem,
+            self._path,
+            tuple(objects),
+            meshes,
+            tuple(materials),
+            tuple(lights),
+            cameras,
+            warnings=self._reading.warnings,
+        )
 
     def _parts_of(self, node: _Node) -> int:
         """How many objects a node becomes."""
@@ -264,8 +293,9 @@ class _Reader:
             return 0
         return len(self._meshes[node.mesh]) * (1 if node.instances is None else len(node.instances))
 
-    def _place(self, node: _Node, world: Matrix, objects: list[Object], names: Names, materials: list[Material],
-               default: int) -> int:  # fmt: skip
+    def _place(
+        self, node: _Node, world: Matrix, objects: list[Object], names: Names, materials: list[Material], default: int
+    ) -> int:
         assert node.mesh is not None  # the caller asked
         primitives = self._meshes[node.mesh]
         places = [world] if node.instances is None else [world @ instance for instance in node.instances]
@@ -326,8 +356,9 @@ def _placed_light(light: Light, name: str, world: Matrix) -> Light:
     if not direction.any():
         direction = np.array([0.0, 0.0, -1.0])
     position: Vec3 = vec3(world[:3, 3])
-    return Light(name, light.type, position, vec3(direction), light.color, light.intensity, light.range, light.inner,
-                 light.outer)  # fmt: skip
+    return Light(
+        name, light.type, position, vec3(direction), light.color, light.intensity, light.range, light.inner, light.outer
+    )
 
 
 def _placed_camera(camera: Camera, name: str, world: Matrix) -> Camera:

@@ -18,9 +18,13 @@ from rendergraph.scene.files import Reading
 from rendergraph.scene.gltf_json import Part
 
 _COMPONENTS: dict[int, np.dtype[np.generic]] = {
-    5120: np.dtype("<i1"), 5121: np.dtype("<u1"), 5122: np.dtype("<i2"), 5123: np.dtype("<u2"),
-    5125: np.dtype("<u4"), 5126: np.dtype("<f4"),
-}  # fmt: skip
+    5120: np.dtype("<i1"),
+    5121: np.dtype("<u1"),
+    5122: np.dtype("<i2"),
+    5123: np.dtype("<u2"),
+    5125: np.dtype("<u4"),
+    5126: np.dtype("<f4"),
+}
 _TYPES = {
     "SCALAR": (1, 1),
     "VEC2": (1, 2),
@@ -130,8 +134,10 @@ class Accessor:
             InputError: it has another.
         """
         if self.type not in types or self.component not in components:
-            raise part.wrong(f"{use} takes {' or '.join(types)} of component type {' or '.join(map(str, components))}, "
-                             f"but {self.part.path} is {self.type} of {self.component}")  # fmt: skip
+            raise part.wrong(
+                f"{use} takes {' or '.join(types)} of component type {' or '.join(map(str, components))}, "
+                f"but {self.part.path} is {self.type} of {self.component}"
+            )
         if normalized and self.component != 5126 and not self.normalized:
             raise part.wrong(f"{use} takes whole numbers only normalized, but {self.part.path} is not")
 

@@ -15,8 +15,14 @@ from rendergraph.scene.model import ImageSource, Material, Texture, Vec3
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
 _WRAPS: Mapping[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 _MAG: Mapping[int, Literal["nearest", "linear"]] = {9728: "nearest", 9729: "linear"}
-_MIN = {9728: "nearest", 9729: "linear", 9984: "nearest_mipmap_nearest", 9985: "linear_mipmap_nearest",
-        9986: "nearest_mipmap_linear", 9987: "linear_mipmap_linear"}  # fmt: skip
+_MIN = {
+    9728: "nearest",
+    9729: "linear",
+    9984: "nearest_mipmap_nearest",
+    9985: "linear_mipmap_nearest",
+    9986: "nearest_mipmap_linear",
+    9987: "linear_mipmap_linear",
+}
 _OTHER_IMAGES = ("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
 
 
@@ -48,8 +54,12 @@ class Materials:
 
     def _sampler(self, part: Part) -> tuple[Wrap, Wrap, Literal["nearest", "linear"], str]:
         values = []
-        for key, table, default in (("wrapS", _WRAPS, 10497), ("wrapT", _WRAPS, 10497), ("magFilter", _MAG, 9729),
-                                    ("minFilter", _MIN, 9987)):  # fmt: skip
+        for key, table, default in (
+            ("wrapS", _WRAPS, 10497),
+            ("wrapT", _WRAPS, 10497),
+            ("magFilter", _MAG, 9729),
+            ("minFilter", _MIN, 9987),
+        ):
             number = part.integer(key, default)
             if number not in table:
                 raise part.wrong(f"'{key}' is {number}, not one of {', '.join(map(str, table))}")

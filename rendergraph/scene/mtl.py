@@ -18,14 +18,45 @@ from rendergraph.scene.model import Material, Texture, Vec3
 from rendergraph.scene.obj_block import text_of
 from rendergraph.scene.phong import dielectric_f0, roughness_of
 
-_MAPS = {b"map_kd": "base_color", b"map_ke": "emissive", b"norm": "normal", b"map_bump": "bump", b"bump": "bump",
-         b"map_d": "alpha", b"map_ks": "specular_color", b"map_pr": "roughness", b"map_pm": "metallic"}  # fmt: skip
-_NUMBERS = {b"ns": "Ns", b"ni": "Ni", b"d": "d", b"tr": "Tr", b"illum": "illum", b"pr": "Pr", b"pm": "Pm",
-            b"aniso": "aniso", b"anisor": "anisor"}  # fmt: skip
+_MAPS = {
+    b"map_kd": "base_color",
+    b"map_ke": "emissive",
+    b"norm": "normal",
+    b"map_bump": "bump",
+    b"bump": "bump",
+    b"map_d": "alpha",
+    b"map_ks": "specular_color",
+    b"map_pr": "roughness",
+    b"map_pm": "metallic",
+}
+_NUMBERS = {
+    b"ns": "Ns",
+    b"ni": "Ni",
+    b"d": "d",
+    b"tr": "Tr",
+    b"illum": "illum",
+    b"pr": "Pr",
+    b"pm": "Pm",
+    b"aniso": "aniso",
+    b"anisor": "anisor",
+}
 _COLORS = {b"ka": "Ka", b"kd": "Kd", b"ks": "Ks", b"ke": "Ke"}
 _SILENT = (b"tf", b"ps", b"pc", b"pcr", b"sharpness", b"map_aat")
-_OPTIONS = {b"-bm": 1, b"-blendu": 1, b"-blendv": 1, b"-boost": 1, b"-cc": 1, b"-clamp": 1, b"-imfchan": 1,
-            b"-texres": 1, b"-type": 1, b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}  # fmt: skip
+_OPTIONS = {
+    b"-bm": 1,
+    b"-blendu": 1,
+    b"-blendv": 1,
+    b"-boost": 1,
+    b"-cc": 1,
+    b"-clamp": 1,
+    b"-imfchan": 1,
+    b"-texres": 1,
+    b"-type": 1,
+    b"-mm": 2,
+    b"-o": 3,
+    b"-s": 3,
+    b"-t": 3,
+}
 _SWITCHES = {b"on": 1.0, b"off": 0.0}
 
 
@@ -170,28 +201,40 @@ def _material(entry: _Entry, path: Path, reading: Reading) -> Material:
     _combined_map(maps, textures, path, reading)
     emissive: Vec3 = values.get("Ke", (1.0, 1.0, 1.0) if "emissive" in maps else (0.0, 0.0, 0.0))
     common: dict[str, Any] = {
-        "name": entry.name, "base_color": (*diffuse, alpha), "emissive": emissive, "alpha_mode": mode,
-        "normal_scale": maps["normal"][2] if "normal" in maps else 1.0, "textures": textures,
-        "unlit": values.get("illum") == 0.0, "double_sided": mode == "mask",
-    }  # fmt: skip
+        "name": entry.name,
+        "base_color": (*diffuse, alpha),
+        "emissive": emissive,
+        "alpha_mode": mode,
+        "normal_scale": maps["normal"][2] if "normal" in maps else 1.0,
+        "textures": textures,
+        "unlit": values.get("illum") == 0.0,
+        "double_sided": mode == "mask",
+    }
     index = values.get("Ni", 1.5)
     if "Pr" in values or "Pm" in values or "metallic_roughness" in textures:
         textures.pop("specular_color", None)
         return Material(
-            **common, metallic=_unit(values.get("Pm", 1.0 if "metallic" in maps else 0.0)),
-            roughness=_unit(values.get("Pr", 1.0 if "roughness" in maps else 0.5)), ior=max(1.0, index),
+            **common,
+            metallic=_unit(values.get("Pm", 1.0 if "metallic" in maps else 0.0)),
+            roughness=_unit(values.get("Pr", 1.0 if "roughness" in maps else 0.5)),
+            ior=max(1.0, index),
             anisotropy_strength=_unit(values.get("aniso", 0.0)),
             anisotropy_rotation=2 * math.pi * values.get("anisor", 0.0),
-        )  # fmt: skip
+        )
     shiny = values.get("illum", 2.0) >= 2
     specular: Vec3 = values.get("Ks", (0.0, 0.0, 0.0)) if shiny else (0.0, 0.0, 0.0)
     n = max(0.0, values.get("Ns", 10.0))
     f0 = dielectric_f0(1.5)
     return Material(
-        **common, roughness=roughness_of(n), specular=1.0 if max(specular) > 0 else 0.0,
+        **common,
+        roughness=roughness_of(n),
+        specular=1.0 if max(specular) > 0 else 0.0,
         specular_color=(specular[0] / f0, specular[1] / f0, specular[2] / f0),
-        ambient=values.get("Ka", diffuse), diffuse=diffuse, specular_phong=specular, shininess=n,
-    )  # fmt: skip
+        ambient=values.get("Ka", diffuse),
+        diffuse=diffuse,
+        specular_phong=specular,
+        shininess=n,
+    )
 
 
 def _combined_map(

@@ -62,8 +62,9 @@ def _distinct(triangles: Ints) -> npt.NDArray[np.bool_]:
 
 
 def _check_indices(found: Statements, reading: Reading) -> None:
-    for column, (count, what) in enumerate(((len(found.positions), "vertices"), (len(found.uvs), "texture coordinates"),
-                                            (len(found.normals), "normals"))):  # fmt: skip
+    for column, (count, what) in enumerate(
+        ((len(found.positions), "vertices"), (len(found.uvs), "texture coordinates"), (len(found.normals), "normals"))
+    ):
         values = found.corners[:, column]
         wrong = ((values < 0) | (values >= count)) & (values != ABSENT)
         if wrong.any():
@@ -146,8 +147,16 @@ def _numbered(columns: Ints) -> Ints:
     return np.unique(key, return_inverse=True)[1].reshape(-1)
 
 
-def _assemble(path: Path, found: Statements, library: dict[str, Material], places: Ints, faces: Ints, normals: Doubles,
-              normal_of: Ints, reading: Reading) -> Scene:  # fmt: skip
+def _assemble(
+    path: Path,
+    found: Statements,
+    library: dict[str, Material],
+    places: Ints,
+    faces: Ints,
+    normals: Doubles,
+    normal_of: Ints,
+    reading: Reading,
+) -> Scene:
     """Objects and meshes: one for each object, group and material, in the order of first use."""
     states = found.states[faces][:, [0, 1, 3]]
     part, owners = _in_order(_numbered(states), states)

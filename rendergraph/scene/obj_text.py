@@ -60,11 +60,18 @@ def statements(data: bytes, reading: Reading) -> Statements:
         Block(block, first_line, grown, reading).read()
     names = tuple(list(table) for table in grown.numbers)
     return Statements(
-        np.concatenate(grown.positions), np.concatenate(grown.colors), np.concatenate(grown.uvs),
-        np.concatenate(grown.normals), np.concatenate(grown.corners), np.concatenate(grown.sizes),
-        np.concatenate(grown.lines), np.concatenate(grown.states), (names[0], names[1], names[2], names[3]),
-        list(grown.libraries.items()), grown.smoothed,
-    )  # fmt: skip
+        np.concatenate(grown.positions),
+        np.concatenate(grown.colors),
+        np.concatenate(grown.uvs),
+        np.concatenate(grown.normals),
+        np.concatenate(grown.corners),
+        np.concatenate(grown.sizes),
+        np.concatenate(grown.lines),
+        np.concatenate(grown.states),
+        (names[0], names[1], names[2], names[3]),
+        list(grown.libraries.items()),
+        grown.smoothed,
+    )
 
 
 def _blocks(data: bytes) -> Iterator[tuple[bytes, int]]:

@@ -37,15 +37,47 @@ SLOTS = (
 _VEC4 = ("<f4", (4,))
 INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
 """Rows of the affine object-to-world matrix (`in_object0`…`2`), material and object index (`in_ids`)."""
-MESH = np.dtype([("first_index", "<u4"), ("count", "<u4"), ("base_vertex", "<i4"), ("vertices", "<u4"),
-                 ("low", "<f4", (3,)), ("high", "<f4", (3,))])  # fmt: skip
+MESH = np.dtype(
+    [
+        ("first_index", "<u4"),
+        ("count", "<u4"),
+        ("base_vertex", "<i4"),
+        ("vertices", "<u4"),
+        ("low", "<f4", (3,)),
+        ("high", "<f4", (3,)),
+    ]
+)
 """Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
-MATERIAL = np.dtype([(name, *_VEC4) for name in ("base_color", "emissive", "surface", "specular", "extra",
-                                                 "phong_diffuse", "phong_specular", "phong_ambient")])  # fmt: skip
+MATERIAL = np.dtype(
+    [
+        (name, *_VEC4)
+        for name in (
+            "base_color",
+            "emissive",
+            "surface",
+            "specular",
+            "extra",
+            "phong_diffuse",
+            "phong_specular",
+            "phong_ambient",
+        )
+    ]
+)
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
-VIEW = np.dtype([(name, "<f4", (4, 4)) for name in ("view", "projection", "view_projection", "inverse_view",
-                                                    "inverse_projection", "inverse_view_projection")]
-                + [(name, *_VEC4) for name in ("eye", "viewport", "range")])  # fmt: skip
+VIEW = np.dtype(
+    [
+        (name, "<f4", (4, 4))
+        for name in (
+            "view",
+            "projection",
+            "view_projection",
+            "inverse_view",
+            "inverse_projection",
+            "inverse_view_projection",
+        )
+    ]
+    + [(name, *_VEC4) for name in ("eye", "viewport", "range")]
+)
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
 Attribute: TypeAlias = Literal["tangent", "uv0", "uv1", "color"]
@@ -107,9 +139,17 @@ def pack(scene: Scene) -> PackedScene:
     orders = []
     for mesh in scene.meshes:
         orders.append(first_use(ordered(mesh.positions, mesh.indices), len(mesh.positions)))
-    streams = {name: _stream(scene.meshes, [old for old, _ in orders], name, width, fill) for name, width, fill in (
-        ("positions", 3, 0.0), ("normals", 3, 0.0), ("tangents", 4, 0.0), ("uv0", 2, 0.0), ("uv1", 2, 0.0),
-        ("colors", 4, 1.0))}  # fmt: skip
+    streams = {
+        name: _stream(scene.meshes, [old for old, _ in orders], name, width, fill)
+        for name, width, fill in (
+            ("positions", 3, 0.0),
+            ("normals", 3, 0.0),
+            ("tangents", 4, 0.0),
+            ("uv0", 2, 0.0),
+            ("uv1", 2, 0.0),
+            ("colors", 4, 1.0),
+        )
+    }
     records = np.zeros(len(scene.meshes), MESH)
     first, base = 0, 0
     for record, mesh, (old, triangles) in zip(records, scene.meshes, orders, strict=True):
@@ -122,9 +162,17 @@ def pack(scene: Scene) -> PackedScene:
     assert positions is not None  # every mesh has both
     assert normals is not None
     return PackedScene(
-        positions, normals, streams["tangents"], streams["uv0"], streams["uv1"], streams["colors"], indices, records,
-        tuple(_attributes(mesh) for mesh in scene.meshes), **_placed(scene, records),
-    )  # fmt: skip
+        positions,
+        normals,
+        streams["tangents"],
+        streams["uv0"],
+        streams["uv1"],
+        streams["colors"],
+        indices,
+        records,
+        tuple(_attributes(mesh) for mesh in scene.meshes),
+        **_placed(scene, records),
+    )
 
 
 def update(packed: PackedScene, scene: Scene) -> PackedScene:
@@ -146,21 +194,31 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
     extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
     uvs, moved = pack_material_uvs(scene.materials)
     return {
-        "instances": instances, "materials": pack_materials(scene.materials), "material_uvs": uvs,
-        "material_moved": moved, "lights": pack_lights(scene.lights), "object_mesh": mesh, "object_material": material,
+        "instances": instances,
+        "materials": pack_materials(scene.materials),
+        "material_uvs": uvs,
+        "material_moved": moved,
+        "lights": pack_lights(scene.lights),
+        "object_mesh": mesh,
+        "object_material": material,
         "mirrored": np.linalg.det(transforms[:, :3, :3]) < 0,
         "casts_shadow": np.array([entry.casts_shadow for entry in objects], bool),
         "hidden": np.array([entry.hidden for entry in objects], bool),
         "double_sided": np.array([scene.materials[entry.material].double_sided for entry in objects], bool),
         "alpha_mode": tuple(scene.materials[entry.material].alpha_mode for entry in objects),
-        "centers": center.astype(np.float32), "radii": np.linalg.norm(extent, axis=1).astype(np.float32),
+        "centers": center.astype(np.float32),
+        "radii": np.linalg.norm(extent, axis=1).astype(np.float32),
         "names": tuple(entry.name for entry in objects),
-    }  # fmt: skip
+    }
 
 
 def _attributes(mesh: Mesh) -> frozenset[Attribute]:
     pairs: tuple[tuple[Attribute, Floats | None], ...] = (
-        ("tangent", mesh.tangents), ("uv0", mesh.uv0), ("uv1", mesh.uv1), ("color", mesh.colors))  # fmt: skip
+        ("tangent", mesh.tangents),
+        ("uv0", mesh.uv0),
+        ("uv1", mesh.uv1),
+        ("color", mesh.colors),
+    )
     return frozenset(name for name, values in pairs if values is not None)
 
 
@@ -231,9 +289,13 @@ def pack_view(view: ViewMatrices) -> bytes:
     inverse_view, inverse_projection = np.linalg.inv(view.view), np.linalg.inv(view.projection)
     both = view.projection @ view.view
     for name, matrix in (
-        ("view", view.view), ("projection", view.projection), ("view_projection", both), ("inverse_view", inverse_view),
-        ("inverse_projection", inverse_projection), ("inverse_view_projection", inverse_view @ inverse_projection),
-    ):  # fmt: skip
+        ("view", view.view),
+        ("projection", view.projection),
+        ("view_projection", both),
+        ("inverse_view", inverse_view),
+        ("inverse_projection", inverse_projection),
+        ("inverse_view_projection", inverse_view @ inverse_projection),
+    ):
         record[name] = matrix.T  # columns behind each other
     if view.projection[3, 2] != 0:
         record["eye"] = (*inverse_view[:3, 3], 1.0)

@@ -43,9 +43,11 @@ def read_plugin_mesh(path: Path, loader: Added[MeshLoader], reading: Reading) ->
         try:
             mesh = _mesh(name, part)
             material = Material(
-                name, (*_color(part.base_color), 1.0), _share("metallic", part.metallic),
+                name,
+                (*_color(part.base_color), 1.0),
+                _share("metallic", part.metallic),
                 _share("roughness", part.roughness),
-            )  # fmt: skip
+            )
         except (ValueError, TypeError, OverflowError) as error:
             raise _unusable(loader, what, f"gave a mesh ({number}) whose {error}") from None
         vertices += len(mesh.positions)

@@ -10,9 +10,26 @@ from rendergraph.scene.cameras import look_at
 from rendergraph.scene.geometry import euler_matrix, placement, unit, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
 
-_PLAIN = ("base_color", "metallic", "roughness", "occlusion_strength", "normal_scale", "alpha_mode", "alpha_cutoff",
-          "double_sided", "unlit", "ior", "specular", "specular_color", "anisotropy_strength", "anisotropy_rotation",
-          "ambient", "diffuse", "specular_phong", "shininess")  # fmt: skip
+_PLAIN = (
+    "base_color",
+    "metallic",
+    "roughness",
+    "occlusion_strength",
+    "normal_scale",
+    "alpha_mode",
+    "alpha_cutoff",
+    "double_sided",
+    "unlit",
+    "ior",
+    "specular",
+    "specular_color",
+    "anisotropy_strength",
+    "anisotropy_rotation",
+    "ambient",
+    "diffuse",
+    "specular_phong",
+    "shininess",
+)
 
 
 def material(name: str, values: Mapping[str, Any], textures: Mapping[str, Texture]) -> Material:
@@ -38,10 +55,17 @@ def light(name: str, values: Mapping[str, Any]) -> Light:
     if values["type"] == "spot" and inner >= outer:
         raise ValueError(f"'inner_degrees' ({inner:g}) must be below 'outer_degrees' ({outer:g})")
     return Light(
-        name, values["type"], values.get("at", (0.0, 0.0, 0.0)), vec3(direction), values.get("color", (1.0, 1.0, 1.0)),
-        values.get("intensity", 1.0), values.get("range"), math.radians(inner), math.radians(outer),
+        name,
+        values["type"],
+        values.get("at", (0.0, 0.0, 0.0)),
+        vec3(direction),
+        values.get("color", (1.0, 1.0, 1.0)),
+        values.get("intensity", 1.0),
+        values.get("range"),
+        math.radians(inner),
+        math.radians(outer),
         values.get("casts_shadow", True),
-    )  # fmt: skip
+    )
 
 
 def camera(name: str, values: Mapping[str, Any]) -> Camera:
@@ -65,11 +89,19 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
     target = values.get("target", (0.0, 0.0, 0.0))
     transform = look_at(values.get("eye", (0.0, 0.0, 5.0)), target, values.get("up", (0.0, 1.0, 0.0)))
     kind: Literal["perspective", "orthographic", "frustum"] = (
-        "orthographic" if "height" in values else "frustum" if "frustum" in values else "perspective")  # fmt: skip
+        "orthographic" if "height" in values else "frustum" if "frustum" in values else "perspective"
+    )
     return Camera(
-        name, transform, kind, math.radians(values.get("fov_y_degrees", 45.0)), values.get("height", 2.0),
-        values.get("frustum"), near, far, target,
-    )  # fmt: skip
+        name,
+        transform,
+        kind,
+        math.radians(values.get("fov_y_degrees", 45.0)),
+        values.get("height", 2.0),
+        values.get("frustum"),
+        near,
+        far,
+        target,
+    )
 
 
 def placed(values: Mapping[str, Any]) -> Matrix:

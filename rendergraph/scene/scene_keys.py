@@ -137,11 +137,16 @@ ORBIT = (
 def keys() -> dict[str, tuple[Key, ...]]:
     """Every section of a scene file with its keys, for `explain scene` and the docs."""
     return {
-        "": TOP, "objects": (*OBJECT, OVERRIDES),
+        "": TOP,
+        "objects": (*OBJECT, OVERRIDES),
         **{f"objects (shape: {name})": shape.keys for name, shape in SHAPES.items()},
-        "objects (overrides)": OVERRIDE, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA,
-        "environment": ENVIRONMENT, "orbit": ORBIT,
-    }  # fmt: skip
+        "objects (overrides)": OVERRIDE,
+        "materials": MATERIAL,
+        "lights": LIGHT,
+        "cameras": CAMERA,
+        "environment": ENVIRONMENT,
+        "orbit": ORBIT,
+    }
 
 
 ANIMATED = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}

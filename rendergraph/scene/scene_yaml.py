@@ -91,8 +91,10 @@ class _Reader:
             self.check.say(root, "RG321", f"a scene file is a mapping that starts with 'scene: 1', not {root.kind}")
             return Scene(self.path.stem)
         top = self.check.values(root, scene_keys.TOP, "the scene", {})
-        sections = {name: self.check.mapping(top[name], name) if name in top else {}
-                    for name in ("objects", "materials", "lights", "cameras")}  # fmt: skip
+        sections = {
+            name: self.check.mapping(top[name], name) if name in top else {}
+            for name in ("objects", "materials", "lights", "cameras")
+        }
         names = {name: tuple(entries) for name, entries in sections.items()}
         for name, entry in sections["materials"].items():
             self._material(name, entry)
@@ -111,10 +113,20 @@ class _Reader:
             orbit = Orbit(found.get("camera", ""), found.get("degrees_per_second", 30.0))
         made = self.made
         return Scene(
-            self.path.stem, self.path, tuple(made.objects), tuple(made.meshes), tuple(made.materials),
-            tuple(made.lights), made.cameras, environment, keyframes, orbit, self.reading.warnings, self.recipe,
+            self.path.stem,
+            self.path,
+            tuple(made.objects),
+            tuple(made.meshes),
+            tuple(made.materials),
+            tuple(made.lights),
+            made.cameras,
+            environment,
+            keyframes,
+            orbit,
+            self.reading.warnings,
+            self.recipe,
             made.placements,
-        )  # fmt: skip
+        )
 
     # Surfaces, lights, cameras ----------------------------------------------------------------------------------------
 
@@ -225,10 +237,17 @@ class _Reader:
                 changes: dict[str, Any] = dict(part.changes)
                 made.materials.append(replace(made.materials[base], name=f"{name}{part.suffix}", **changes))
             placed.append((len(made.objects), part.local))
-            made.objects.append(Object(
-                name + part.suffix, mesh, material, world @ part.local, values.get("casts_shadow", True),
-                values.get("hidden", False), name,
-            ))  # fmt: skip
+            made.objects.append(
+                Object(
+                    name + part.suffix,
+                    mesh,
+                    material,
+                    world @ part.local,
+                    values.get("casts_shadow", True),
+                    values.get("hidden", False),
+                    name,
+                )
+            )
         made.placements[name] = Placement(tuple(placed))
         self._count_objects(entry)
 
@@ -247,12 +266,17 @@ class _Reader:
             changes = overrides.get(part.name, overrides.get(part.node, {}))
             word = changes.get("material", values.get("material"))
             objects.append((len(made.objects), part.transform))
-            made.objects.append(Object(
-                f"{name}/{part.name}", part.mesh + found.first_mesh,
-                part.material + found.first_material if word is None else self._material_index(word),
-                world @ part.transform, changes.get("casts_shadow", values.get("casts_shadow", part.casts_shadow)),
-                changes.get("hidden", values.get("hidden", part.hidden)), f"{name}/{part.node}",
-            ))  # fmt: skip
+            made.objects.append(
+                Object(
+                    f"{name}/{part.name}",
+                    part.mesh + found.first_mesh,
+                    part.material + found.first_material if word is None else self._material_index(word),
+                    world @ part.transform,
+                    changes.get("casts_shadow", values.get("casts_shadow", part.casts_shadow)),
+                    changes.get("hidden", values.get("hidden", part.hidden)),
+                    f"{name}/{part.node}",
+                )
+            )
         for light in scene.lights:
             local = scene_build.light_matrix(light)
             lights.append((len(made.lights), local))

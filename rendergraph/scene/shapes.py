@@ -65,19 +65,33 @@ def mesh(shape: str, **values: Any) -> Mesh:
     return build(shape, **values)[0].mesh
 
 
-def _mesh(name: str, positions: npt.ArrayLike, triangles: npt.ArrayLike, normals: npt.ArrayLike, uv: npt.ArrayLike,
-          along: npt.ArrayLike) -> Mesh:  # fmt: skip
+def _mesh(
+    name: str,
+    positions: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    normals: npt.ArrayLike,
+    uv: npt.ArrayLike,
+    along: npt.ArrayLike,
+) -> Mesh:
     """A mesh from plain arrays; `along` is the direction of growing u, w is +1 for all shapes here."""
     tangents = np.concatenate([unit(along), np.ones((len(np.asarray(along)), 1))], axis=1)
     points = np.asarray(positions, np.float32) + np.float32(0)  # no -0, so that equal positions have equal bits
-    return Mesh(name, points, np.asarray(triangles, np.uint32).reshape(-1, 3), np.asarray(normals, np.float32),
-                tangents.astype(np.float32), np.asarray(uv, np.float32))  # fmt: skip
+    return Mesh(
+        name,
+        points,
+        np.asarray(triangles, np.uint32).reshape(-1, 3),
+        np.asarray(normals, np.float32),
+        tangents.astype(np.float32),
+        np.asarray(uv, np.float32),
+    )
 
 
 def _joined(name: str, meshes: Sequence[Mesh]) -> Mesh:
     starts = np.cumsum([0, *(len(part.positions) for part in meshes)])
-    columns = [np.concatenate([getattr(part, field) for part in meshes])
-               for field in ("positions", "normals", "tangents", "uv0")]  # fmt: skip
+    columns = [
+        np.concatenate([getattr(part, field) for part in meshes])
+        for field in ("positions", "normals", "tangents", "uv0")
+    ]
     indices = np.concatenate([part.indices + np.uint32(start) for part, start in zip(meshes, starts, strict=False)])
     return Mesh(name, columns[0], indices, columns[1], columns[2], columns[3])
 
@@ -115,8 +129,14 @@ def _lathe(
     down = np.linspace(0, 1, rows + 1) if v is None else np.asarray(v)
     uv = np.stack([u, np.repeat(down[:, None], segments + 1, 1)], axis=-1)
     along = np.stack([np.cos(turn), np.zeros_like(turn), -np.sin(turn)], axis=-1)
-    return _mesh(name, positions.reshape(-1, 3), _grid(segments, rows, (bool(poles[0]), bool(poles[-1]))),
-                 unit(normals).reshape(-1, 3), uv.reshape(-1, 2), along.reshape(-1, 3))  # fmt: skip
+    return _mesh(
+        name,
+        positions.reshape(-1, 3),
+        _grid(segments, rows, (bool(poles[0]), bool(poles[-1]))),
+        unit(normals).reshape(-1, 3),
+        uv.reshape(-1, 2),
+        along.reshape(-1, 3),
+    )
 
 
 def _cap(radius: float, height: float, up: bool, segments: int) -> Mesh:
@@ -140,21 +160,40 @@ def plane(size: Sequence[float], segments: int) -> Mesh:
     u, v = np.meshgrid(t, t)
     positions = np.stack([(u - 0.5) * size[0], np.zeros_like(u), (v - 0.5) * size[1]], axis=-1).reshape(-1, 3)
     count = len(positions)
-    return _mesh("plane", positions, _grid(segments, segments), np.tile((0, 1, 0), (count, 1)),
-                 np.stack([u, v], axis=-1).reshape(-1, 2), np.tile((1, 0, 0), (count, 1)))  # fmt: skip
+    return _mesh(
+        "plane",
+        positions,
+        _grid(segments, segments),
+        np.tile((0, 1, 0), (count, 1)),
+        np.stack([u, v], axis=-1).reshape(-1, 2),
+        np.tile((1, 0, 0), (count, 1)),
+    )
 
 
 def box(size: Sequence[float]) -> Mesh:
     """A box with flat faces, each with the whole texture."""
     half = np.asarray(size, np.float64) / 2
     parts = []
-    for right, up, out in ((0, 0, -1), (0, 1, 0), (1, 0, 0)), ((0, 0, 1), (0, 1, 0), (-1, 0, 0)), (
-        (1, 0, 0), (0, 0, -1), (0, 1, 0)), ((1, 0, 0), (0, 0, 1), (0, -1, 0)), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), (
-        (-1, 0, 0), (0, 1, 0), (0, 0, -1)):  # fmt: skip
+    for right, up, out in (
+        ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
+        ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+        ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+        ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+        ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        ((-1, 0, 0), (0, 1, 0), (0, 0, -1)),
+    ):
         u, v = np.array([[0, 0], [0, 1], [1, 1], [1, 0]]).T[:, :, None]
         positions = (np.asarray(out) + (2 * u - 1) * np.asarray(right) + (1 - 2 * v) * np.asarray(up)) * half
-        parts.append(_mesh("side", positions, [[0, 1, 2], [0, 2, 3]], np.tile(out, (4, 1)),
-                           np.concatenate([u, v], axis=1), np.tile(right, (4, 1))))  # fmt: skip
+        parts.append(
+            _mesh(
+                "side",
+                positions,
+                [[0, 1, 2], [0, 2, 3]],
+                np.tile(out, (4, 1)),
+                np.concatenate([u, v], axis=1),
+                np.tile(right, (4, 1)),
+            )
+        )
     return _joined("box", parts)
 
 
@@ -219,8 +258,14 @@ def torus_knot(radius: float, tube: float, p: int, q: int, segments: int, sides:
     normals = np.cos(angle)[:, None, None] * out + np.sin(angle)[:, None, None] * side
     positions = center + tube * normals
     u, v = np.meshgrid(np.arange(segments + 1) / segments * max(p, q) * 2, np.arange(sides + 1) / sides)
-    return _mesh("torus_knot", positions.reshape(-1, 3), _grid(segments, sides), normals.reshape(-1, 3),
-                 np.stack([u, v], axis=-1).reshape(-1, 2), np.tile(ahead, (sides + 1, 1)))  # fmt: skip
+    return _mesh(
+        "torus_knot",
+        positions.reshape(-1, 3),
+        _grid(segments, sides),
+        normals.reshape(-1, 3),
+        np.stack([u, v], axis=-1).reshape(-1, 2),
+        np.tile(ahead, (sides + 1, 1)),
+    )
 
 
 def stairs(size: Sequence[float], steps: int) -> Mesh:
@@ -246,13 +291,29 @@ def stairs(size: Sequence[float], steps: int) -> Mesh:
         a, b = k, (k + 1) % count
         corners = np.stack([left[b], left[a], right[a], right[b]])
         normal = unit(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
-        parts.append(_mesh("tread", corners, [[0, 1, 2], [0, 2, 3]], np.tile(normal, (4, 1)),
-                           [[0, 0], [0, 1], [1, 1], [1, 0]], np.tile((1, 0, 0), (4, 1))))  # fmt: skip
+        parts.append(
+            _mesh(
+                "tread",
+                corners,
+                [[0, 1, 2], [0, 2, 3]],
+                np.tile(normal, (4, 1)),
+                [[0, 0], [0, 1], [1, 1], [1, 0]],
+                np.tile((1, 0, 0), (4, 1)),
+            )
+        )
     return _joined("stairs", parts)
 
 
-def sphere_grid(radius: float, columns: int, rows: int, spacing: float, roughness: Sequence[float],
-                metallic: Sequence[float], segments: int, rings: int) -> list[Part]:  # fmt: skip
+def sphere_grid(
+    radius: float,
+    columns: int,
+    rows: int,
+    spacing: float,
+    roughness: Sequence[float],
+    metallic: Sequence[float],
+    segments: int,
+    rings: int,
+) -> list[Part]:
     """Spheres in the XY plane: roughness grows from left to right, metallic from bottom to top."""
     ball = sphere(radius, segments, rings)
     parts = []
@@ -270,41 +331,94 @@ def _range(name: str, doc: str, default: tuple[float, float]) -> Key:
 
 _SEGMENTS = whole("segments", "Sides around the axis.", 48, 3, 2048)
 SHAPES: dict[str, Shape] = {
-    "plane": Shape("A horizontal rectangle facing +Y.", (
-        Key("size", "vector", "Extent along X and Z.", (1.0, 1.0), "m", low=0, above=True, size=2),
-        whole("segments", "Squares along each side.", 1, 1, 1024),
-    ), plane, lambda v: (v["segments"] + 1) ** 2),
-    "box": Shape("A box.", (
-        Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
-    ), box),
-    "sphere": Shape("A sphere of latitude and longitude.", (
-        positive("radius", "Radius.", 0.5), _SEGMENTS, whole("rings", "Rows from pole to pole.", 24, 2, 1024),
-    ), sphere, lambda v: (v["segments"] + 1) * (v["rings"] + 1)),
-    "cylinder": Shape("An upright cylinder with caps.", (
-        positive("radius", "Radius.", 0.5), positive("height", "Extent along Y.", 1.0), _SEGMENTS,
-    ), cylinder, lambda v: 4 * (v["segments"] + 1)),
-    "cone": Shape("An upright cone with a base.", (
-        positive("radius", "Radius of the base.", 0.5), positive("height", "Extent along Y.", 1.0), _SEGMENTS,
-    ), cone, lambda v: 3 * (v["segments"] + 1)),
-    "torus": Shape("A ring around Y.", (
-        positive("radius", "From the centre to the middle of the tube.", 0.5),
-        positive("tube", "Radius of the tube.", 0.2), _SEGMENTS, whole("sides", "Sides around the tube.", 24, 3, 1024),
-    ), torus, lambda v: (v["segments"] + 1) * (v["sides"] + 1)),
-    "torus_knot": Shape("A tube along a torus knot around Y.", (
-        positive("radius", "Radius of the torus the knot lies on.", 0.5), positive("tube", "Radius of the tube.", 0.1),
-        whole("p", "Turns about the axis.", 2, 1, 32), whole("q", "Turns through the hole.", 3, 1, 32),
-        whole("segments", "Segments along the knot.", 192, 3, 8192),
-        whole("sides", "Sides around the tube.", 24, 3, 1024),
-    ), torus_knot, lambda v: (v["segments"] + 1) * (v["sides"] + 1)),
-    "stairs": Shape("A solid flight of stairs that climbs towards -Z.", (
-        Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
-        whole("steps", "Number of steps.", 5, 1, 200),
-    ), stairs, lambda v: 12 * v["steps"]),
-    "sphere_grid": Shape("Spheres in the XY plane, objects `name/column_row`: roughness to the right, metallic up.", (
-        positive("radius", "Radius of one sphere.", 0.4), whole("columns", "Values of roughness.", 5, 1, 64),
-        whole("rows", "Values of metallic.", 5, 1, 64), positive("spacing", "Between centres.", 1.0),
-        _range("roughness", "At the left and at the right.", (0.1, 1.0)),
-        _range("metallic", "At the bottom and at the top.", (0.0, 1.0)),
-        _SEGMENTS, whole("rings", "Rows from pole to pole.", 24, 2, 1024),
-    ), sphere_grid, lambda v: (v["segments"] + 1) * (v["rings"] + 1)),
-}  # fmt: skip
+    "plane": Shape(
+        "A horizontal rectangle facing +Y.",
+        (
+            Key("size", "vector", "Extent along X and Z.", (1.0, 1.0), "m", low=0, above=True, size=2),
+            whole("segments", "Squares along each side.", 1, 1, 1024),
+        ),
+        plane,
+        lambda v: (v["segments"] + 1) ** 2,
+    ),
+    "box": Shape(
+        "A box.", (Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),), box
+    ),
+    "sphere": Shape(
+        "A sphere of latitude and longitude.",
+        (
+            positive("radius", "Radius.", 0.5),
+            _SEGMENTS,
+            whole("rings", "Rows from pole to pole.", 24, 2, 1024),
+        ),
+        sphere,
+        lambda v: (v["segments"] + 1) * (v["rings"] + 1),
+    ),
+    "cylinder": Shape(
+        "An upright cylinder with caps.",
+        (
+            positive("radius", "Radius.", 0.5),
+            positive("height", "Extent along Y.", 1.0),
+            _SEGMENTS,
+        ),
+        cylinder,
+        lambda v: 4 * (v["segments"] + 1),
+    ),
+    "cone": Shape(
+        "An upright cone with a base.",
+        (
+            positive("radius", "Radius of the base.", 0.5),
+            positive("height", "Extent along Y.", 1.0),
+            _SEGMENTS,
+        ),
+        cone,
+        lambda v: 3 * (v["segments"] + 1),
+    ),
+    "torus": Shape(
+        "A ring around Y.",
+        (
+            positive("radius", "From the centre to the middle of the tube.", 0.5),
+            positive("tube", "Radius of the tube.", 0.2),
+            _SEGMENTS,
+            whole("sides", "Sides around the tube.", 24, 3, 1024),
+        ),
+        torus,
+        lambda v: (v["segments"] + 1) * (v["sides"] + 1),
+    ),
+    "torus_knot": Shape(
+        "A tube along a torus knot around Y.",
+        (
+            positive("radius", "Radius of the torus the knot lies on.", 0.5),
+            positive("tube", "Radius of the tube.", 0.1),
+            whole("p", "Turns about the axis.", 2, 1, 32),
+            whole("q", "Turns through the hole.", 3, 1, 32),
+            whole("segments", "Segments along the knot.", 192, 3, 8192),
+            whole("sides", "Sides around the tube.", 24, 3, 1024),
+        ),
+        torus_knot,
+        lambda v: (v["segments"] + 1) * (v["sides"] + 1),
+    ),
+    "stairs": Shape(
+        "A solid flight of stairs that climbs towards -Z.",
+        (
+            Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
+            whole("steps", "Number of steps.", 5, 1, 200),
+        ),
+        stairs,
+        lambda v: 12 * v["steps"],
+    ),
+    "sphere_grid": Shape(
+        "Spheres in the XY plane, objects `name/column_row`: roughness to the right, metallic up.",
+        (
+            positive("radius", "Radius of one sphere.", 0.4),
+            whole("columns", "Values of roughness.", 5, 1, 64),
+            whole("rows", "Values of metallic.", 5, 1, 64),
+            positive("spacing", "Between centres.", 1.0),
+            _range("roughness", "At the left and at the right.", (0.1, 1.0)),
+            _range("metallic", "At the bottom and at the top.", (0.0, 1.0)),
+            _SEGMENTS,
+            whole("rings", "Rows from pole to pole.", 24, 2, 1024),
+        ),
+        sphere_grid,
+        lambda v: (v["segments"] + 1) * (v["rings"] + 1),
+    ),
+}

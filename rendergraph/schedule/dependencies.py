@@ -209,14 +209,18 @@ def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str,
     if maker != step.node and not versions.writers.get(resource):
         text = f"node '{step.node}' reads '{resource}', but no step of '{maker}' writes it; write it in its `record`"
         return Problem("RG604", text, step.place)
-    text = (f"it reads '{resource}', but no step has written it by then; "
-            "write it in an earlier step, or declare it `History` to read last frame's value")  # fmt: skip
+    text = (
+        f"it reads '{resource}', but no step has written it by then; "
+        "write it in an earlier step, or declare it `History` to read last frame's value"
+    )
     return step.problem("RG601", text)
 
 
 def _loads_nothing(step: Step, resource: str) -> Problem:
-    text = (f"the first step that writes '{resource}' keeps what is there, but nothing is there yet; "
-            "give the port a `clear` value or fill it in an earlier step")  # fmt: skip
+    text = (
+        f"the first step that writes '{resource}' keeps what is there, but nothing is there yet; "
+        "give the port a `clear` value or fill it in an earlier step"
+    )
     return step.problem("RG603", text)
 
 

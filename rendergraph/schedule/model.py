@@ -65,9 +65,13 @@ class Model:
 
     @classmethod
     def of(
-        cls, waits: Waits, kept: Sequence[Step], resources: Mapping[str, Resource], whole_frame: set[str],
+        cls,
+        waits: Waits,
+        kept: Sequence[Step],
+        resources: Mapping[str, Resource],
+        whole_frame: set[str],
         sinks: Sequence[Step],
-    ) -> Model:  # fmt: skip
+    ) -> Model:
         """Number the steps of a dependency graph.
 
         Args:
@@ -105,10 +109,17 @@ class Model:
         kinds: dict[object, int] = {}
         classes = tuple(kinds.setdefault(storage_class(resources[id]), len(kinds)) for id in names)
         return cls(
-            steps, before, tuple(map(tuple, after)), tuple(touched), tuple(born),
-            tuple(resources[id].bytes for id in names), classes, tuple(toucher_count), tuple(names),
+            steps,
+            before,
+            tuple(map(tuple, after)),
+            tuple(touched),
+            tuple(born),
+            tuple(resources[id].bytes for id in names),
+            classes,
+            tuple(toucher_count),
+            tuple(names),
             sum(resources[id].bytes for id in whole_frame),
-        )  # fmt: skip
+        )
 
     def __len__(self) -> int:
         return len(self.steps)

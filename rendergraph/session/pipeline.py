@@ -350,9 +350,15 @@ class Pipeline:
 
         pipeline = self if size is None else self.with_size(size)
         options: dict[str, Any] = {
-            "frames": frames, "outputs": outputs, "taps": taps, "alias": alias, "poison": poison, "shuffle": shuffle,
-            "fps": fps, "on_frame": on_frame,
-        }  # fmt: skip
+            "frames": frames,
+            "outputs": outputs,
+            "taps": taps,
+            "alias": alias,
+            "poison": poison,
+            "shuffle": shuffle,
+            "fps": fps,
+            "on_frame": on_frame,
+        }
         if session is not None:
             return session.render(pipeline, **options)
         with Session(device=device) as own:

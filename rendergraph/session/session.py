@@ -299,10 +299,13 @@ def _declared(cls: type[Node]) -> tuple[Any, ...]:
 def _structure(expansion: Expansion) -> tuple[Any, ...]:
     """An expansion without the values that can change in a compiled pipeline."""
     steps = tuple(
-        replace(step, uniforms=tuple((name, None) for name, _ in step.uniforms),  # type: ignore[misc]
-                functions=tuple(replace(f, uniforms=()) for f in step.functions))
+        replace(
+            step,
+            uniforms=tuple((name, None) for name, _ in step.uniforms),  # type: ignore[misc]
+            functions=tuple(replace(f, uniforms=()) for f in step.functions),
+        )
         for step in expansion.steps
-    )  # fmt: skip
+    )
     resources = tuple(expansion.resources.values())
     return steps, resources, tuple(expansion.wanted.items()), tuple(expansion.views.items())
 

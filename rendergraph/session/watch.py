@@ -99,5 +99,7 @@ def _settle(paths: list[Path]) -> None:
 
 def _made(session: Session) -> dict[str, int]:
     return {
-        "programs": session.programs.compiled, "textures": session.device.textures_made, "scenes": session.scenes_made,
-    }  # fmt: skip
+        "programs": session.programs.compiled,
+        "textures": session.device.textures_made,
+        "scenes": session.scenes_made,
+    }

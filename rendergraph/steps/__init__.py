@@ -22,10 +22,33 @@ from rendergraph.steps.state import (
     Stencil,
     StencilFace,
     StencilOp,
-)  # fmt: skip
+)
 
 __all__ = [
-    "ADD", "ALPHA", "MULTIPLY", "PREMULTIPLIED", "Blend", "BlendFactor", "Compare", "Frame", "FrameScene",
-    "FunctionBinding", "Read", "Recorder", "Request", "Resource", "Role", "State", "Stencil", "StencilFace",
-    "StencilOp", "Step", "Steps", "Target", "UniformValue", "ViewMatrices", "Write", "define_text",
-]  # fmt: skip
+    "ADD",
+    "ALPHA",
+    "MULTIPLY",
+    "PREMULTIPLIED",
+    "Blend",
+    "BlendFactor",
+    "Compare",
+    "Frame",
+    "FrameScene",
+    "FunctionBinding",
+    "Read",
+    "Recorder",
+    "Request",
+    "Resource",
+    "Role",
+    "State",
+    "Stencil",
+    "StencilFace",
+    "StencilOp",
+    "Step",
+    "Steps",
+    "Target",
+    "UniformValue",
+    "ViewMatrices",
+    "Write",
+    "define_text",
+]

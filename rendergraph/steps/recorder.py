@@ -178,9 +178,19 @@ class Steps:
                 raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
-            "geometry", shaders, out, bindings, defines, state=state, view=view, view_index=view_index,
-            objects=checks.objects(objects), materials=materials, order=order, per_light=per_light,
-        )  # fmt: skip
+            "geometry",
+            shaders,
+            out,
+            bindings,
+            defines,
+            state=state,
+            view=view,
+            view_index=view_index,
+            objects=checks.objects(objects),
+            materials=materials,
+            order=order,
+            per_light=per_light,
+        )
 
     def draw(
         self,
@@ -222,9 +232,19 @@ class Steps:
             self._connected(port)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
-            "draw", shaders, out, bindings, defines, state=state, vertices=vertices, topology=topology, view=view,
-            view_index=view_index, instances=instances, attributes=held,
-        )  # fmt: skip
+            "draw",
+            shaders,
+            out,
+            bindings,
+            defines,
+            state=state,
+            vertices=vertices,
+            topology=topology,
+            view=view,
+            view_index=view_index,
+            instances=instances,
+            attributes=held,
+        )
 
     def compute(
         self,

@@ -10,9 +10,17 @@ from rendergraph.errors import Misuse, suggestion
 Compare = Literal["never", "less", "equal", "lequal", "greater", "notequal", "gequal", "always"]
 StencilOp = Literal["keep", "zero", "replace", "incr", "incr_wrap", "decr", "decr_wrap", "invert"]
 BlendFactor = Literal[
-    "zero", "one", "src_color", "one_minus_src_color", "dst_color", "one_minus_dst_color", "src_alpha",
-    "one_minus_src_alpha", "dst_alpha", "one_minus_dst_alpha",
-]  # fmt: skip
+    "zero",
+    "one",
+    "src_color",
+    "one_minus_src_color",
+    "dst_color",
+    "one_minus_dst_color",
+    "src_alpha",
+    "one_minus_src_alpha",
+    "dst_alpha",
+    "one_minus_dst_alpha",
+]
 BlendOp = Literal["add", "subtract", "reverse_subtract", "min", "max"]
 Cull = Literal["material", "back", "front", "none"]
 

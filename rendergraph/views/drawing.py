@@ -19,12 +19,20 @@ MARGIN = 24.0
 
 # One hue a meaning, each at least 3:1 against white and against near-black, so that links show on any page.
 HUES = {
-    "radiance": "#c2701c", "display_color": "#c2701c", "emissive": "#c2701c", "luminance": "#c2701c",
-    "depth": "#3b7dd8", "linear_depth": "#3b7dd8", "shadow_map": "#3b7dd8",
-    "normal": "#8a63d2", "albedo": "#8a63d2", "material": "#8a63d2",
-    "visibility": "#2c9163", "occlusion": "#2c9163",
+    "radiance": "#c2701c",
+    "display_color": "#c2701c",
+    "emissive": "#c2701c",
+    "luminance": "#c2701c",
+    "depth": "#3b7dd8",
+    "linear_depth": "#3b7dd8",
+    "shadow_map": "#3b7dd8",
+    "normal": "#8a63d2",
+    "albedo": "#8a63d2",
+    "material": "#8a63d2",
+    "visibility": "#2c9163",
+    "occlusion": "#2c9163",
     "shadow": "#c94f7c",
-}  # fmt: skip
+}
 GREY = "#7d8590"
 
 STYLE = """
@@ -178,9 +186,13 @@ def _source_socket(link: Link, table: dict[str, Card]) -> Socket:
 
 
 def _strokes(
-    trunk: Trunk, boxes: dict[str, Box], table: dict[str, Card], lefts: list[float], widths: list[float],
+    trunk: Trunk,
+    boxes: dict[str, Box],
+    table: dict[str, Card],
+    lefts: list[float],
+    widths: list[float],
     marks: Mapping[str, Mark],
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     first = trunk.links[0]
     start, card = boxes[first.source], table[first.source]
     hue = _hue(_source_socket(first, table))

@@ -104,9 +104,15 @@ def graph_json(graph: Graph) -> dict[str, Any]:
             if info is not None and info.desc is not None:
                 desc = info.desc
                 made |= {
-                    "format": desc.format, "size": [desc.width, desc.height], "layers": desc.layers, "mips": desc.mips,
-                    "samples": desc.samples, "bytes": desc.bytes, "view": info.view, "lights": list(info.lights),
-                }  # fmt: skip
+                    "format": desc.format,
+                    "size": [desc.width, desc.height],
+                    "layers": desc.layers,
+                    "mips": desc.mips,
+                    "samples": desc.samples,
+                    "bytes": desc.bytes,
+                    "view": info.view,
+                    "lights": list(info.lights),
+                }
             elif info is not None and info.bytes:
                 made["bytes"] = info.bytes
             outputs[socket.name] = made
@@ -127,10 +133,13 @@ def graph_json(graph: Graph) -> dict[str, Any]:
         "nodes": nodes,
         "links": [
             {
-                "source": link.source, "source_port": link.source_port, "target": link.target,
-                "target_port": link.target_port, "previous": link.previous,
+                "source": link.source,
+                "source_port": link.source_port,
+                "target": link.target,
+                "target_port": link.target_port,
+                "previous": link.previous,
             }
             for link in links(graph)
         ],
         "outputs": {name: str(end) for name, end in graph.outputs.items()},
-    }  # fmt: skip
+    }

@@ -15,8 +15,12 @@ GROUP_GAP = 6.0
 BARS = 72.0  # height of the chart of live bytes
 
 # Read green and write red are what people know from other viewers; the letters carry it for those who cannot tell.
-USES = {"R": ("#2c9163", "reads"), "W": ("#d0453e", "writes"), "B": ("#c2851c", "reads and writes"),
-        "P": ("#3b7dd8", "reads last frame's value")}  # fmt: skip
+USES = {
+    "R": ("#2c9163", "reads"),
+    "W": ("#d0453e", "writes"),
+    "B": ("#c2851c", "reads and writes"),
+    "P": ("#3b7dd8", "reads last frame's value"),
+}
 STYLE = """
 .ink{fill:#1f2328}.fact{fill:#57606a}.band{fill:#7d8590;opacity:.12}.alive{fill:#7d8590;opacity:.45}.bar{fill:#7d8590}
 .peak{fill:#d0453e}.bound{stroke:#2c9163;stroke-dasharray:4 3}.use{fill:#ffffff;font-weight:600}

@@ -108,9 +108,13 @@ def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     if isinstance(resource.desc, TextureDesc):
         desc = resource.desc
         found |= {
-            "kind": desc.kind, "format": desc.format, "size": [desc.width, desc.height], "layers": desc.layers,
-            "mips": desc.mips, "samples": desc.samples,
-        }  # fmt: skip
+            "kind": desc.kind,
+            "format": desc.format,
+            "size": [desc.width, desc.height],
+            "layers": desc.layers,
+            "mips": desc.mips,
+            "samples": desc.samples,
+        }
     else:
         found["kind"] = "buffer"
     return found | {

@@ -96,24 +96,43 @@ def test_every_template_passes_without_a_word(kind: str, tmp_path: Path) -> None
 HOSTILE = {
     "raises": ("x = 1\nraise RuntimeError('not today')\n", r"glow.py:2:1: RG491 .* RuntimeError: not today"),
     "leaves": ("import sys\nsys.exit(7)\n", r"glow.py:2:1: RG4\d\d .*(sys.exit\(7\)|SystemExit: 7)"),
-    "exits": ("import os\n\nos._exit(0)\n", r"glow.py:3:1: RG450 it ends the process with status 0 while it is imported"),
+    "exits": (
+        "import os\n\nos._exit(0)\n",
+        r"glow.py:3:1: RG450 it ends the process with status 0 while it is imported",
+    ),
     "crashes": ("import ctypes\nctypes.string_at(0)\n", r"glow.py:2:1: RG451 it crashes the process \(SIGSEGV\) while"),
-    "aborts": ("import os\nos.abort()\n", r"glow.py:2:1: RG451 it crashes the process \(SIGABRT\) while it is imported"),
+    "aborts": (
+        "import os\nos.abort()\n",
+        r"glow.py:2:1: RG451 it crashes the process \(SIGABRT\) while it is imported",
+    ),
     "sleeps": ("import time\ntime.sleep(60)\n", r"glow.py:2:1: RG452 it takes longer than 2 s while it is imported"),
-    "spins": ("while True:\n    pass\n", r"glow.py:[12]:1: RG452 it takes longer than 2 s while it is imported; --limit"),
-    "ignores": ("import signal\nfor n in (1, 2, 10, 15): signal.signal(n, signal.SIG_IGN)\nwhile True:\n    pass\n",
-                r"glow.py.* RG452 it takes longer than 2 s"),
+    "spins": (
+        "while True:\n    pass\n",
+        r"glow.py:[12]:1: RG452 it takes longer than 2 s while it is imported; --limit",
+    ),
+    "ignores": (
+        "import signal\nfor n in (1, 2, 10, 15): signal.signal(n, signal.SIG_IGN)\nwhile True:\n    pass\n",
+        r"glow.py.* RG452 it takes longer than 2 s",
+    ),
     "prints": ("while True:\n    print('x' * 1000)\n", r"glow.py:2:1: RG452 it takes longer than 2 s"),
     "eats": ("x = []\nwhile True:\n    x.append(bytearray(1 << 24))\n", r"glow.py:3:1: RG453 .* 500 MiB of memory"),
     "gulps": ("x = bytearray(1 << 40)\n", r"glow.py:1:1: RG453 it takes more than the 500 MiB of memory that it may"),
     "nothing": ("x = 1\n", r"glow.py: RG492 the module of node type 'glow' must define one Node class, it has none"),
-    "children": ("import os, time\nif os.fork() == 0:\n    time.sleep(30)\nos._exit(4)\n", r"glow.py:4:1: RG450 .* status 4"),
+    "children": (
+        "import os, time\nif os.fork() == 0:\n    time.sleep(30)\nos._exit(4)\n",
+        r"glow.py:4:1: RG450 .* status 4",
+    ),
     "closes": ("import os\nos.closerange(3, 100)\nos._exit(0)\n", r"glow.py.* RG450 it ends the process"),
-    "closes and sleeps": ("import os, time\nos.closerange(3, 100)\ntime.sleep(60)\n", r"glow.py.* RG452 it takes longer"),
-    "chats": ("import os\nfor n in range(3, 20):\n    try: os.write(n, b'{}\\nx\\n[1]\\n')\n    except OSError: pass\n1 / 0\n",
-              r"glow.py:5:1: RG491 .* ZeroDivisionError"),
+    "closes and sleeps": (
+        "import os, time\nos.closerange(3, 100)\ntime.sleep(60)\n",
+        r"glow.py.* RG452 it takes longer",
+    ),
+    "chats": (
+        "import os\nfor n in range(3, 20):\n    try: os.write(n, b'{}\\nx\\n[1]\\n')\n    except OSError: pass\n1 / 0\n",
+        r"glow.py:5:1: RG491 .* ZeroDivisionError",
+    ),
     "interrupts": ("raise KeyboardInterrupt\n", r"glow.py:1:1: RG4\d\d .*KeyboardInterrupt"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow
@@ -128,41 +147,76 @@ def test_a_hostile_import_is_one_message(check: Check, name: str) -> None:
 
 
 RUNNING = {
-    "raises in record": (body("def record(self, steps: Steps) -> None:", "    raise KeyError('gone')"),
-                         r"glow.py:13:1: RG420 .*KeyError: 'gone'"),
-    "raises in update": (body("def update(self, frame: Frame) -> None:", "    frame.nothing"),
-                         r"glow.py:13:1: RG433 .*AttributeError"),
-    "exits in record": (body("def record(self, steps: Steps) -> None:", "    import os; os._exit(1)"),
-                        r"glow.py:13:1: RG450 it ends the process with status 1 in variant 'default'"),
-    "spins in update": (body("def update(self, frame: Frame) -> None:", "    while True: pass"),
-                        r"glow.py:13:1: RG452 it takes longer than 3 s in variant 'default'; --limit pass-seconds=N"),
-    "crashes in update": (body("def update(self, frame: Frame) -> None:", "    import ctypes; ctypes.string_at(0)"),
-                          r"glow.py:13:1: RG451 it crashes the process \(SIGSEGV\) in variant 'default'"),
-    "eats in record": (body("def record(self, steps: Steps) -> None:", "    bytearray(1 << 40)"),
-                       r"glow.py:13:1: RG453 it takes more than the 500 MiB"),
-    "writes its input": (body("def record(self, steps: Steps) -> None:",
-                              "    steps.fullscreen('glow.frag', out=self.radiance, radiance=self.radiance)"),
-                         r"glow.py:13:1: RG421 "),
-    "writes what it made up": (body("def record(self, steps: Steps) -> None:",
-                                    "    steps.fullscreen('glow.frag', out=Output(Radiance, doc='Not mine.'))"),
-                               r"glow.py:13:1: RG42\d "),
-    "fills too much": (body("words = Internal(kind='buffer', bytes=16)",
-                            "def record(self, steps: Steps) -> None:",
-                            "    steps.fullscreen('glow.frag', radiance=self.radiance, words=self.words)",
-                            "def update(self, frame: Frame) -> None:",
-                            "    import numpy; frame.write(self.words, numpy.zeros(100))"),
-                       r"glow.py:16:1: RG432 .*writes 800 bytes into 'words', which holds 16"),
-    "fills another's": (body("def update(self, frame: Frame) -> None:",
-                             "    import numpy",
-                             "    frame.write(Internal(kind='buffer', bytes=16), numpy.zeros(1))"),
-                        r"glow.py:14:1: RG433 "),
-    "changes state": (body("def update(self, frame: Frame) -> None:",
-                           "    import ctypes; ctypes.CDLL('libGL.so.1').glEnable(0x0B90)"),
-                      r"glow.py:12:5: RG456 'update' changes OpenGL's state: what is enabled"),
-    "leaks": (body("def update(self, frame: Frame) -> None:",
-                   "    import ctypes; ctypes.CDLL('libGL.so.1').glCreateBuffers(3, (ctypes.c_uint * 3)())"),
-              r"glow.py: RG456 the node leaves GL objects behind: \d+ buffers"),
-}  # fmt: skip
+    "raises in record": (
+        body("def record(self, steps: Steps) -> None:", "    raise KeyError('gone')"),
+        r"glow.py:13:1: RG420 .*KeyError: 'gone'",
+    ),
+    "raises in update": (
+        body("def update(self, frame: Frame) -> None:", "    frame.nothing"),
+        r"glow.py:13:1: RG433 .*AttributeError",
+    ),
+    "exits in record": (
+        body("def record(self, steps: Steps) -> None:", "    import os; os._exit(1)"),
+        r"glow.py:13:1: RG450 it ends the process with status 1 in variant 'default'",
+    ),
+    "spins in update": (
+        body("def update(self, frame: Frame) -> None:", "    while True: pass"),
+        r"glow.py:13:1: RG452 it takes longer than 3 s in variant 'default'; --limit pass-seconds=N",
+    ),
+    "crashes in update": (
+        body("def update(self, frame: Frame) -> None:", "    import ctypes; ctypes.string_at(0)"),
+        r"glow.py:13:1: RG451 it crashes the process \(SIGSEGV\) in variant 'default'",
+    ),
+    "eats in record": (
+        body("def record(self, steps: Steps) -> None:", "    bytearray(1 << 40)"),
+        r"glow.py:13:1: RG453 it takes more than the 500 MiB",
+    ),
+    "writes its input": (
+        body(
+            "def record(self, steps: Steps) -> None:",
+            "    steps.fullscreen('glow.frag', out=self.radiance, radiance=self.radiance)",
+        ),
+        r"glow.py:13:1: RG421 ",
+    ),
+    "writes what it made up": (
+        body(
+            "def record(self, steps: Steps) -> None:",
+            "    steps.fullscreen('glow.frag', out=Output(Radiance, doc='Not mine.'))",
+        ),
+        r"glow.py:13:1: RG42\d ",
+    ),
+    "fills too much": (
+        body(
+            "words = Internal(kind='buffer', bytes=16)",
+            "def record(self, steps: Steps) -> None:",
+            "    steps.fullscreen('glow.frag', radiance=self.radiance, words=self.words)",
+            "def update(self, frame: Frame) -> None:",
+            "    import numpy; frame.write(self.words, numpy.zeros(100))",
+        ),
+        r"glow.py:16:1: RG432 .*writes 800 bytes into 'words', which holds 16",
+    ),
+    "fills another's": (
+        body(
+            "def update(self, frame: Frame) -> None:",
+            "    import numpy",
+            "    frame.write(Internal(kind='buffer', bytes=16), numpy.zeros(1))",
+        ),
+        r"glow.py:14:1: RG433 ",
+    ),
+    "changes state": (
+        body(
+            "def update(self, frame: Frame) -> None:", "    import ctypes; ctypes.CDLL('libGL.so.1').glEnable(0x0B90)"
+        ),
+        r"glow.py:12:5: RG456 'update' changes OpenGL's state: what is enabled",
+    ),
+    "leaks": (
+        body(
+            "def update(self, frame: Frame) -> None:",
+            "    import ctypes; ctypes.CDLL('libGL.so.1').glCreateBuffers(3, (ctypes.c_uint * 3)())",
+        ),
+        r"glow.py: RG456 the node leaves GL objects behind: \d+ buffers",
+    ),
+}
 
 
 @pytest.mark.slow
@@ -179,20 +233,35 @@ def test_a_hostile_pass_is_one_message(check: Check, name: str) -> None:
 BOMB = "\n".join(["#define B0 1.0", *(f"#define B{n + 1} B{n}+B{n}" for n in range(30))])
 SHADERS = {
     "does not compile": (SHADER.replace("gain *", "gain * *"), r"glow.frag:4:\d+: RG410 "),
-    "leaves an output unwritten": (SHADER.replace("brighter =", "vec4 lost ="),
-                                   r"glow.frag:3:1: RG454 the shader never writes 'brighter', which its step draws to"),
+    "leaves an output unwritten": (
+        SHADER.replace("brighter =", "vec4 lost ="),
+        r"glow.frag:3:1: RG454 the shader never writes 'brighter', which its step draws to",
+    ),
     "leaves one of two unwritten": (SHADER.replace("void", "out vec4 more;\nvoid"), r"glow.*: RG4(37|54) .*'more'"),
-    "writes half": (SHADER.replace("{ ", "{ if (gl_FragCoord.x < 10.0) discard; "),
-                    r"glow.py:8:5: RG454 230 of 851 texels of 'brighter' are not written; write them all, or declare"),
+    "writes half": (
+        SHADER.replace("{ ", "{ if (gl_FragCoord.x < 10.0) discard; "),
+        r"glow.py:8:5: RG454 230 of 851 texels of 'brighter' are not written; write them all, or declare",
+    ),
     "never looks at a parameter": (SHADER.replace("= gain *", "="), r"glow.py:10:5: RG455 'gain' is declared, but no"),
-    "never looks at an input": (SHADER.replace("gain * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0)", "vec4(gain)"),
-                                r"glow.py:7:5: RG455 'radiance' is declared"),
-    "looks at what nobody sets": (SHADER.replace("gain *", "gain * other *").replace("out", "uniform float other;\nout"),
-                                  r"glow.frag:3:15: RG434 .*'other', which nothing sets"),
-    "looks at another's buffer": (SHADER.replace("out", "layout(std430) buffer loot { vec4 all_of_it[]; };\nout")
-                                  .replace("gain *", "all_of_it[3] + gain *"), r"glow.frag.*RG4\d\d .*loot"),
-    "macros that double": (BOMB + SHADER.replace("gain *", "(B30) * gain *"), r"glow.(py|frag).* RG409 macros make more than"),
-}  # fmt: skip
+    "never looks at an input": (
+        SHADER.replace("gain * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0)", "vec4(gain)"),
+        r"glow.py:7:5: RG455 'radiance' is declared",
+    ),
+    "looks at what nobody sets": (
+        SHADER.replace("gain *", "gain * other *").replace("out", "uniform float other;\nout"),
+        r"glow.frag:3:15: RG434 .*'other', which nothing sets",
+    ),
+    "looks at another's buffer": (
+        SHADER.replace("out", "layout(std430) buffer loot { vec4 all_of_it[]; };\nout").replace(
+            "gain *", "all_of_it[3] + gain *"
+        ),
+        r"glow.frag.*RG4\d\d .*loot",
+    ),
+    "macros that double": (
+        BOMB + SHADER.replace("gain *", "(B30) * gain *"),
+        r"glow.(py|frag).* RG409 macros make more than",
+    ),
+}
 
 
 @pytest.mark.slow
@@ -274,9 +343,11 @@ def test_an_input_that_nothing_can_be_made_up_for_is_a_warning(check: Check) -> 
 
 RECORDS = {
     "raises": ("raise KeyError('lamp')", r"glow.py:15:1: RG420 node 'glow' failed while recording: KeyError: 'lamp'$"),
-    "samples its target": ("steps.fullscreen('glow.frag', radiance=self.brighter, out=self.brighter)",
-                           r"glow.py:15:1: RG422 node 'glow': it samples 'glow.brighter'"),
-}  # fmt: skip
+    "samples its target": (
+        "steps.fullscreen('glow.frag', radiance=self.brighter, out=self.brighter)",
+        r"glow.py:15:1: RG422 node 'glow': it samples 'glow.brighter'",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", RECORDS)
@@ -327,8 +398,11 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert (out, err) == ("", "lens_falloff: all is well in 1 variant\n")
     assert main(["check-node", "lens_falloff.py", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
-        "node": "lens_falloff", "file": "lens_falloff.py", "variants": ["default"], "warnings": []
-    }  # fmt: skip
+        "node": "lens_falloff",
+        "file": "lens_falloff.py",
+        "variants": ["default"],
+        "warnings": [],
+    }
     Path("slow.py").write_text("import time\ntime.sleep(60)\n")
     assert main(["check-node", "slow.py", "--limit", "import-seconds=1", "--json"]) == 3
     problem = json.loads(capsys.readouterr().out)["error"]["problems"][0]

@@ -80,9 +80,13 @@ def test_a_package_can_be_built_and_found(tmp_path: Path) -> None:
         "print(found.plugin, found.cls.__module__, (found.shaders / 'lens_falloff.frag').is_file())"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], env=dict(os.environ, PYTHONPATH=str(site)), cwd=tmp_path,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "-c", program],
+        env=dict(os.environ, PYTHONPATH=str(site)),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.stdout.split() == ["lens_falloff", "rendergraph_lens_falloff.nodes.lens_falloff", "True"], done.stderr
 
 
@@ -120,14 +124,21 @@ def test_a_second_node_beside_the_first_leaves_the_schema_and_says_how_to_refres
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("Lens-Falloff", r"RG530 .* such as 'lens_falloff'"), ("3d", r"such as 'd'"), ("", r"a name is up to 40"),
-        ("x" * 41, r"a name is up to 40"), ("a__b", r"such as 'a_b'"), ("gl_thing", r"reserved by GLSL"),
-        ("filter", r"reserved by GLSL or Python; choose another, such as 'my_filter'"), ("lambda", r"reserved"),
+        ("Lens-Falloff", r"RG530 .* such as 'lens_falloff'"),
+        ("3d", r"such as 'd'"),
+        ("", r"a name is up to 40"),
+        ("x" * 41, r"a name is up to 40"),
+        ("a__b", r"such as 'a_b'"),
+        ("gl_thing", r"reserved by GLSL"),
+        ("filter", r"reserved by GLSL or Python; choose another, such as 'my_filter'"),
+        ("lambda", r"reserved"),
         ("tonemap", r"there is a node type of that name; choose another, such as 'my_tonemap'"),
-        ("random", r"a Python module has that name"), ("numpy", r"a Python module has that name"),
-        ("test_it", r"pytest would take the module for a test; .* 'it_node'"), ("../up", r"such as 'up'"),
+        ("random", r"a Python module has that name"),
+        ("numpy", r"a Python module has that name"),
+        ("test_it", r"pytest would take the module for a test; .* 'it_node'"),
+        ("../up", r"such as 'up'"),
     ],
-)  # fmt: skip
+)
 def test_names_that_cannot_be(name: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=message):
         new_node(name, where=tmp_path)

@@ -70,14 +70,23 @@ def test_a_buffer_is_no_picture_on_the_command_line(
     )
 
 
-@pytest.mark.parametrize("declared", ["uniform writeonly image2D color;", "writeonly uniform image2D color;",
-                                      "layout(rgba16f) uniform writeonly image2D color;", "uniform image2D color;",
-                                      "layout(binding = 1) uniform restrict image2D color;"])  # fmt: skip
+@pytest.mark.parametrize(
+    "declared",
+    [
+        "uniform writeonly image2D color;",
+        "writeonly uniform image2D color;",
+        "layout(rgba16f) uniform writeonly image2D color;",
+        "uniform image2D color;",
+        "layout(binding = 1) uniform restrict image2D color;",
+    ],
+)
 def test_an_image_takes_the_format_of_its_port(author: Any, gl: rg.Session, declared: str) -> None:
     author.node('shader = "wrong.comp"\ncolor = Output(Radiance, doc="Where it is.")')
     store = "imageStore(color, p, vec4(p, 0.0, 1.0))"
-    author.write(wrong__comp=f"layout(local_size_x = 8, local_size_y = 4) in;\n{declared}\nvoid main() {{\n"
-                 f"    ivec2 p = ivec2(gl_GlobalInvocationID.xy);\n    {store};\n}}")  # fmt: skip
+    author.write(
+        wrong__comp=f"layout(local_size_x = 8, local_size_y = 4) in;\n{declared}\nvoid main() {{\n"
+        f"    ivec2 p = ivec2(gl_GlobalInvocationID.xy);\n    {store};\n}}"
+    )
     image = gl.render(author.pipeline(size="[19, 7]"))["image"]
     np.testing.assert_array_equal(image[::-1, :, 0], np.tile(np.arange(19.0), (7, 1)))
     np.testing.assert_array_equal(image[::-1, :, 1], np.tile(np.arange(7.0)[:, None], (1, 19)))
@@ -238,8 +247,11 @@ def record(self, steps):
 
 def test_a_mip_chain_down_and_up_again(author: Any, gl: rg.Session) -> None:
     author.node(SOURCE, "checks")
-    author.node(CHAIN.replace("out=self.chain.mip(0))", "out=self.chain.mip(0), scale=1)").replace(
-        "out=self.color)", "out=self.color, scale=1)"))  # fmt: skip
+    author.node(
+        CHAIN.replace("out=self.chain.mip(0))", "out=self.chain.mip(0), scale=1)").replace(
+            "out=self.color)", "out=self.color, scale=1)"
+        )
+    )
     author.write(
         checks__frag=SOURCE_FRAG,
         copy__frag="uniform sampler2D source;\nuniform int scale;\nout float made;\n"

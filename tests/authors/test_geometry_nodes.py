@@ -69,9 +69,15 @@ cameras:
 
 @pytest.mark.parametrize(
     ("objects", "drawn"),
-    [("'all'", (True, True)), ("['right']", (False, True)), ("('left', 'right')", (True, True)),
-     ("'left'", (True, False)), ("[]", (False, False)), ("'transparent'", (False, False))],
-)  # fmt: skip
+    [
+        ("'all'", (True, True)),
+        ("['right']", (False, True)),
+        ("('left', 'right')", (True, True)),
+        ("'left'", (True, False)),
+        ("[]", (False, False)),
+        ("'transparent'", (False, False)),
+    ],
+)
 def test_objects_by_kind_and_by_name(author: Any, gl: rg.Session, objects: str, drawn: tuple[bool, bool]) -> None:
     author.node(SELECTED.replace("{objects}", objects))
     author.write(**show("in_normal", "vec3", "vec4(1.0)"))
@@ -159,9 +165,12 @@ def test_a_draw_over_a_buffer_that_another_node_filled(author: Any, gl: rg.Sessi
 
 LIMITS = {
     'color = Output(Radiance, samples=16, doc="Colour.")': ("samples", 16, "'a.color' has 16 samples a texel"),
-    'color = Output(Radiance, kind="texture2d_array", layers=100_000, size=(1, 1), doc="Colour.")':
-        ("layers", 100_000, "'a.color' has 100000 layers"),
-}  # fmt: skip
+    'color = Output(Radiance, kind="texture2d_array", layers=100_000, size=(1, 1), doc="Colour.")': (
+        "layers",
+        100_000,
+        "'a.color' has 100000 layers",
+    ),
+}
 
 
 @pytest.mark.parametrize("body", LIMITS)

@@ -77,9 +77,16 @@ def test_a_buffer_that_is_only_read_is_declared_so(author: Any, gl: rg.Session, 
 
 
 def test_a_functions_buffer_that_is_only_read_is_declared_so(author: Any, gl: rg.Session) -> None:
-    author.node(NUMBERS.replace("BYTES", "64").replace('"wrong.frag"', '"wrong.frag", glow=self.glow').replace(
-        "\ndef", 'glow = Function(Signature("glow", "vec4 glow()", (), "+", "vec4(0.0)", "Glow."), reads=("numbers",), '
-                 'shader="glow.glsl", doc="Glow.")\n\ndef', 1))  # fmt: skip
+    author.node(
+        NUMBERS.replace("BYTES", "64")
+        .replace('"wrong.frag"', '"wrong.frag", glow=self.glow')
+        .replace(
+            "\ndef",
+            'glow = Function(Signature("glow", "vec4 glow()", (), "+", "vec4(0.0)", "Glow."), reads=("numbers",), '
+            'shader="glow.glsl", doc="Glow.")\n\ndef',
+            1,
+        )
+    )
     author.write(
         wrong__comp=NUMBERS_COMP,
         glow__glsl="layout(std430) buffer numbers { float values[]; };\nvec4 glow() { return vec4(values[3]); }\n",

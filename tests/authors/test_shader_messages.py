@@ -101,15 +101,36 @@ def answer(form: str, text: StageText, fragment: str, name: str) -> Problem:
         ("lit.frag", "mistake_shadow", "mistake_shadow", "shadow.glsl", 3, ""),
         ("lit.frag", "color = vec4(shadow", "shadow", "lit.frag", 3, ""),
         # lines that nobody wrote: the author's nearest, and what they are there for
-        ("fog.frag", "depth_view_block", "View", "fog.frag", 4, "(in what rendergraph writes for the views of 'depth': "),
+        (
+            "fog.frag",
+            "depth_view_block",
+            "View",
+            "fog.frag",
+            4,
+            "(in what rendergraph writes for the views of 'depth': ",
+        ),
         ("lit.frag", "float result = 1.0", "result", "lit.frag", 1, "(in what rendergraph writes for shadow() of all "),
-        ("main.frag", "#define SAMPLES 4", "SAMPLES", "main.frag", 1, "(in what rendergraph writes for the macro SAMPLES: "),
+        (
+            "main.frag",
+            "#define SAMPLES 4",
+            "SAMPLES",
+            "main.frag",
+            1,
+            "(in what rendergraph writes for the macro SAMPLES: ",
+        ),
     ],
-)  # fmt: skip
+)
 def test_every_driver_leads_to_the_authors_line(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, form: str, shader: str, fragment: str, name: str, file: str, line: int,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    form: str,
+    shader: str,
+    fragment: str,
+    name: str,
+    file: str,
+    line: int,
     more: str,
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.chdir(folder)
     found = answer(form, texts(folder, shader)["fragment"], fragment, name)
     assert found.place is not None
@@ -177,10 +198,12 @@ def test_nvidias_link_messages_have_lines(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     "message",
-    ["error: fragment shader input `color' has no matching output in the previous stage",
-     "error: vertex shader output `color' declared as type `vec3'",
-     "ERROR: Type mismatch of varying 'color'"],
-)  # fmt: skip
+    [
+        "error: fragment shader input `color' has no matching output in the previous stage",
+        "error: vertex shader output `color' declared as type `vec3'",
+        "ERROR: Type mismatch of varying 'color'",
+    ],
+)
 def test_link_messages_are_at_the_variable(folder: Path, message: str) -> None:
     (found,) = link_problems(message, texts(folder, "main.frag"))
     assert found.place is not None
@@ -195,8 +218,11 @@ SCENE = "objects: {box: {shape: box}}\n"
 CASES = {
     "include in include": (
         COLOR,
-        {"wrong.frag": '#include "a.glsl"\nout vec4 color; void main() { color = a(); }',
-         "a.glsl": '\n#include "b.glsl"\nvec4 a() { return b(); }', "b.glsl": "// B\nvec4 b() {\n    return nothing;\n}"},
+        {
+            "wrong.frag": '#include "a.glsl"\nout vec4 color; void main() { color = a(); }',
+            "a.glsl": '\n#include "b.glsl"\nvec4 a() { return b(); }',
+            "b.glsl": "// B\nvec4 b() {\n    return nothing;\n}",
+        },
         r"b\.glsl:3:12: RG410 node 'a': fragment shader: .*nothing.* \(included at a\.glsl:2\)",
     ),
     "far in": (
@@ -216,18 +242,24 @@ CASES = {
     ),
     "shared include": (
         COLOR,
-        {"wrong.frag": "out vec4 color;\n#define vec3 nothing\n#include <tone_curves.glsl>\nvoid main() { color = vec4(1); }"},
+        {
+            "wrong.frag": "out vec4 color;\n#define vec3 nothing\n#include <tone_curves.glsl>\nvoid main() { color = vec4(1); }"
+        },
         r"luminance\.glsl:\d+:\d+: RG410 node 'a': fragment shader: .* \(included at wrong\.frag:3\)",
     ),
     "the vertex stage": (
         DRAWN,
-        {"wrong.vert": "#include <geometry_vertex.glsl>\nvoid main() {\n    pass_vertex_on();\n    v_positon.x = 1.0;\n}"},
+        {
+            "wrong.vert": "#include <geometry_vertex.glsl>\nvoid main() {\n    pass_vertex_on();\n    v_positon.x = 1.0;\n}"
+        },
         r"wrong\.vert:4:\d+: RG410 node 'a': vertex shader: .*v_positon",
     ),
     "stages that do not fit": (
         DRAWN,
-        {"wrong.vert": "in vec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }",
-         "wrong.frag": "\nin vec2 v_place;\nout vec4 color;\nvoid main() { color = v_place.xyxy; }"},
+        {
+            "wrong.vert": "in vec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }",
+            "wrong.frag": "\nin vec2 v_place;\nout vec4 color;\nvoid main() { color = v_place.xyxy; }",
+        },
         r"wrong\.frag:2:9: RG411 node 'a': the stages vertex, fragment do not link: .*v_place",
     ),
     "an attribute misspelt": (
@@ -280,8 +312,10 @@ CASES = {
     ),
     "more than an array holds": (
         COLOR + 'def record(self, steps):\n    steps.fullscreen("wrong.frag", weights=[0.1] * 5)',
-        {"wrong.frag": "uniform float weights[4];\nout vec4 color;\n"
-                       "void main() { color = vec4(weights[0], weights[1], weights[2], weights[3]); }"},
+        {
+            "wrong.frag": "uniform float weights[4];\nout vec4 color;\n"
+            "void main() { color = vec4(weights[0], weights[1], weights[2], weights[3]); }"
+        },
         r"wrong\.frag:1:15: RG436 .* declares 'weights' as float\[4\], but it is given 5 numbers$",
     ),
     "floats for a whole number": (
@@ -301,17 +335,21 @@ CASES = {
     ),
     "a texture named like a variable of an earlier stage": (
         DRAWN,
-        {"wrong.vert": "in vec3 in_position;\nvoid main() {\n    float depth = 1.0;\n"
-                       "    gl_Position = vec4(in_position, depth);\n}",
-         "wrong.frag": "uniform sampler2D depth;\nout vec4 color;\nvoid main() { color = texture(depth, vec2(0)); }"},
+        {
+            "wrong.vert": "in vec3 in_position;\nvoid main() {\n    float depth = 1.0;\n"
+            "    gl_Position = vec4(in_position, depth);\n}",
+            "wrong.frag": "uniform sampler2D depth;\nout vec4 color;\nvoid main() { color = texture(depth, vec2(0)); }",
+        },
         r"wrong\.frag:1:19: RG430 .* samples 'depth', but the step reads no texture of that name",
     ),
     "a buffer misspelt": (
         COLOR + 'numbers = Internal(kind="buffer", bytes=64)\n\ndef record(self, steps):\n'
         '    steps.compute("wrong.comp", over=1, out=self.numbers)\n'
         '    steps.fullscreen("wrong.frag", numbers=self.numbers, out=self.color)',
-        {"wrong.comp": "layout(local_size_x = 1) in;\nlayout(std430) buffer nubmers { float values[]; };\n"
-                       "void main() { values[0] = 1.0; }"},
+        {
+            "wrong.comp": "layout(local_size_x = 1) in;\nlayout(std430) buffer nubmers { float values[]; };\n"
+            "void main() { values[0] = 1.0; }"
+        },
         r"wrong\.comp:2:23: RG430 .*wrong\.py:20: wrong\.comp looks at block 'nubmers', but the step has no buffer of that "
         r"name; it has numbers$",
     ),
@@ -322,8 +360,10 @@ CASES = {
     ),
     "a material's texture without a guard": (
         COLOR + 'def record(self, steps):\n    steps.geometry("wrong.frag")',
-        {"wrong.frag": "uniform sampler2D base_color_texture;\nout vec4 color;\n"
-                       "void main() { color = texture(base_color_texture, vec2(0)); }"},
+        {
+            "wrong.frag": "uniform sampler2D base_color_texture;\nout vec4 color;\n"
+            "void main() { color = texture(base_color_texture, vec2(0)); }"
+        },
         r"wrong\.frag:1:19: RG430 .*'base_color_texture', but .* reads none; not every material has it, so it stands inside "
         r"#ifdef HAS_BASE_COLOR_TEXTURE$",
     ),
@@ -334,17 +374,21 @@ CASES = {
     ),
     "an image of another format": (
         'shader = "wrong.comp"\n' + COLOR,
-        {"wrong.comp": "layout(local_size_x = 8) in;\nlayout(r32f) uniform writeonly image2D color;\n"
-                       "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"},
+        {
+            "wrong.comp": "layout(local_size_x = 8) in;\nlayout(r32f) uniform writeonly image2D color;\n"
+            "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"
+        },
         r"wrong\.comp:2:1: RG427 node 'a': image 'color' has layout\(r32f\), but 'a\.color' is rgba16f; leave the layout out",
     ),
     "an image of whole numbers": (
         'shader = "wrong.comp"\ncolor = Output(Radiance, format="r32ui", doc="Colour.")',
-        {"wrong.comp": "layout(local_size_x = 8) in;\nuniform writeonly image2D color;\n"
-                       "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"},
+        {
+            "wrong.comp": "layout(local_size_x = 8) in;\nuniform writeonly image2D color;\n"
+            "void main() { imageStore(color, ivec2(0), vec4(1.0)); }"
+        },
         r"wrong\.comp:2:1: RG427 node 'a': image 'color' is an image2D, but 'a\.color' is r32ui, which takes uimage2D",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", CASES)

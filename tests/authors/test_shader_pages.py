@@ -30,10 +30,12 @@ CASES = {
     "RG430": (COLOR, "wrong.frag", "out vec4 color; void main() { color = texelFetch(depht, ivec2(0), 0); }", None),
     "RG436": (COLOR + GAIN, "wrong.frag", OUT.format("gain.xyzx"), OUT.format("vec4(gain)")),
     "RG434": (
-        COLOR + GAIN, "wrong.frag", "out vec4 color; void main() { color = vec4(gian); }",
+        COLOR + GAIN,
+        "wrong.frag",
+        "out vec4 color; void main() { color = vec4(gian); }",
         "out vec4 color; void main() { color = vec4(gain); }",
     ),
-}  # fmt: skip
+}
 LAST = "nodes:\n  a: {type: wrong, inputs: {depth: a.color@previous}}\noutputs: {image: a.color}\n"
 
 

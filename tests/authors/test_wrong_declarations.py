@@ -10,128 +10,88 @@ COLOR = 'color = Output(Radiance, doc="Colour.")\n'
 
 DECLARATIONS = {
     # names
-    'uniform = Output(Radiance, doc="D.")  # here':
-        "'uniform' is reserved by GLSL or by the node's base class; choose another name",
-    'camera = Input(AnyTexel, doc="D.")  # here':
-        "'camera' is reserved by GLSL or by the node's base class; choose another name",
+    'uniform = Output(Radiance, doc="D.")  # here': "'uniform' is reserved by GLSL or by the node's base class; choose another name",
+    'camera = Input(AnyTexel, doc="D.")  # here': "'camera' is reserved by GLSL or by the node's base class; choose another name",
     'Color = Output(Radiance, doc="D.")  # here': "'Color' is not a lower-case GLSL identifier",
     'gl_color = Output(Radiance, doc="D.")  # here': "'gl_color' is not a lower-case GLSL identifier",
     'two__lines = Output(Radiance, doc="D.")  # here': "'two__lines' is not a lower-case GLSL identifier",
-    'depth = Input(Depth, doc="D.")\ndepth_views: float = param(default=1.0, doc="D.")  # here':
-        "'depth_views' is what shaders are given for the views of port 'depth'; rename one",
-    'depth = Input(Depth, doc="D.")  # here\nhas_depth: bool = define(default=True, doc="D.")':
-        "input 'depth' and define 'has_depth' would define one macro, HAS_DEPTH; rename one",
-    'curve: Literal["a", "b"] = define(default="a", doc="D.")  # here\ncurve_a: bool = define(default=True, doc="D.")':
-        "choice 'a' of 'curve' and define 'curve_a' would define one macro, CURVE_A; rename one",
-    'light_count: int = define(default=1, doc="D.")  # here':
-        "define 'light_count' would define the macro LIGHT_COUNT, which is rendergraph's own; choose another name",
+    'depth = Input(Depth, doc="D.")\ndepth_views: float = param(default=1.0, doc="D.")  # here': "'depth_views' is what shaders are given for the views of port 'depth'; rename one",
+    'depth = Input(Depth, doc="D.")  # here\nhas_depth: bool = define(default=True, doc="D.")': "input 'depth' and define 'has_depth' would define one macro, HAS_DEPTH; rename one",
+    'curve: Literal["a", "b"] = define(default="a", doc="D.")  # here\ncurve_a: bool = define(default=True, doc="D.")': "choice 'a' of 'curve' and define 'curve_a' would define one macro, CURVE_A; rename one",
+    'light_count: int = define(default=1, doc="D.")  # here': "define 'light_count' would define the macro LIGHT_COUNT, which is rendergraph's own; choose another name",
     'albedo = Input(Albedo, group="albedo", doc="D.")  # here': "group 'albedo' has the name of a port or parameter",
     # docs
-    'more = Output(Radiance)  # here': "port 'more' has no doc",
+    "more = Output(Radiance)  # here": "port 'more' has no doc",
     'gain: float = param(default=1.0, doc="")  # here': "parameter 'gain' has no doc",
-    'gain: float = 1.0  # here':
-        "parameter 'gain' is a plain value; declare it with param(…), define(…) or structural(…)",
+    "gain: float = 1.0  # here": "parameter 'gain' is a plain value; declare it with param(…), define(…) or structural(…)",
     # ports
     'more = Output("radiance", doc="D.")  # here': "port 'more' has the semantic 'radiance'; it is a Semantic, such as Radiance",
     'more = Input("radiance", doc="D.")  # here': "port 'more' has the semantic 'radiance'; it is a Semantic, such as Radiance",
-    'more = Input(Radiance, kind="function", doc="D.")  # here':
-        "port 'more' has the semantic Semantic(name='radiance', doc='Scene-linear radiance, Rec. 709 primaries, 0 to "
-        "infinity.', space=None, encoding='linear'); it is a Signature, such as ShadowLookup",
+    'more = Input(Radiance, kind="function", doc="D.")  # here': "port 'more' has the semantic Semantic(name='radiance', doc='Scene-linear radiance, Rec. 709 primaries, 0 to "
+    "infinity.', space=None, encoding='linear'); it is a Signature, such as ShadowLookup",
     'more = Output(doc="D.")  # here': "port 'more' has neither a semantic nor `like`",
     'more = Input(Radiance, kind="texture", doc="D.")  # here': "port 'more' has kind 'texture'; did you mean 'texture2d'?",
-    'more = Input(Radiance, filter="bilinear", doc="D.")  # here':
-        "port 'more' has filter 'bilinear'; did you mean 'linear'?",
+    'more = Input(Radiance, filter="bilinear", doc="D.")  # here': "port 'more' has filter 'bilinear'; did you mean 'linear'?",
     'more = Input(Radiance, wrap="clamp_to_edge", doc="D.")  # here': "port 'more' has wrap 'clamp_to_edge'; there is border, clamp, mirror, repeat",
     'more = Input(Radiance, size="half", doc="D.")  # here': "port 'more' has size 'half'; there is any, same",
     'more = Input(Radiance, samples=4, doc="D.")  # here': "port 'more' has samples 4; there is any, multi, single",
     'more = Input(Radiance, use="load", doc="D.")  # here': "port 'more' has use 'load'; there is depth_test, image, sample",
-    'more = Input(Radiance, anisotropy=0, doc="D.")  # here':
-        "port 'more' has anisotropy=0; it is a whole number from 1, or a function of node and facts",
+    'more = Input(Radiance, anisotropy=0, doc="D.")  # here': "port 'more' has anisotropy=0; it is a whole number from 1, or a function of node and facts",
     'more = Input(Radiance, optional="yes", doc="D.")  # here': "port 'more' has optional='yes'; it is True or False",
-    'more = Output(Radiance, format="rgb16f", doc="D.")  # here':
-        "port 'more' has an unknown format 'rgb16f'; did you mean 'rgba16f'?",
-    'more = Output(Radiance, format=16, doc="D.")  # here':
-        "port 'more' has format=16; it is the name of one, such as 'rgba16f'",
-    'more = Output(Radiance, kind="texture3d", doc="D.")  # here':
-        "port 'more' has kind 'texture3d'; did you mean 'texture2d'?",
-    'more = Output(Radiance, mips=-1, doc="D.")  # here':
-        "port 'more' has mips=-1; it is a whole number from 0, or a function of node and facts",
-    'more = Output(Radiance, layers=1.5, doc="D.")  # here':
-        "port 'more' has layers=1.5; it is a whole number from 0, or a function of node and facts",
-    'more = Output(Radiance, size=0, doc="D.")  # here':
-        "port 'more' has size=0; a factor of the viewport is a number above 0",
-    'more = Output(Radiance, size=(64, 0.5), doc="D.")  # here':
-        "port 'more' has size=(64, 0.5); width and height are whole numbers from 1",
+    'more = Output(Radiance, format="rgb16f", doc="D.")  # here': "port 'more' has an unknown format 'rgb16f'; did you mean 'rgba16f'?",
+    'more = Output(Radiance, format=16, doc="D.")  # here': "port 'more' has format=16; it is the name of one, such as 'rgba16f'",
+    'more = Output(Radiance, kind="texture3d", doc="D.")  # here': "port 'more' has kind 'texture3d'; did you mean 'texture2d'?",
+    'more = Output(Radiance, mips=-1, doc="D.")  # here': "port 'more' has mips=-1; it is a whole number from 0, or a function of node and facts",
+    'more = Output(Radiance, layers=1.5, doc="D.")  # here': "port 'more' has layers=1.5; it is a whole number from 0, or a function of node and facts",
+    'more = Output(Radiance, size=0, doc="D.")  # here': "port 'more' has size=0; a factor of the viewport is a number above 0",
+    'more = Output(Radiance, size=(64, 0.5), doc="D.")  # here': "port 'more' has size=(64, 0.5); width and height are whole numbers from 1",
     'more = Output(Radiance, size="color", doc="D.")  # here': "port 'more' has the size of 'color', which is no input",
     'more = Output(Radiance, size=("color", 0), doc="D.")  # here': (
         "port 'more' has the size of 'color', which is no input",
         "port 'more' has the size of 'color' times 0; a factor is a number above 0",
     ),
-    'more = Output(Radiance, clear="black", doc="D.")  # here':
-        "port 'more' has clear='black'; it is a number, up to four of them, or None",
-    'more = Output(Radiance, clear=(0, 0, 0, 0, 0), doc="D.")  # here':
-        "port 'more' has clear=(0, 0, 0, 0, 0); it is a number, up to four of them, or None",
-    'more = Output(Radiance, kind="buffer", doc="D.")  # here':
-        "port 'more' has bytes=0; it is a whole number from 1, or a function of node and facts",
-    'more = Output(Radiance, kind="buffer", bytes=8, clear=1.0, doc="D.")  # here':
-        "port 'more' is a buffer, which is cleared to 0 alone, not to 1.0",
-    'more = History(kind="buffer", bytes=8)  # here':
-        "'more' is a History of a buffer; only textures keep last frame's values",
+    'more = Output(Radiance, clear="black", doc="D.")  # here': "port 'more' has clear='black'; it is a number, up to four of them, or None",
+    'more = Output(Radiance, clear=(0, 0, 0, 0, 0), doc="D.")  # here': "port 'more' has clear=(0, 0, 0, 0, 0); it is a number, up to four of them, or None",
+    'more = Output(Radiance, kind="buffer", doc="D.")  # here': "port 'more' has bytes=0; it is a whole number from 1, or a function of node and facts",
+    'more = Output(Radiance, kind="buffer", bytes=8, clear=1.0, doc="D.")  # here': "port 'more' is a buffer, which is cleared to 0 alone, not to 1.0",
+    'more = History(kind="buffer", bytes=8)  # here': "'more' is a History of a buffer; only textures keep last frame's values",
     'more = History(Radiance, first="white")  # here': "port 'more' has first='white'; it is a number, for every channel",
-    'more = Views(count=-1, doc="D.")  # here':
-        "port 'more' has count=-1; it is a whole number from 0, or a function of node and facts",
+    'more = Views(count=-1, doc="D.")  # here': "port 'more' has count=-1; it is a whole number from 0, or a function of node and facts",
     'more = Views(lights=(0,), doc="D.")  # here': "port 'more' has lights=(0,); it is a function of node and facts",
-    'more = Function("shadow", "a.glsl", doc="D.")  # here':
-        "port 'more' has the signature 'shadow'; it is a Signature, such as ShadowLookup",
-    'more = Function(ShadowLookup, None, doc="D.")  # here':
-        "port 'more' has shader=None; it is the name of the file with its text",
+    'more = Function("shadow", "a.glsl", doc="D.")  # here': "port 'more' has the signature 'shadow'; it is a Signature, such as ShadowLookup",
+    'more = Function(ShadowLookup, None, doc="D.")  # here': "port 'more' has shader=None; it is the name of the file with its text",
     # rules that name ports
-    'more = Output(like="sauce", doc="D.")  # here\nsource = Input(Radiance, optional=True, doc="D.")':
-        "port 'more' is like 'sauce', which is no port; did you mean 'source'?",
+    'more = Output(like="sauce", doc="D.")  # here\nsource = Input(Radiance, optional=True, doc="D.")': "port 'more' is like 'sauce', which is no port; did you mean 'source'?",
     'more = Output(like="color", doc="D.")  # here': "port 'more' is like 'color', which is no input",
-    'more = Output(Radiance, view="color", doc="D.")  # here':
-        "port 'more' is view 'color', which is no input and no table of views",
+    'more = Output(Radiance, view="color", doc="D.")  # here': "port 'more' is view 'color', which is no input and no table of views",
     'more = Output(Radiance, lights="sun", doc="D.")  # here': "port 'more' is lights 'sun', which is no port",
     'more = Output(Radiance, needs=("depth",), doc="D.")  # here': "port 'more' needs 'depth', which is no port",
     'more = Output(Radiance, needs=("color",), doc="D.")  # here': "port 'more' needs 'color', which is no input",
     'more = Function(ShadowLookup, "a.glsl", reads=("map",), doc="D.")  # here': "port 'more' reads 'map', which is no port",
     # parameters
-    'gain: float = param(default="1.0", doc="D.")  # here':
-        "the default of 'gain', '1.0', is wrong: Input should be a valid number",
+    'gain: float = param(default="1.0", doc="D.")  # here': "the default of 'gain', '1.0', is wrong: Input should be a valid number",
     'gain: float = param(default=3.0, max=2, doc="D.")  # here': "the default of 'gain', 3.0, is wrong: must be at most 2",
-    'gain: int = param(default=1.5, doc="D.")  # here':
-        "the default of 'gain', 1.5, is wrong: Input should be a valid integer",
+    'gain: int = param(default=1.5, doc="D.")  # here': "the default of 'gain', 1.5, is wrong: Input should be a valid integer",
     'gain: float = param(default=float("nan"), doc="D.")  # here': "a default is not finite",
-    'gain: float = param(default={1}, doc="D.")  # here':
-        "a default is no value that a file can hold: Object of type set is not JSON serializable",
+    'gain: float = param(default={1}, doc="D.")  # here': "a default is no value that a file can hold: Object of type set is not JSON serializable",
     'gain: float = param(default=1.0, min=2, max=1, doc="D.")  # here': (
         "parameter 'gain' goes from 2 to 1, which is nothing",
         "the default of 'gain', 1.0, is wrong: must be at least 2",
     ),
     'gain: float = param(default=1.0, min="0", doc="D.")  # here': "parameter 'gain' has min='0', which is no number",
-    'gain: float = param(default=1.0, glsl="half", doc="D.")  # here':
-        "parameter 'gain' has glsl='half', which is no GLSL type",
-    'name: str = param(default="a", doc="D.")  # here':
-        "parameter 'name' is a param of text, which no uniform holds; make it a define with Literal[…]",
-    'mode: Literal["a", "b"] = param(default="a", doc="D.")  # here':
-        "parameter 'mode' is a param of text, which no uniform holds; make it a define with Literal[…]",
-    'gain: float | None = param(default=None, doc="D.")  # here':
-        "parameter 'gain' is a param that may be None; give it a default",
-    'gains: list[float] = param(default=[1.0], doc="D.")  # here':
-        "parameter 'gains' is a param of a list; a tuple says how many numbers there are",
-    'gains: dict[str, float] = param(default={}, doc="D.")  # here':
-        "parameter 'gains' is a param of dict; shaders take numbers and switches",
-    'name: str = define(default="a", doc="D.")  # here':
-        "parameter 'name' is a define of free text; list its choices as Literal[…]",
-    'taps: list[float] = define(default=[1.0], doc="D.")  # here':
-        "parameter 'taps' is a define of several numbers; macros hold one, make it a param",
-    'taps: tuple[float, float] = define(default=(1.0, 1.0), doc="D.")  # here':
-        "parameter 'taps' is a define of several numbers; macros hold one, make it a param",
-    'mode: Literal["four by four"] = define(default="four by four", doc="D.")  # here':
-        "parameter 'mode' is a define with the choice 'four by four', which cannot stand in a macro's name",
+    'gain: float = param(default=1.0, glsl="half", doc="D.")  # here': "parameter 'gain' has glsl='half', which is no GLSL type",
+    'name: str = param(default="a", doc="D.")  # here': "parameter 'name' is a param of text, which no uniform holds; make it a define with Literal[…]",
+    'mode: Literal["a", "b"] = param(default="a", doc="D.")  # here': "parameter 'mode' is a param of text, which no uniform holds; make it a define with Literal[…]",
+    'gain: float | None = param(default=None, doc="D.")  # here': "parameter 'gain' is a param that may be None; give it a default",
+    'gains: list[float] = param(default=[1.0], doc="D.")  # here': "parameter 'gains' is a param of a list; a tuple says how many numbers there are",
+    'gains: dict[str, float] = param(default={}, doc="D.")  # here': "parameter 'gains' is a param of dict; shaders take numbers and switches",
+    'name: str = define(default="a", doc="D.")  # here': "parameter 'name' is a define of free text; list its choices as Literal[…]",
+    'taps: list[float] = define(default=[1.0], doc="D.")  # here': "parameter 'taps' is a define of several numbers; macros hold one, make it a param",
+    'taps: tuple[float, float] = define(default=(1.0, 1.0), doc="D.")  # here': "parameter 'taps' is a define of several numbers; macros hold one, make it a param",
+    'mode: Literal["four by four"] = define(default="four by four", doc="D.")  # here': "parameter 'mode' is a define with the choice 'four by four', which cannot stand in a macro's name",
     # the class
     'shader = "wrong.vert"  # here': "`shader` is 'wrong.vert'; it is a file that ends in .frag or .comp",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("body", DECLARATIONS)
@@ -151,7 +111,7 @@ CLASSES = {
     "import nonsense_module  # here": "RG491 node type 'wrong' cannot be imported: ModuleNotFoundError",
     "raise SystemExit  # here": "RG491 node type 'wrong' cannot be imported: SystemExit",
     'state = State(cull="both")  # here': "RG491 node type 'wrong' cannot be imported: Misuse: State: cull is 'both'; there is",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("body", CLASSES)

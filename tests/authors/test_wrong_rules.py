@@ -15,53 +15,33 @@ COLOR = 'color = Output(Radiance, doc="Colour.")\n'
 
 RULES = {
     # what fails, by the rule's name
-    'more = Output(Radiance, size=lambda node, facts: node.side(), doc="D.")  # here':
-        "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: AttributeError: 'Wrong' object has no attribute "
-        "'side'; there is color, more",
-    'more = Output(Radiance, size=lambda node, facts: "large", doc="D.")':
-        "'a.more' (wrong): the rule for its size gives 'large', not width and height",
-    'more = Output(Radiance, size=lambda node, facts: 64, doc="D.")':
-        "'a.more' (wrong): the rule for its size gives 64, not width and height",
-    'more = Output(Radiance, format=lambda node, facts: facts.input("nothing").desc.format, doc="D.")  # here':
-        "'a.more' (wrong): the rule for its format fails: wrong.py:{line}: KeyError: 'nothing'",
-    'more = Output(Radiance, format=lambda node, facts: ["rgba16f"], doc="D.")':
-        "RG211 'a.more' (wrong): there is no format '['rgba16f']'",
-    'more = Output(Radiance, kind="texture2d_array", layers=lambda node, facts: 1 / 0, doc="D.")  # here':
-        "'a.more' (wrong): the rule for its layers fails: wrong.py:{line}: ZeroDivisionError: division by zero",
-    'more = Output(Radiance, mips=lambda node, facts: "all", doc="D.")':
-        "RG208 'a.more' (wrong): a texture of 16×8 has 1 to 5 mips, not all",
-    'more = Output(Radiance, samples=lambda node, facts: [4], doc="D.")':
-        "RG208 'a.more' (wrong): a texture cannot have [4] samples a texel",
-    'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 2.5, doc="D.")':
-        "RG208 'a.more' (wrong): a buffer has at least 1 byte, not 2.5",
-    'color = Output(Radiance, clear=lambda node: node.dark, doc="D.")  # here':
-        "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
-        "attribute 'dark'; there is color",
-    'color = Output(Radiance, clear=lambda node: "black", doc="D.")':
-        "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four, or None",
-    'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")':
-        "'a.more' (wrong): the rule for its lights gives 3, not the indices of lights",
-    'more = Views(count=lambda node, facts: None, doc="D.")':
-        "'a.more' (wrong): the rule for its count gives None, not a whole number from 0",
-    'more = Views(count=lambda node, facts: facts.lamps, doc="D.")  # here':
-        "'a.more' (wrong): the rule for its count fails: wrong.py:{line}: AttributeError: 'Facts' object has no "
-        "attribute 'lamps'",
-    'more = Views(lights=lambda node, facts: facts.lights[9], doc="D.")  # here':
-        "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",
-    'last = Input(AnyTexel, filter=lambda node: node.smooth, optional=True, doc="D.")  # here':
-        "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
-        "attribute 'smooth'; there is color, last",
-    'last = Input(AnyTexel, filter=lambda node: "bicubic", optional=True, doc="D.")':
-        "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
-    'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here':
-        "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: ValueError: invalid literal for int() with base "
-        "10: 'x'",
+    'more = Output(Radiance, size=lambda node, facts: node.side(), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: AttributeError: 'Wrong' object has no attribute "
+    "'side'; there is color, more",
+    'more = Output(Radiance, size=lambda node, facts: "large", doc="D.")': "'a.more' (wrong): the rule for its size gives 'large', not width and height",
+    'more = Output(Radiance, size=lambda node, facts: 64, doc="D.")': "'a.more' (wrong): the rule for its size gives 64, not width and height",
+    'more = Output(Radiance, format=lambda node, facts: facts.input("nothing").desc.format, doc="D.")  # here': "'a.more' (wrong): the rule for its format fails: wrong.py:{line}: KeyError: 'nothing'",
+    'more = Output(Radiance, format=lambda node, facts: ["rgba16f"], doc="D.")': "RG211 'a.more' (wrong): there is no format '['rgba16f']'",
+    'more = Output(Radiance, kind="texture2d_array", layers=lambda node, facts: 1 / 0, doc="D.")  # here': "'a.more' (wrong): the rule for its layers fails: wrong.py:{line}: ZeroDivisionError: division by zero",
+    'more = Output(Radiance, mips=lambda node, facts: "all", doc="D.")': "RG208 'a.more' (wrong): a texture of 16×8 has 1 to 5 mips, not all",
+    'more = Output(Radiance, samples=lambda node, facts: [4], doc="D.")': "RG208 'a.more' (wrong): a texture cannot have [4] samples a texel",
+    'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 2.5, doc="D.")': "RG208 'a.more' (wrong): a buffer has at least 1 byte, not 2.5",
+    'color = Output(Radiance, clear=lambda node: node.dark, doc="D.")  # here': "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
+    "attribute 'dark'; there is color",
+    'color = Output(Radiance, clear=lambda node: "black", doc="D.")': "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four, or None",
+    'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")': "'a.more' (wrong): the rule for its lights gives 3, not the indices of lights",
+    'more = Views(count=lambda node, facts: None, doc="D.")': "'a.more' (wrong): the rule for its count gives None, not a whole number from 0",
+    'more = Views(count=lambda node, facts: facts.lamps, doc="D.")  # here': "'a.more' (wrong): the rule for its count fails: wrong.py:{line}: AttributeError: 'Facts' object has no "
+    "attribute 'lamps'",
+    'more = Views(lights=lambda node, facts: facts.lights[9], doc="D.")  # here': "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",
+    'last = Input(AnyTexel, filter=lambda node: node.smooth, optional=True, doc="D.")  # here': "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
+    "attribute 'smooth'; there is color, last",
+    'last = Input(AnyTexel, filter=lambda node: "bicubic", optional=True, doc="D.")': "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
+    'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: ValueError: invalid literal for int() with base "
+    "10: 'x'",
     'more = Output(Radiance, size=lambda node, facts: node.refuse(), doc="D.")\n'
-    'def refuse(self):\n    raise ValueError("it takes two lights")':
-        "node 'a' (wrong): it takes two lights",
-    'more = Output(Radiance, size=lambda node, facts: exit(), doc="D.")  # here':
-        "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: SystemExit: None",
-}  # fmt: skip
+    'def refuse(self):\n    raise ValueError("it takes two lights")': "node 'a' (wrong): it takes two lights",
+    'more = Output(Radiance, size=lambda node, facts: exit(), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: SystemExit: None",
+}
 
 
 @pytest.mark.parametrize("body", RULES)
@@ -77,9 +57,8 @@ def test_a_rule_that_fails(author: Any, body: str) -> None:
 
 VALIDATORS = {
     "raise KeyError(value)  # here": "RG490 node type 'wrong': it",
-    "return value if value == 1.0 else 1 / 0  # here":
-        "RG209 node 'a' (wrong): its own checks fail: wrong.py:{line}: ZeroDivisionError: division by zero",
-}  # fmt: skip
+    "return value if value == 1.0 else 1 / 0  # here": "RG209 node 'a' (wrong): its own checks fail: wrong.py:{line}: ZeroDivisionError: division by zero",
+}
 
 
 @pytest.mark.parametrize("body", VALIDATORS)
@@ -112,10 +91,12 @@ def test_a_helper_beside_the_node_is_the_authors_own(author: Any) -> None:
 
 @pytest.mark.parametrize(
     ("helper", "said_of"),
-    [("import math\nSIZE = 1 / 0\n", "_shade.py:2:1: RG491 node type 'wrong' cannot be imported: ZeroDivisionError"),
-     ("import math\n\ndef shade(:\n", "_shade.py:3:1: RG491 node type 'wrong' cannot be imported: SyntaxError"),
-     ("SIZE = 1\n", "wrong.py:13:1: RG491 node type 'wrong' cannot be imported: ImportError")],
-)  # fmt: skip
+    [
+        ("import math\nSIZE = 1 / 0\n", "_shade.py:2:1: RG491 node type 'wrong' cannot be imported: ZeroDivisionError"),
+        ("import math\n\ndef shade(:\n", "_shade.py:3:1: RG491 node type 'wrong' cannot be imported: SyntaxError"),
+        ("SIZE = 1\n", "wrong.py:13:1: RG491 node type 'wrong' cannot be imported: ImportError"),
+    ],
+)
 def test_a_helper_that_cannot_be_imported(author: Any, helper: str, said_of: str) -> None:
     author.write(_shade__py=helper)
     author.node(COLOR, before="from ._shade import shade\n\n\n")
@@ -131,10 +112,12 @@ def test_what_numpy_raises_is_at_the_authors_line(author: Any) -> None:
 
 @pytest.mark.parametrize(
     ("head", "body", "kind"),
-    [("def", "yield steps.fullscreen('wrong.frag')", "generator"),
-     ("async def", "steps.fullscreen('wrong.frag')", "coroutine"),
-     ("def", "return steps", "Steps")],
-)  # fmt: skip
+    [
+        ("def", "yield steps.fullscreen('wrong.frag')", "generator"),
+        ("async def", "steps.fullscreen('wrong.frag')", "coroutine"),
+        ("def", "return steps", "Steps"),
+    ],
+)
 def test_a_record_that_gives_something_back(author: Any, head: str, body: str, kind: str) -> None:
     author.node(f"{COLOR}{head} record(self, steps):\n    {body}")
     (said,) = author.said(author.pipeline().check)
@@ -246,8 +229,10 @@ def test_a_maker_that_has_nothing_to_read_is_said_to(author: Any) -> None:
 
 def test_a_node_that_nobody_wants_remembers_nothing(author: Any) -> None:
     """Whoever is not wanted does not keep alive what it would read of last frame."""
-    author.node(f'{COLOR}spare = Output(Radiance, doc="Spare.")\n\ndef record(self, steps):\n'
-                '    assert not steps.used(self.spare)\n    steps.fullscreen("wrong.frag", out=self.color)')  # fmt: skip
+    author.node(
+        f'{COLOR}spare = Output(Radiance, doc="Spare.")\n\ndef record(self, steps):\n'
+        '    assert not steps.used(self.spare)\n    steps.fullscreen("wrong.frag", out=self.color)'
+    )
     author.node(READER, "reader")
     text = (
         "nodes:\n  a: {type: wrong}\n  b: {type: reader, inputs: {source: a.spare@previous}}\n"

@@ -24,172 +24,115 @@ def record(self, steps):
 
 CALLS = {
     # ports and parts of ports
-    'steps.fullscreen("wrong.frag", source="source")':
-        "RG423 source='source': a step takes ports, numbers and lists of numbers; give the port itself",
+    'steps.fullscreen("wrong.frag", source="source")': "RG423 source='source': a step takes ports, numbers and lists of numbers; give the port itself",
     'steps.fullscreen("wrong.frag", source=None)': "RG423 source=None: a step takes ports, numbers and lists of numbers",
-    'steps.fullscreen("wrong.frag", source=self.views)':
-        "RG423 source is the view table 'views'; give it as `view=` to a step that draws",
-    'steps.fullscreen("wrong.frag", source=Internal(Radiance))':
-        "RG424 source is an Internal made in place; declare it as an attribute of the class",
+    'steps.fullscreen("wrong.frag", source=self.views)': "RG423 source is the view table 'views'; give it as `view=` to a step that draws",
+    'steps.fullscreen("wrong.frag", source=Internal(Radiance))': "RG424 source is an Internal made in place; declare it as an attribute of the class",
     'steps.fullscreen("wrong.frag", out="color")': "RG423 out is the text 'color'; give the port itself, self.color",
-    'steps.fullscreen("wrong.frag", out="colour")':
-        "RG423 out is the text 'colour'; give the port itself; did you mean 'color'?",
+    'steps.fullscreen("wrong.frag", out="colour")': "RG423 out is the text 'colour'; give the port itself; did you mean 'color'?",
     'steps.fullscreen("wrong.frag", out=7)': "RG423 out is 7, not a port",
     'steps.fullscreen("wrong.frag", out=[self.color])': "RG423 out is [Output(name='color', semantic=Semantic(name='radiance', ..., not a port",
-    'steps.fullscreen("wrong.frag", out={})':
-        "RG423 out is empty; name what the step writes, or leave it out for every output that is used",
+    'steps.fullscreen("wrong.frag", out={})': "RG423 out is empty; name what the step writes, or leave it out for every output that is used",
     'steps.fullscreen("wrong.frag", out={1: self.color})': "RG423 out has the key 1; the keys are the shader's names",
-    'steps.fullscreen("wrong.frag", out={"color": "color"})':
-        "RG423 out['color'] is the text 'color'; give the port itself, self.color",
-    'steps.fullscreen("wrong.frag", out={"a": self.color, "b": self.color})':
-        "RG423 out writes 'color' twice, as 'a' and as 'b'",
-    'steps.fullscreen("wrong.frag", out=self.source)':
-        "RG421 it writes its input 'source'; only outputs, internals and history can be written",
-    'steps.fullscreen("wrong.frag", out=self.views)':
-        "RG421 it writes its views 'views'; only outputs, internals and history can be written",
-    'steps.fullscreen("wrong.frag", out=self.chain.mip(-1))':
-        "RG423 out is mip -1 of 'chain'; they are counted from 0",
+    'steps.fullscreen("wrong.frag", out={"color": "color"})': "RG423 out['color'] is the text 'color'; give the port itself, self.color",
+    'steps.fullscreen("wrong.frag", out={"a": self.color, "b": self.color})': "RG423 out writes 'color' twice, as 'a' and as 'b'",
+    'steps.fullscreen("wrong.frag", out=self.source)': "RG421 it writes its input 'source'; only outputs, internals and history can be written",
+    'steps.fullscreen("wrong.frag", out=self.views)': "RG421 it writes its views 'views'; only outputs, internals and history can be written",
+    'steps.fullscreen("wrong.frag", out=self.chain.mip(-1))': "RG423 out is mip -1 of 'chain'; they are counted from 0",
     'steps.fullscreen("wrong.frag", out=self.chain.mip(5))': "RG423 'chain' has no mip 5; it has 0 to 4",
     'steps.fullscreen("wrong.frag", out=self.color.layer(1))': "RG423 'color' has no layer 1; it has only 0",
-    'steps.fullscreen("wrong.frag", out=self.chain.mip(1.0))':
-        "RG423 out is mip 1.0 of 'chain'; they are counted from 0",
-    'steps.fullscreen("wrong.frag", source=self.chain.mip(9), out=self.color)':
-        "RG423 'chain' has no mip 9; it has 0 to 4",
-    'steps.fullscreen("wrong.frag", out=self.numbers.mip(0))':
-        "RG423 'numbers' is a buffer, which has no mips and no layers",
+    'steps.fullscreen("wrong.frag", out=self.chain.mip(1.0))': "RG423 out is mip 1.0 of 'chain'; they are counted from 0",
+    'steps.fullscreen("wrong.frag", source=self.chain.mip(9), out=self.color)': "RG423 'chain' has no mip 9; it has 0 to 4",
+    'steps.fullscreen("wrong.frag", out=self.numbers.mip(0))': "RG423 'numbers' is a buffer, which has no mips and no layers",
     # numbers
     'steps.fullscreen("wrong.frag", axis=[])': "RG423 axis=[]: a step takes ports, numbers and lists of numbers",
-    'steps.fullscreen("wrong.frag", axis=(1, "0"))':
-        "RG423 axis=(1, '0'): a step takes ports, numbers and lists of numbers",
-    'steps.fullscreen("wrong.frag", axis=object)':
-        "RG423 axis=<class 'object'>: a step takes ports, numbers and lists of numbers",
-    'steps.fullscreen("wrong.frag", defines=["TAPS"])':
-        "RG423 defines is ['TAPS'], not a mapping from macros to values",
-    'steps.fullscreen("wrong.frag", defines={"TAPS": [1, 2]})':
-        "RG423 defines gives TAPS the value [1, 2]; a macro is a number, True, False or text",
+    'steps.fullscreen("wrong.frag", axis=(1, "0"))': "RG423 axis=(1, '0'): a step takes ports, numbers and lists of numbers",
+    'steps.fullscreen("wrong.frag", axis=object)': "RG423 axis=<class 'object'>: a step takes ports, numbers and lists of numbers",
+    'steps.fullscreen("wrong.frag", defines=["TAPS"])': "RG423 defines is ['TAPS'], not a mapping from macros to values",
+    'steps.fullscreen("wrong.frag", defines={"TAPS": [1, 2]})': "RG423 defines gives TAPS the value [1, 2]; a macro is a number, True, False or text",
     'steps.fullscreen("wrong.frag", defines={"2X": 1})': "RG423 defines has the name '2X', which cannot be a macro's",
-    'steps.fullscreen("wrong.frag", defines={"FAR": float("inf")})':
-        "RG423 defines gives FAR the value inf, which GLSL cannot write",
+    'steps.fullscreen("wrong.frag", defines={"FAR": float("inf")})': "RG423 defines gives FAR the value inf, which GLSL cannot write",
     # shaders and state
-    'steps.fullscreen(self.color)': "RG423 the fragment shader is the Output 'color', not the name of a file",
+    "steps.fullscreen(self.color)": "RG423 the fragment shader is the Output 'color', not the name of a file",
     'steps.fullscreen("")': "RG423 the fragment shader is '', not the name of a file",
     'steps.geometry("wrong.frag", vertex=b"a.vert")': "RG423 the vertex shader is b'a.vert', not the name of a file",
     'steps.fullscreen("wrong.frag", state="additive")': "RG423 state is 'additive', not a State(…)",
-    'steps.fullscreen("wrong.frag", state=ADD)':
-        "RG423 state is Blend(src='one', dst='one', src_alpha=None, dst_alpha=Non..., not a State(…)",
-    'steps.fullscreen("wrong.frag", state=State(depth_func="less_equal"))':
-        "RG423 State: depth_func is 'less_equal'; did you mean 'lequal'?",
-    'steps.fullscreen("wrong.frag", state=State(blend="add"))':
-        "RG423 State: blend is 'add', not a Blend, a tuple of them, or None",
-    'steps.fullscreen("wrong.frag", state=State(color_mask=(True, True, True)))':
-        "RG423 State: color_mask is (True, True, True), not four of True and False",
-    'steps.fullscreen("wrong.frag", state=State(scissor=(0, 0, 0.5, 1)))':
-        "RG423 State: scissor is (0, 0, 0.5, 1), not x, y, width and height in texels",
-    'steps.fullscreen("wrong.frag", state=State(stencil=Stencil(StencilFace(func="equals"))))':
-        "RG423 StencilFace: func is 'equals'; did you mean 'equal'?",
-    'steps.fullscreen("wrong.frag", state=State(blend=Blend("source_alpha")))':
-        "RG423 Blend: src is 'source_alpha'; did you mean 'src_alpha'?",
-    'steps.fullscreen("wrong.frag", state=State(culling="none"))':
-        "RG420 TypeError: State.__init__() got an unexpected keyword argument 'culling'",
+    'steps.fullscreen("wrong.frag", state=ADD)': "RG423 state is Blend(src='one', dst='one', src_alpha=None, dst_alpha=Non..., not a State(…)",
+    'steps.fullscreen("wrong.frag", state=State(depth_func="less_equal"))': "RG423 State: depth_func is 'less_equal'; did you mean 'lequal'?",
+    'steps.fullscreen("wrong.frag", state=State(blend="add"))': "RG423 State: blend is 'add', not a Blend, a tuple of them, or None",
+    'steps.fullscreen("wrong.frag", state=State(color_mask=(True, True, True)))': "RG423 State: color_mask is (True, True, True), not four of True and False",
+    'steps.fullscreen("wrong.frag", state=State(scissor=(0, 0, 0.5, 1)))': "RG423 State: scissor is (0, 0, 0.5, 1), not x, y, width and height in texels",
+    'steps.fullscreen("wrong.frag", state=State(stencil=Stencil(StencilFace(func="equals"))))': "RG423 StencilFace: func is 'equals'; did you mean 'equal'?",
+    'steps.fullscreen("wrong.frag", state=State(blend=Blend("source_alpha")))': "RG423 Blend: src is 'source_alpha'; did you mean 'src_alpha'?",
+    'steps.fullscreen("wrong.frag", state=State(culling="none"))': "RG420 TypeError: State.__init__() got an unexpected keyword argument 'culling'",
     # geometry
-    'steps.geometry("wrong.frag", objects="transparnt")':
-        "RG423 objects is 'transparnt'; did you mean 'transparent'? An object of this name is ['transparnt']",
-    'steps.geometry("wrong.frag", objects=3)':
-        "RG423 objects is 3; it is all, opaque, transparent, casters or a list of objects' names",
+    'steps.geometry("wrong.frag", objects="transparnt")': "RG423 objects is 'transparnt'; did you mean 'transparent'? An object of this name is ['transparnt']",
+    'steps.geometry("wrong.frag", objects=3)': "RG423 objects is 3; it is all, opaque, transparent, casters or a list of objects' names",
     'steps.geometry("wrong.frag", materials="all")': "RG423 materials is 'all'; there is alpha, full, none",
-    'steps.geometry("wrong.frag", order="back to front")':
-        "RG423 order is 'back to front'; did you mean 'back_to_front'?",
+    'steps.geometry("wrong.frag", order="back to front")': "RG423 order is 'back to front'; did you mean 'back_to_front'?",
     'steps.geometry("wrong.frag", per_light=-1)': "RG423 per_light is -1, not a whole number from 0",
     'steps.geometry("wrong.frag", view="camera")': "RG423 view is the text 'camera'; give the port itself; there is chain, color, given, nearest, numbers, small, source, views",
-    'steps.geometry("wrong.frag", view=self.color)':
-        "RG423 view is the Output 'color'; it is a Views port or an input that carries views",
-    'steps.geometry("wrong.frag", view=self.views, view_index=2)':
-        "RG423 view_index is 2, but 'views' has 2 views, counted from 0",
+    'steps.geometry("wrong.frag", view=self.color)': "RG423 view is the Output 'color'; it is a Views port or an input that carries views",
+    'steps.geometry("wrong.frag", view=self.views, view_index=2)': "RG423 view_index is 2, but 'views' has 2 views, counted from 0",
     'steps.geometry("wrong.frag", view_index="0")': "RG423 view_index is '0', not a whole number from 0",
     'steps.geometry("wrong.frag", per_light=7)': "RG423 per_light is 7, but the scene has 1 lights, counted from 0",
-    'steps.fullscreen("wrong.frag", source=self.source.sampled("bilinear"))':
-        "RG423 sampled has the filter 'bilinear'; did you mean 'linear'?",
-    'steps.fullscreen("wrong.frag", source=self.source.sampled(wrap="edge"))':
-        "RG423 sampled has the wrap 'edge'; there is border, clamp, mirror, repeat",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.given)':
-        "RG423 input 'given' is not connected; ask `steps.connected` first",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_p": self.given})':
-        "RG423 input 'given' is not connected; ask `steps.connected` first",
+    'steps.fullscreen("wrong.frag", source=self.source.sampled("bilinear"))': "RG423 sampled has the filter 'bilinear'; did you mean 'linear'?",
+    'steps.fullscreen("wrong.frag", source=self.source.sampled(wrap="edge"))': "RG423 sampled has the wrap 'edge'; there is border, clamp, mirror, repeat",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.given)': "RG423 input 'given' is not connected; ask `steps.connected` first",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_p": self.given})': "RG423 input 'given' is not connected; ask `steps.connected` first",
     # draws
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, topology="triangle")':
-        "RG423 topology is 'triangle'; did you mean 'triangles'?",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, topology="triangle")': "RG423 topology is 'triangle'; did you mean 'triangles'?",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=-3)': "RG423 vertices is -3, not a whole number from 0",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=12 / 3)':
-        "RG423 vertices is 4.0, not a whole number from 0; divide with //",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.small)':
-        "RG423 vertices is the Internal 'small', which is no buffer",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, instances=True)':
-        "RG423 instances is True, not a whole number from 0",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"in_position": self.numbers})':
-        "RG423 attributes has the layout 'in_position'; it reads like '3f 2f in_position in_uv'",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f 2f in_position": self.numbers})':
-        "RG423 attributes has the layout '3f 2f in_position': 2 formats, 1 names; it reads like "
-        "'3f 2f in_position in_uv'",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"vec3 in_position": self.numbers})':
-        "RG423 attributes has the layout 'vec3 in_position'; it reads like '3f 2f in_position in_uv'",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_position": self.small})':
-        "RG423 attributes['3f in_position'] is the Internal 'small', which is no buffer",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])':
-        "RG423 attributes is [Internal(name='numbers', semantic=None, like=None, kind=..., not a mapping from "
-        "layouts to buffers",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=12 / 3)': "RG423 vertices is 4.0, not a whole number from 0; divide with //",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.small)': "RG423 vertices is the Internal 'small', which is no buffer",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, instances=True)': "RG423 instances is True, not a whole number from 0",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"in_position": self.numbers})': "RG423 attributes has the layout 'in_position'; it reads like '3f 2f in_position in_uv'",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f 2f in_position": self.numbers})': "RG423 attributes has the layout '3f 2f in_position': 2 formats, 1 names; it reads like "
+    "'3f 2f in_position in_uv'",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"vec3 in_position": self.numbers})': "RG423 attributes has the layout 'vec3 in_position'; it reads like '3f 2f in_position in_uv'",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_position": self.small})': "RG423 attributes['3f in_position'] is the Internal 'small', which is no buffer",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])': "RG423 attributes is [Internal(name='numbers', semantic=None, like=None, kind=..., not a mapping from "
+    "layouts to buffers",
     # compute
-    'steps.compute("a.comp", groups=(1, 0, 1), out=self.small)':
-        "RG423 groups is (1, 0, 1); each is a whole number from 1",
-    'steps.compute("a.comp", groups=(16 / 8, 1, 1), out=self.small)':
-        "RG423 groups is (2.0, 1, 1); each is a whole number from 1; divide with //",
-    'steps.compute("a.comp", groups=(1, 1, 1, 1), out=self.small)':
-        "RG423 groups is (1, 1, 1, 1), not one to three whole numbers",
+    'steps.compute("a.comp", groups=(1, 0, 1), out=self.small)': "RG423 groups is (1, 0, 1); each is a whole number from 1",
+    'steps.compute("a.comp", groups=(16 / 8, 1, 1), out=self.small)': "RG423 groups is (2.0, 1, 1); each is a whole number from 1; divide with //",
+    'steps.compute("a.comp", groups=(1, 1, 1, 1), out=self.small)': "RG423 groups is (1, 1, 1, 1), not one to three whole numbers",
     'steps.compute("a.comp", groups="8", out=self.small)': "RG423 groups is '8'; each is a whole number from 1",
-    'steps.compute("a.comp", groups=(1, 1, 1), over=self.small, out=self.small)':
-        "RG423 both over and groups are given; over finds the number of groups itself",
+    'steps.compute("a.comp", groups=(1, 1, 1), over=self.small, out=self.small)': "RG423 both over and groups are given; over finds the number of groups itself",
     'steps.compute("a.comp", over="small", out=self.small)': "RG423 over is the text 'small'; give the port itself, self.small",
-    'steps.compute("a.comp", over=self.numbers, out=self.numbers)':
-        "RG423 over is the buffer 'numbers'; say how many invocations, as in over=256",
-    'steps.compute("a.comp", over=self.source, out=self.numbers)':
-        "RG423 over is input 'source', which is not connected; ask `steps.connected` first",
+    'steps.compute("a.comp", over=self.numbers, out=self.numbers)': "RG423 over is the buffer 'numbers'; say how many invocations, as in over=256",
+    'steps.compute("a.comp", over=self.source, out=self.numbers)': "RG423 over is input 'source', which is not connected; ask `steps.connected` first",
     'steps.compute("a.comp", over=-5, out=self.numbers)': "RG423 over is -5; each is a whole number from 1",
-    'steps.compute("a.comp", out=self.numbers)':
-        "RG423 it writes and reads no texture that says how many work groups there are; give over or groups",
+    'steps.compute("a.comp", out=self.numbers)': "RG423 it writes and reads no texture that says how many work groups there are; give over or groups",
     # clears and mips
-    'steps.clear(self.color, "black")':
-        "RG423 value='black': a step takes ports, numbers and lists of numbers; give the port itself",
-    'steps.clear(self.color, (0, 0, 0, 0, 0))': "RG423 value has 5 numbers; a texel has up to 4 channels",
-    'steps.clear(self.numbers, 1.0)': "RG423 'numbers' is a buffer, which is cleared to 0 alone",
+    'steps.clear(self.color, "black")': "RG423 value='black': a step takes ports, numbers and lists of numbers; give the port itself",
+    "steps.clear(self.color, (0, 0, 0, 0, 0))": "RG423 value has 5 numbers; a texel has up to 4 channels",
+    "steps.clear(self.numbers, 1.0)": "RG423 'numbers' is a buffer, which is cleared to 0 alone",
     'steps.clear("color")': "RG423 out is the text 'color'; give the port itself, self.color",
-    'steps.mipmaps(self.color)': "RG423 'color' has no mips to make; declare it with mips=0 for the whole chain",
-    'steps.mipmaps(self.chain.mip(0))': "RG423 out is a part of 'chain'; mips are made of a whole texture",
+    "steps.mipmaps(self.color)": "RG423 'color' has no mips to make; declare it with mips=0 for the whole chain",
+    "steps.mipmaps(self.chain.mip(0))": "RG423 out is a part of 'chain'; mips are made of a whole texture",
     # questions
-    'steps.desc(self.source)': "RG423 input 'source' is not connected; ask `steps.connected` first",
-    'steps.desc(self.numbers)': "RG423 'numbers' holds no texture; its description has no size or format",
+    "steps.desc(self.source)": "RG423 input 'source' is not connected; ask `steps.connected` first",
+    "steps.desc(self.numbers)": "RG423 'numbers' holds no texture; its description has no size or format",
     'steps.desc("color")': "RG423 desc's argument is the text 'color'; give the port itself, self.color",
     'steps.connected("source")': "RG423 connected's argument is the text 'source'; give the port itself, self.source",
     'steps.used("color")': "RG423 used's argument is the text 'color'; give the port itself, self.color",
     # what no driver draws
-    'steps.fullscreen("wrong.frag", out={"color": self.color, "small": self.small})':
-        "RG425 'a.color' is 16×8, but 'a.small' is 8×4; the targets of one step are alike in size, samples and layers",
-    'steps.fullscreen("wrong.frag", source=self.color, out=self.color)':
-        "RG422 it samples 'a.color' in the step that writes it; blend, sample another mip or layer, or go through an "
-        "`Internal`",
-    'steps.fullscreen("wrong.frag", out=self.color, state=State(blend=(Blend("dst_color", "zero"),)))':
-        "RG429 it blends onto 'a.color', which holds nothing yet; declare it with `clear=`",
-    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))':
-        "RG429 it tests depth against 'a.nearest', which holds nothing yet; declare it with `clear=1.0`",
+    'steps.fullscreen("wrong.frag", out={"color": self.color, "small": self.small})': "RG425 'a.color' is 16×8, but 'a.small' is 8×4; the targets of one step are alike in size, samples and layers",
+    'steps.fullscreen("wrong.frag", source=self.color, out=self.color)': "RG422 it samples 'a.color' in the step that writes it; blend, sample another mip or layer, or go through an "
+    "`Internal`",
+    'steps.fullscreen("wrong.frag", out=self.color, state=State(blend=(Blend("dst_color", "zero"),)))': "RG429 it blends onto 'a.color', which holds nothing yet; declare it with `clear=`",
+    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))': "RG429 it tests depth against 'a.nearest', which holds nothing yet; declare it with `clear=1.0`",
     # Python's own
     'steps.fulscreen("wrong.frag")': "RG420 AttributeError: 'Steps' object has no attribute 'fulscreen'; did "
-        "you mean 'fullscreen'?",
-    'steps.fullscreen("wrong.frag", source=self.sorce)':
-        "RG420 AttributeError: 'Wrong' object has no attribute 'sorce'; did you mean 'source'?",
-    'steps.fullscreen()': "RG420 TypeError: Steps.fullscreen() missing 1 required positional argument: 'shader'",
-    '1 / 0': "RG420 ZeroDivisionError: division by zero",
-    'exit(7)': "RG420 SystemExit: 7",
-    'raise Exception': "RG420 Exception: ",
-    'self.gain = 2.0': "RG420 ValidationError: 1 validation error for Wrong",
-}  # fmt: skip
+    "you mean 'fullscreen'?",
+    'steps.fullscreen("wrong.frag", source=self.sorce)': "RG420 AttributeError: 'Wrong' object has no attribute 'sorce'; did you mean 'source'?",
+    "steps.fullscreen()": "RG420 TypeError: Steps.fullscreen() missing 1 required positional argument: 'shader'",
+    "1 / 0": "RG420 ZeroDivisionError: division by zero",
+    "exit(7)": "RG420 SystemExit: 7",
+    "raise Exception": "RG420 Exception: ",
+    "self.gain = 2.0": "RG420 ValidationError: 1 validation error for Wrong",
+}
 
 
 @pytest.mark.parametrize("call", CALLS)

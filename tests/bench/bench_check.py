@@ -71,13 +71,17 @@ class Join(Node):
 def text() -> str:
     """A file of 40 nodes in the shape of a real one: a G-buffer, occlusion, light, two pyramids of blurs, a grade."""
     lines = [
-        "# Forty nodes.", "rendergraph: 1", "description: Generated", "size: [1920, 1080]", "nodes:",
+        "# Forty nodes.",
+        "rendergraph: 1",
+        "description: Generated",
+        "size: [1920, 1080]",
+        "nodes:",
         "  surfaces: {type: surfaces}",
         "  ao: {type: occlude, inputs: {depth: surfaces.depth, normal: surfaces.normal}, params: {radius: 0.8}}",
         "  ao_wide: {type: occlude, inputs: {depth: surfaces.depth, normal: surfaces.normal}, params: {samples: 8}}",
         "  occlusion: {type: join, inputs: {first: ao.occlusion, second: ao_wide.occlusion}}",
         "  light: {type: join, inputs: {first: surfaces.albedo, second: occlusion.joined}, params: {weight: 0.25}}",
-    ]  # fmt: skip
+    ]
     count, last = 5, "light.joined"
     for pyramid in ("bloom", "flare"):
         levels: list[str] = []
@@ -189,8 +193,10 @@ def main() -> None:
         print(json.dumps(result, indent=1))
         return
     low, high = result["cold_range_ms"]
-    print(f"new process: {result['cold_ms']:.1f} ms ({low:.1f} to {high:.1f}), goal <= {GOAL_MS:.0f} ms; "
-          f"again: {result['again_ms']:.1f} ms; proven: {result['proven']}")  # fmt: skip
+    print(
+        f"new process: {result['cold_ms']:.1f} ms ({low:.1f} to {high:.1f}), goal <= {GOAL_MS:.0f} ms; "
+        f"again: {result['again_ms']:.1f} ms; proven: {result['proven']}"
+    )
     for name in result["cold_stages_ms"]:
         print(f"  {name:10} {result['cold_stages_ms'][name]:6.2f} ms   {result['again_stages_ms'][name]:6.2f} ms")
 

@@ -48,9 +48,18 @@ def by_hand(output: str) -> None:
     eye, to_light = (0.0, 1.0, 3.0), np.array([1.0, 2.0, 1.0]) / 6**0.5
     camera = perspective(np.radians(45), SIZE[0] / SIZE[1], 0.1, 10.0) @ look_at(eye, (0, 0, 0))
     program = Forward(
-        SIZE, sphere(64, 32), np.eye(4)[None], np.array([[0.8, 0.3, 0.2]]), np.array([[0.0, 0.5]]), camera, eye,
-        to_light, 3.0, 2048, ((0, 0, 0), 1.1),
-    )  # fmt: skip
+        SIZE,
+        sphere(64, 32),
+        np.eye(4)[None],
+        np.array([[0.8, 0.3, 0.2]]),
+        np.array([[0.0, 0.5]]),
+        camera,
+        eye,
+        to_light,
+        3.0,
+        2048,
+        ((0, 0, 0), 1.1),
+    )
     program.frames(1)
     write_png(Path(output), np.ascontiguousarray(program.picture()[..., :3]))
 
@@ -119,10 +128,12 @@ def main() -> None:
     for name, times in taken.items():
         more = [a[0] - b[0] for a, b in zip(times, taken["by hand"], strict=True)]
         rows[name] = {
-            "wall_s": statistics.median(wall for wall, _ in times), "cpu_s": statistics.median(cpu for _, cpu in times),
-            "more_wall_s": statistics.median(more), "more_wall_range_s": [min(more), max(more)],
+            "wall_s": statistics.median(wall for wall, _ in times),
+            "cpu_s": statistics.median(cpu for _, cpu in times),
+            "more_wall_s": statistics.median(more),
+            "more_wall_range_s": [min(more), max(more)],
             "more_cpu_s": statistics.median(a[1] - b[1] for a, b in zip(times, taken["by hand"], strict=True)),
-        }  # fmt: skip
+        }
     if chosen.json:
         print(json.dumps({"goal_more_s": GOAL_S, "programs": rows}, indent=1))
         return

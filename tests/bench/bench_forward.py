@@ -52,16 +52,28 @@ def write_glb(path: Path, mesh: tuple[Any, Any, Any], models: Any, colors: Any, 
         "scenes": [{"nodes": list(range(len(models) + 2))}],
         "nodes": [
             {"name": "camera", "camera": 0, "matrix": np.linalg.inv(view).T.ravel().tolist()},
-            {"name": "sun", "matrix": np.linalg.inv(light).T.ravel().tolist(),
-             "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            {
+                "name": "sun",
+                "matrix": np.linalg.inv(light).T.ravel().tolist(),
+                "extensions": {"KHR_lights_punctual": {"light": 0}},
+            },
             *({"name": f"ball{i}", "mesh": i, "matrix": m.T.ravel().tolist()} for i, m in enumerate(models)),
         ],
-        "cameras": [{"type": "perspective", "perspective": {
-            "yfov": FOV_Y, "aspectRatio": SIZE[0] / SIZE[1], "znear": NEAR, "zfar": FAR}}],
+        "cameras": [
+            {
+                "type": "perspective",
+                "perspective": {"yfov": FOV_Y, "aspectRatio": SIZE[0] / SIZE[1], "znear": NEAR, "zfar": FAR},
+            }
+        ],
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": INTENSITY}]}},
         "materials": [
-            {"pbrMetallicRoughness": {
-                "baseColorFactor": [*color.tolist(), 1], "metallicFactor": metallic, "roughnessFactor": roughness}}
+            {
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [*color.tolist(), 1],
+                    "metallicFactor": metallic,
+                    "roughnessFactor": roughness,
+                }
+            }
             for color, (metallic, roughness) in zip(colors, surfaces, strict=True)
         ],
         "meshes": [
@@ -69,8 +81,14 @@ def write_glb(path: Path, mesh: tuple[Any, Any, Any], models: Any, colors: Any, 
             for i in range(len(models))
         ],
         "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3",
-             "min": mesh[0].min(0).tolist(), "max": mesh[0].max(0).tolist()},
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": vertices,
+                "type": "VEC3",
+                "min": mesh[0].min(0).tolist(),
+                "max": mesh[0].max(0).tolist(),
+            },
             {"bufferView": 1, "componentType": 5126, "count": vertices, "type": "VEC3"},
             {"bufferView": 2, "componentType": 5125, "count": triangles, "type": "SCALAR"},
         ],
@@ -78,7 +96,7 @@ def write_glb(path: Path, mesh: tuple[Any, Any, Any], models: Any, colors: Any, 
             {"buffer": 0, "byteOffset": o, "byteLength": a.nbytes} for o, a in zip(offsets[:-1], arrays, strict=True)
         ],
         "buffers": [{"byteLength": offsets[-1]}],
-    }  # fmt: skip
+    }
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     data = b"".join(a.tobytes() for a in arrays)
@@ -94,9 +112,7 @@ def by_hand(shadow: int | None, mesh: tuple[Any, Any, Any], size: tuple[int, int
     camera = perspective(FOV_Y, size[0] / size[1], NEAR, FAR) @ look_at(EYE, TARGET)
     center = models[:, :3, 3].mean(axis=0)
     radius = float(np.linalg.norm(models[:, :3, 3] - center, axis=1).max() + 1)
-    return Forward(
-        size, mesh, models, colors, surfaces, camera, EYE, TO_LIGHT, INTENSITY, shadow, (center, radius)
-    )  # fmt: skip
+    return Forward(size, mesh, models, colors, surfaces, camera, EYE, TO_LIGHT, INTENSITY, shadow, (center, radius))
 
 
 def pipeline(scene: Path, shadow: int | None) -> Any:

@@ -142,11 +142,16 @@ def bench(frames: int, folder: str | None) -> tuple[list[Cell], str]:
                 fragments = sum(count for _, count in counted[name])
                 cells.append(
                     Cell(
-                        name, lights, statistics.median(times[name]), min(times[name]), max(times[name]), fragments,
+                        name,
+                        lights,
+                        statistics.median(times[name]),
+                        min(times[name]),
+                        max(times[name]),
+                        fragments,
                         evaluations(name, counted[name], lights, covered),
                         predict(name, lights, vertices, sum(c for _, c in counted["forward"]), covered, local),
                     )
-                )  # fmt: skip
+                )
         return cells, session.device.renderer
 
 
@@ -154,10 +159,16 @@ def table(cells: list[Cell], device: str) -> str:
     """Markdown."""
     heads = ("technique", "lights", "CPU ms (least to most)", "fragments shaded", "light evaluations", "predicted")
     rows = [
-        (c.pipeline, str(c.lights), f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})", f"{c.fragments:,}",
-         f"{c.evaluations:,}", f"{c.predicted:,.0f}")
+        (
+            c.pipeline,
+            str(c.lights),
+            f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})",
+            f"{c.fragments:,}",
+            f"{c.evaluations:,}",
+            f"{c.predicted:,.0f}",
+        )
         for c in cells
-    ]  # fmt: skip
+    ]
     return markdown(device, SIZE, heads, rows)
 
 

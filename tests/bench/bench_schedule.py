@@ -40,12 +40,14 @@ def graph(passes: Mapping[str, tuple[Sequence[str], Mapping[str, TextureDesc]]],
     }
     steps = [
         Step(
-            node, 0, "fullscreen",
+            node,
+            0,
+            "fullscreen",
             reads=tuple(Read(f"input{number}", id, 1) for number, id in enumerate(reads)),
             writes=tuple(Write(port, f"{node}.{port}", 1) for port in made),
         )
         for node, (reads, made) in passes.items()
-    ]  # fmt: skip
+    ]
     return Expansion(tuple(steps), resources, {"image": image})
 
 
@@ -83,10 +85,16 @@ def deferred() -> Expansion:
     """A deferred pipeline of 40 passes: cascades, G-buffer, occlusion, reflections, bloom, tone mapping."""
     half, full = 0.5, 1.0
     passes: dict[str, tuple[list[str], dict[str, TextureDesc]]] = {
-        "gbuffer": ([], {
-            "albedo": texture("rgba8"), "normal": texture("rgb10_a2"), "material": texture("rgba8"),
-            "motion": texture("rg16f"), "depth": texture("depth32f"),
-        }),
+        "gbuffer": (
+            [],
+            {
+                "albedo": texture("rgba8"),
+                "normal": texture("rgb10_a2"),
+                "material": texture("rgba8"),
+                "motion": texture("rg16f"),
+                "depth": texture("depth32f"),
+            },
+        ),
         "sun": ([], {"shadow_map": texture("depth16", 1, 4, (2048, 2048))}),
         "linear": (["gbuffer.depth"], {"depth": texture("r32f")}),
         "hiz1": (["linear.depth"], {"depth": texture("r32f", half)}),
@@ -98,8 +106,16 @@ def deferred() -> Expansion:
         "ao_blur_y": (["ao_blur_x.out", "hiz1.depth"], {"out": texture("r8", half)}),
         "ao_up": (["ao_blur_y.out", "linear.depth"], {"occlusion": texture("r8", full)}),
         "light": (
-            ["gbuffer.albedo", "gbuffer.normal", "gbuffer.material", "gbuffer.depth", "shadows.visibility",
-             "ao_up.occlusion"], {"radiance": texture("rgba16f")}),
+            [
+                "gbuffer.albedo",
+                "gbuffer.normal",
+                "gbuffer.material",
+                "gbuffer.depth",
+                "shadows.visibility",
+                "ao_up.occlusion",
+            ],
+            {"radiance": texture("rgba16f")},
+        ),
         "trace": (["hiz1.depth", "hiz2.depth", "hiz3.depth", "gbuffer.normal"], {"hits": texture("rgba16f", half)}),
         "reflect": (["trace.hits", "light.radiance"], {"color": texture("rgba16f", half)}),
         "reflect_blur": (["reflect.color"], {"color": texture("rgba16f", half)}),
@@ -113,7 +129,7 @@ def deferred() -> Expansion:
         "near": (["blur.radiance", "focus.coc"], {"color": texture("rgba16f", half)}),
         "far": (["blur.radiance", "focus.coc"], {"color": texture("rgba16f", half)}),
         "lens": (["near.color", "far.color", "blur.radiance", "focus.coc"], {"radiance": texture("rgba16f")}),
-    }  # fmt: skip
+    }
     source = "lens.radiance"
     for level in range(1, 7):
         passes[f"down{level}"] = ([source], {"color": texture("r11f_g11f_b10f", half**level)})
@@ -158,8 +174,16 @@ def main() -> None:
             memory = plan.memory
             kept = schedule(expansion, keep_order=True, budget_s=0).peak_bytes
             heap = memory.next_tier_bytes if memory.next_tier == "heap" else memory.allocated_bytes
-            figures.append((memory.no_reuse_bytes, kept, memory.lower_bound_bytes, memory.allocated_bytes, heap or 0,
-                            memory.proven))  # fmt: skip
+            figures.append(
+                (
+                    memory.no_reuse_bytes,
+                    kept,
+                    memory.lower_bound_bytes,
+                    memory.allocated_bytes,
+                    heap or 0,
+                    memory.proven,
+                )
+            )
         proven = sum(figure[5] for figure in figures)
         mean = [statistics.mean(figure[i] for figure in figures) / MIB for i in range(5)]
         ratio = [statistics.mean(figure[i] / figure[2] for figure in figures) for i in (1, 3, 4)]

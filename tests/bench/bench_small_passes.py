@@ -152,9 +152,8 @@ def main() -> None:
     chosen = options(__doc__, frames=5, turns=100)
     keep_memory()
     rows = [
-        bench(size, scaled, frames=chosen.frames, turns=chosen.turns)
-        for scaled in (False, True) for size in (64, 4)
-    ]  # fmt: skip
+        bench(size, scaled, frames=chosen.frames, turns=chosen.turns) for scaled in (False, True) for size in (64, 4)
+    ]
     report(rows, chosen.json, gl_calls_a_frame=objects_made())
 
 

@@ -88,10 +88,15 @@ def table(cells: list[Cell], device: str) -> str:
     """Markdown."""
     heads = ("technique", "samples", "CPU ms (least to most)", "ms at half size", "mean occlusion")
     rows = [
-        (c.pipeline, str(c.samples), f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})", f"{c.half_ms:.1f}",
-         f"{c.mean:.3f}")
+        (
+            c.pipeline,
+            str(c.samples),
+            f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})",
+            f"{c.half_ms:.1f}",
+            f"{c.mean:.3f}",
+        )
         for c in cells
-    ]  # fmt: skip
+    ]
     return markdown(device, SIZE, heads, rows)
 
 

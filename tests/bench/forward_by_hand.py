@@ -169,17 +169,28 @@ def perspective(fov_y: float, aspect: float, near: float, far: float) -> Any:
 def light_matrix(to_light: Any, center: Any, radius: float) -> Any:
     """World to the clip space of a directional light that sees a ball."""
     view = look_at(np.asarray(center) + np.asarray(to_light), center, (0, 1, 0.01))
-    return np.array([[1 / radius, 0, 0, 0], [0, 1 / radius, 0, 0], [0, 0, -1 / radius, -1 / radius],
-                     [0, 0, 0, 1]]) @ view  # fmt: skip
+    return (
+        np.array([[1 / radius, 0, 0, 0], [0, 1 / radius, 0, 0], [0, 0, -1 / radius, -1 / radius], [0, 0, 0, 1]]) @ view
+    )
 
 
 class Forward:
     """The program: everything made in the constructor, `draw` is a frame."""
 
     def __init__(
-        self, size: tuple[int, int], mesh: tuple[Any, Any, Any], models: Any, colors: Any, surfaces: Any, camera: Any,
-        eye: Any, to_light: Any, intensity: float, shadow: int | None = None, ball: tuple[Any, float] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        size: tuple[int, int],
+        mesh: tuple[Any, Any, Any],
+        models: Any,
+        colors: Any,
+        surfaces: Any,
+        camera: Any,
+        eye: Any,
+        to_light: Any,
+        intensity: float,
+        shadow: int | None = None,
+        ball: tuple[Any, float] | None = None,
+    ) -> None:
         context = glcontext.get_backend_by_name("egl")(mode="standalone", glversion=450, device_index=0)
         self.ctx = ctx = moderngl.create_context(context=context)
         self._load = context.load
@@ -199,9 +210,15 @@ class Forward:
         program["light_color"].value = (intensity,) * 3
         program["ambient"].value = (0.03,) * 3
         self.spheres = ctx.vertex_array(
-            program, [(vertices, "3f", "in_position"), (normals, "3f", "in_normal"), (models, "16f/i", "in_model"),
-                      (looks, "3f 2f/i", "in_color", "in_surface")], index,
-        )  # fmt: skip
+            program,
+            [
+                (vertices, "3f", "in_position"),
+                (normals, "3f", "in_normal"),
+                (models, "16f/i", "in_model"),
+                (looks, "3f 2f/i", "in_color", "in_surface"),
+            ],
+            index,
+        )
         self.radiance = ctx.texture(size, 4, dtype="f2")
         self.radiance.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.target = ctx.framebuffer(self.radiance, self._depth(size))

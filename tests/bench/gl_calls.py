@@ -37,9 +37,13 @@ class Calls:
         counter = ctypes.addressof(self._counters) + 8 * slot
         # mov r11, counter; inc qword [r11]; mov r11, target; jmp r11. No argument is passed in r11.
         self._code[32 * slot : 32 * slot + 26] = (
-            b"\x49\xbb" + struct.pack("<Q", counter) + b"\x49\xff\x03"
-            + b"\x49\xbb" + struct.pack("<Q", target) + b"\x41\xff\xe3"
-        )  # fmt: skip
+            b"\x49\xbb"
+            + struct.pack("<Q", counter)
+            + b"\x49\xff\x03"
+            + b"\x49\xbb"
+            + struct.pack("<Q", target)
+            + b"\x41\xff\xe3"
+        )
         return self._base + 32 * slot
 
     def taken(self) -> Counter[str]:
@@ -87,5 +91,8 @@ def counting() -> Iterator[Calls]:
 def made(counts: Counter[str]) -> int:
     """How many of the calls create objects."""
     creates = ("glGen", "glCreate", "glFenceSync", "glTextureView")
-    return sum(n for name, n in counts.items() if name.startswith(creates) and name != "glGenerateTextureMipmap"
-               and name != "glGenerateMipmap")  # fmt: skip
+    return sum(
+        n
+        for name, n in counts.items()
+        if name.startswith(creates) and name != "glGenerateTextureMipmap" and name != "glGenerateMipmap"
+    )

@@ -7,11 +7,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 COLORS = {
-    "forward": "#b3541e", "forward-multipass": "#d99a2b", "deferred": "#2b6cb0", "deferred-stencil-lights": "#2f855a",
-}  # fmt: skip
+    "forward": "#b3541e",
+    "forward-multipass": "#d99a2b",
+    "deferred": "#2b6cb0",
+    "deferred-stencil-lights": "#2f855a",
+}
 FORMULAS = {
-    "forward": "V + L·F", "forward-multipass": "L·(V + F)", "deferred": "V + L·F", "deferred-stencil-lights": "V + ΣF′",
-}  # fmt: skip
+    "forward": "V + L·F",
+    "forward-multipass": "L·(V + F)",
+    "deferred": "V + L·F",
+    "deferred-stencil-lights": "V + ΣF′",
+}
 WIDTH, HEIGHT, LEFT, TOP, PANEL = 920, 430, 70, 50, 340
 
 

@@ -84,9 +84,19 @@ def compare(name: str, ours: Draw, by_hand: Draw, *, frames: int, turns: int, go
     low, _, high = statistics.quantiles(cpu, n=4) if turns > 1 else (cpu[0],) * 3
     medians = [statistics.median(column) for column in zip(*taken, strict=True)]
     return Row(
-        name, goal, medians[0], medians[2], statistics.median(cpu), low, high, medians[1], medians[3],
-        statistics.median(wall), turns, frames,
-    )  # fmt: skip
+        name,
+        goal,
+        medians[0],
+        medians[2],
+        statistics.median(cpu),
+        low,
+        high,
+        medians[1],
+        medians[3],
+        statistics.median(wall),
+        turns,
+        frames,
+    )
 
 
 def cpu_and_wall(draw: Draw, frames: int) -> tuple[float, float]:
@@ -180,9 +190,13 @@ def markdown(device: str, size: tuple[int, int], heads: Sequence[str], rows: Seq
 
 
 def figures(
-    chosen: argparse.Namespace, name: str, device: str, cells: Sequence[Any], table: str,
+    chosen: argparse.Namespace,
+    name: str,
+    device: str,
+    cells: Sequence[Any],
+    table: str,
     plot: Callable[[list[dict[str, Any]], str], str],
-) -> None:  # fmt: skip
+) -> None:
     """Print measured cells as a table or JSON; with `--save` the table and a plot are written too."""
     rows = [asdict(cell) for cell in cells]
     if chosen.save:

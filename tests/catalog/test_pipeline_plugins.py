@@ -113,11 +113,13 @@ def test_paths_are_relative_to_the_file_they_stand_in(write: Write) -> None:
     )
     folder = write(
         {
-            "sub/glow.yaml": glow, "sub/times.frag": EFFECT, "sub/inner/named.frag": EFFECT,
+            "sub/glow.yaml": glow,
+            "sub/times.frag": EFFECT,
+            "sub/inner/named.frag": EFFECT,
             "patch.yaml": "nodes: {effect: {type: ./sub/times.frag}}\n",
             "p.yaml": pipeline("./sub/glow.yaml"),
         }
-    )  # fmt: skip
+    )
     graph = link(spec_of(folder / "p.yaml"), Catalog.discover())
     assert [graph[name].type.name for name in ("effect/one", "effect/two")] == ["./sub/times.frag", "named"]
     spec = spec_of(folder / "p.yaml", patches=[folder / "patch.yaml"])
@@ -189,8 +191,11 @@ def test_where_names_come_from(write: Write, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("RENDERGRAPH_PATH", f"{folder / 'path'}{os.pathsep}{os.pathsep}{folder / 'other'}")
     names = Catalog.discover([folder / "typed", folder / "path"]).names()
     assert {name for name in names if name.endswith("_effect")} == {
-        "project_effect", "path_effect", "other_effect", "typed_effect",
-    }  # fmt: skip
+        "project_effect",
+        "path_effect",
+        "other_effect",
+        "typed_effect",
+    }
     assert Catalog.discover([folder / "typed"], installed=False).names() == ["typed_effect"]
     assert Catalog.discover([folder / "path"]).get("path_effect").plugin == "path"  # named twice, and one type
 
@@ -343,14 +348,15 @@ def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("plugins", "text"),
     [
-        ("[../fx]", "2:11: RG012 '../fx' lies outside"), ("[./none]", "2:11: RG011 there is no folder './none'"),
+        ("[../fx]", "2:11: RG012 '../fx' lies outside"),
+        ("[./none]", "2:11: RG011 there is no folder './none'"),
         ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file, a folder is needed"),
         ("./fx", "2:10: RG106 'plugins' takes a list as in [./effects, some-package], this is text"),
         ("[-rlist]", "2:11: RG131 '-rlist' is neither a folder of plugins nor a package's name"),
         ("[3]", "2:11: RG106 'plugins' takes text, this is a number"),
         ("[/]", "2:11: RG012 '/' lies outside"),
     ],
-)  # fmt: skip
+)
 def test_wrong_plugins(write: Write, plugins: str, text: str) -> None:
     folder = write({"fx/times.frag": EFFECT, "in/p.yaml": pipeline("tonemap", f"plugins: {plugins}\n")})
     assert any(message.startswith(text) for message in messages(folder / "in" / "p.yaml"))

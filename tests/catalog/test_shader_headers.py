@@ -64,8 +64,12 @@ def test_a_header_says_everything_that_a_class_can(tmp_path: Path) -> None:
     assert (darkened.like, darkened.format, darkened.mips, darkened.clear) == ("color", "r32f", 0, (1.0, 2.0, 3.0, 4.0))
     assert (darkened.first, darkened.semantic, darkened.doc) == (5, None, "Result.")
     assert cls().model_dump() == {
-        "strength": 0.25, "taps": 4, "curve": "soft", "smooth_it": True, "scale": 0.5,
-    }  # fmt: skip
+        "strength": 0.25,
+        "taps": 4,
+        "curve": "soft",
+        "smooth_it": True,
+        "scale": 0.5,
+    }
     assert [cls.role_of(name) for name in cls.parameters()] == ["param", "define", "define", "define", "structural"]
     assert get_args(cls.parameters()["curve"].annotation) == ("soft", "hard")
     desc = TextureDesc("texture2d", "rgba16f", 101, 50)
@@ -133,8 +137,9 @@ def test_compute_images_and_buffers(tmp_path: Path) -> None:
     """
     cls = load(tmp_path, text, "effect.comp").cls
     assert {name: (port.kind, port.use) for name, port in cls.inputs().items() if isinstance(port, Input)} == {
-        "source": ("texture2d", "image"), "table": ("buffer", "sample"),
-    }  # fmt: skip
+        "source": ("texture2d", "image"),
+        "table": ("buffer", "sample"),
+    }
     made = {name: (port.kind, port.format) for name, port in cls.outputs().items() if isinstance(port, Output)}
     assert made == {"counts": ("buffer", None), "picture": ("texture2d_array", "r32ui")}
 
@@ -160,59 +165,112 @@ def headed(text: str) -> str:
         ("doc: 3", ["2:6: RG440 'doc' takes text, this is 3"]),
         ("inputs: [color]", ["2:9: RG440 'inputs' takes a mapping of names, this is a list"]),
         ("inputs: {color: radiance}", ["2:17: RG440 'color' takes a mapping as in {doc: …}, this is text"]),
-        ("inputs: {color: {filter: smooth}}",
-         ["2:26: RG440 'filter' takes one of nearest, linear, trilinear, this is 'smooth'"]),
-        ("inputs: {color: {semantic: radiant}}",
-         ["2:28: RG440 there is no semantic 'radiant'; did you mean 'radiance'?"]),
-        ("inputs: {colour: {}}",
-         ["2:10: RG444 the header has input 'colour', but the shader declares no 'uniform sampler2D colour;'; "
-          "did you mean 'color'?"]),
-        ("inputs: {strength: {}}",
-         ["2:10: RG444 the header has input 'strength', but the shader declares 'uniform float strength'"]),
+        (
+            "inputs: {color: {filter: smooth}}",
+            ["2:26: RG440 'filter' takes one of nearest, linear, trilinear, this is 'smooth'"],
+        ),
+        (
+            "inputs: {color: {semantic: radiant}}",
+            ["2:28: RG440 there is no semantic 'radiant'; did you mean 'radiance'?"],
+        ),
+        (
+            "inputs: {colour: {}}",
+            [
+                "2:10: RG444 the header has input 'colour', but the shader declares no 'uniform sampler2D colour;'; "
+                "did you mean 'color'?"
+            ],
+        ),
+        (
+            "inputs: {strength: {}}",
+            ["2:10: RG444 the header has input 'strength', but the shader declares 'uniform float strength'"],
+        ),
         ("outputs: {darkened: {format: rgba9}}", None),
-        ("outputs: {darkened: {like: colour}}",
-         ["2:28: RG444 'like' names no input of this node: 'colour'; did you mean 'color'?"]),
+        (
+            "outputs: {darkened: {like: colour}}",
+            ["2:28: RG444 'like' names no input of this node: 'colour'; did you mean 'color'?"],
+        ),
         ("outputs: {darkened: {size: $scale}}", ["2:28: RG444 there is no parameter 'scale' with role: structural"]),
-        ("outputs: {darkened: {size: 0}}",
-         ["2:28: RG440 'size' takes a factor of the picture's size, an input's name, [input, factor], or "
-          "[width, height] in texels, this is 0"]),
-        ("outputs: {darkened: {}, more: {}}",
-         ["2:25: RG444 the header has output 'more', but the shader declares no 'out vec4 more;'"]),
-        ("params: {strength: {default: [1, 2]}}",
-         ["2:30: RG442 the default of 'strength' (float) is a number, not [1, 2]"]),
-        ("params: {strength: {default: true}}",
-         ["2:30: RG442 the default of 'strength' (float) is a number, not true"]),
+        (
+            "outputs: {darkened: {size: 0}}",
+            [
+                "2:28: RG440 'size' takes a factor of the picture's size, an input's name, [input, factor], or "
+                "[width, height] in texels, this is 0"
+            ],
+        ),
+        (
+            "outputs: {darkened: {}, more: {}}",
+            ["2:25: RG444 the header has output 'more', but the shader declares no 'out vec4 more;'"],
+        ),
+        (
+            "params: {strength: {default: [1, 2]}}",
+            ["2:30: RG442 the default of 'strength' (float) is a number, not [1, 2]"],
+        ),
+        (
+            "params: {strength: {default: true}}",
+            ["2:30: RG442 the default of 'strength' (float) is a number, not true"],
+        ),
         ("params: {strength: {min: 2, max: 1}}", ["2:26: RG442 'strength' has a min of 2 above its max of 1"]),
         ("params: {strength: {min: 2}}", ["2:26: RG442 the default of 'strength' is 0, outside of its own range"]),
-        ("params: {strength: {role: define}}",
-         ["2:10: RG444 the header has parameter 'strength', which the shader declares as 'uniform float strength;', "
-          "no define"]),
-        ("params: {strenght: {role: param}}",
-         ["2:10: RG444 the header has parameter 'strenght', but the shader declares no 'uniform float strenght;'; "
-          "did you mean 'strength'?"]),
-        ("params: {strenght: {default: 1}}",
-         ["2:10: RG444 the header has parameter 'strenght', but the shader has neither 'uniform float strenght;' nor "
-          "STRENGHT, as which it would be compiled in; did you mean 'strength'?"]),
-        ("params: {mode: {choices: [a, b]}}",
-         ["2:10: RG444 the header has parameter 'mode', but the shader has neither 'uniform float mode;' nor "
-          "MODE, as which it would be compiled in; there is strength"]),
-        ("params: {more: {role: define}}",
-         ["2:10: RG444 'more' is no uniform of the shader; it needs choices, or a number or a switch as default"]),
-        ("params: {mode: {role: define, choices: [a, b], default: c}}",
-         ["2:57: RG442 the default of 'mode' is one of a, b, not 'c'"]),
-        ("inputs: {color: {}}\nparams: {color: {}}",
-         ["3:10: RG440 'color' stands in line 2 too; no port or parameter has the name of another"]),
-        ("params: {filter: {role: define, default: 1}}",
-         ["2:10: RG490 shader 'effect.frag': 'filter' is reserved by GLSL or by the node's base class; "
-          "choose another name"]),
+        (
+            "params: {strength: {role: define}}",
+            [
+                "2:10: RG444 the header has parameter 'strength', which the shader declares as 'uniform float strength;', "
+                "no define"
+            ],
+        ),
+        (
+            "params: {strenght: {role: param}}",
+            [
+                "2:10: RG444 the header has parameter 'strenght', but the shader declares no 'uniform float strenght;'; "
+                "did you mean 'strength'?"
+            ],
+        ),
+        (
+            "params: {strenght: {default: 1}}",
+            [
+                "2:10: RG444 the header has parameter 'strenght', but the shader has neither 'uniform float strenght;' nor "
+                "STRENGHT, as which it would be compiled in; did you mean 'strength'?"
+            ],
+        ),
+        (
+            "params: {mode: {choices: [a, b]}}",
+            [
+                "2:10: RG444 the header has parameter 'mode', but the shader has neither 'uniform float mode;' nor "
+                "MODE, as which it would be compiled in; there is strength"
+            ],
+        ),
+        (
+            "params: {more: {role: define}}",
+            ["2:10: RG444 'more' is no uniform of the shader; it needs choices, or a number or a switch as default"],
+        ),
+        (
+            "params: {mode: {role: define, choices: [a, b], default: c}}",
+            ["2:57: RG442 the default of 'mode' is one of a, b, not 'c'"],
+        ),
+        (
+            "inputs: {color: {}}\nparams: {color: {}}",
+            ["3:10: RG440 'color' stands in line 2 too; no port or parameter has the name of another"],
+        ),
+        (
+            "params: {filter: {role: define, default: 1}}",
+            [
+                "2:10: RG490 shader 'effect.frag': 'filter' is reserved by GLSL or by the node's base class; "
+                "choose another name"
+            ],
+        ),
         ("doc: 'open", ["2:6: RG001 not valid YAML: the quote that starts here is not closed"]),
         ("doc: a\ndoc: b", ["3:1: RG002 the key 'doc' stands here twice, first in line 2; remove one"]),
-        ("doc: 1\ninputs: 2\nparams: {strength: {min: x, uint: EV}}",
-         ["2:6: RG440 'doc' takes text, this is 1", "3:9: RG440 'inputs' takes a mapping of names, this is a number",
-          "4:26: RG440 'min' takes a number, this is 'x'",
-          "4:29: RG440 a parameter has no key 'uint'; did you mean 'unit'?"]),
+        (
+            "doc: 1\ninputs: 2\nparams: {strength: {min: x, uint: EV}}",
+            [
+                "2:6: RG440 'doc' takes text, this is 1",
+                "3:9: RG440 'inputs' takes a mapping of names, this is a number",
+                "4:26: RG440 'min' takes a number, this is 'x'",
+                "4:29: RG440 a parameter has no key 'uint'; did you mean 'unit'?",
+            ],
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_header_is_told_at_its_line(tmp_path: Path, text: str, messages: list[str] | None) -> None:
     found = mistakes(tmp_path, headed(text))
     if messages is None:
@@ -256,16 +314,24 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("layout(r32f) uniform image2D a;", "1:1: RG443 a compute shader says how many threads a group has"),
-        ("layout(local_size_x = N) in;\nlayout(r32f) uniform image2D a;",
-         "1:1: RG443 local_size_x: the value of 'N' is not known; write a number"),
-        ("layout(local_size_x = 0) in;\nlayout(r32f) uniform image2D a;",
-         "1:1: RG443 local_size_x is a whole number from 1 to 1024, not 0"),
-        ("/*---\nthreads: b\n---*/\nlayout(local_size_x = 8) in;\nlayout(r32f) uniform image2D a;",
-         "2:10: RG443 'threads' names no texture of this node: 'b'"),
-        ("layout(local_size_x = 8) in;\nbuffer a { uint b; };",
-         "2:8: RG441 how large is the buffer 'a'? say outputs: {a: {bytes: N}} in the header"),
+        (
+            "layout(local_size_x = N) in;\nlayout(r32f) uniform image2D a;",
+            "1:1: RG443 local_size_x: the value of 'N' is not known; write a number",
+        ),
+        (
+            "layout(local_size_x = 0) in;\nlayout(r32f) uniform image2D a;",
+            "1:1: RG443 local_size_x is a whole number from 1 to 1024, not 0",
+        ),
+        (
+            "/*---\nthreads: b\n---*/\nlayout(local_size_x = 8) in;\nlayout(r32f) uniform image2D a;",
+            "2:10: RG443 'threads' names no texture of this node: 'b'",
+        ),
+        (
+            "layout(local_size_x = 8) in;\nbuffer a { uint b; };",
+            "2:8: RG441 how large is the buffer 'a'? say outputs: {a: {bytes: N}} in the header",
+        ),
     ],
-)  # fmt: skip
+)
 def test_wrong_compute_shaders(tmp_path: Path, text: str, message: str) -> None:
     assert mistakes(tmp_path, text, "effect.comp")[0].startswith(message)
 

@@ -41,13 +41,31 @@ def mistakes(folder: Path, text: str, name: str = "effect.frag") -> list[str]:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("0.5", 0.5), (".5", 0.5), ("1.", 1.0), ("1e-3", 1e-3), ("2.5E+2f", 250.0), ("3u", 3), ("0x1F", 31), ("-2", -2),
-        ("true", True), ("1.0 / 4.0", 0.25), ("7 / 2", 3), ("-7 / 2", -3), ("2 * (3 + 4) - 1", 13), ("- -1", 1),
-        ("vec3(1)", (1.0, 1.0, 1.0)), ("vec3(1.0, 2.0, 3.0)", (1.0, 2.0, 3.0)), ("2.0 * vec2(1, 3)", (2.0, 6.0)),
-        ("vec4(vec2(1, 2), vec2(3, 4))", (1.0, 2.0, 3.0, 4.0)), ("ivec2(1.9, -1.9)", (1, -1)), ("float(3)", 3.0),
-        ("vec2(4, 9) / vec2(2, 3)", (2.0, 3.0)), ("radius * 2.0", 3.0), ("1e-3 - 1", -0.999),
+        ("0.5", 0.5),
+        (".5", 0.5),
+        ("1.", 1.0),
+        ("1e-3", 1e-3),
+        ("2.5E+2f", 250.0),
+        ("3u", 3),
+        ("0x1F", 31),
+        ("-2", -2),
+        ("true", True),
+        ("1.0 / 4.0", 0.25),
+        ("7 / 2", 3),
+        ("-7 / 2", -3),
+        ("2 * (3 + 4) - 1", 13),
+        ("- -1", 1),
+        ("vec3(1)", (1.0, 1.0, 1.0)),
+        ("vec3(1.0, 2.0, 3.0)", (1.0, 2.0, 3.0)),
+        ("2.0 * vec2(1, 3)", (2.0, 6.0)),
+        ("vec4(vec2(1, 2), vec2(3, 4))", (1.0, 2.0, 3.0, 4.0)),
+        ("ivec2(1.9, -1.9)", (1, -1)),
+        ("float(3)", 3.0),
+        ("vec2(4, 9) / vec2(2, 3)", (2.0, 3.0)),
+        ("radius * 2.0", 3.0),
+        ("1e-3 - 1", -0.999),
     ],
-)  # fmt: skip
+)
 def test_constant_expressions(text: str, value: object) -> None:
     found = constant(tokens(text), {"radius": 1.5})
     assert found == value
@@ -57,10 +75,25 @@ def test_constant_expressions(text: str, value: object) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "", "unknown", "1.0 /", "1 / 0", "vec3(1, 2)", "(1", "1 2", "sin(1.0)", "true + 1", "vec2(1) + vec3(1)", "1e39",
-        "int(1e999)", "ivec2(1e999)", "1e38 / 1e-9", "1e30 * 1e30", "0x" + 40 * "f", 40 * "9",
+        "",
+        "unknown",
+        "1.0 /",
+        "1 / 0",
+        "vec3(1, 2)",
+        "(1",
+        "1 2",
+        "sin(1.0)",
+        "true + 1",
+        "vec2(1) + vec3(1)",
+        "1e39",
+        "int(1e999)",
+        "ivec2(1e999)",
+        "1e38 / 1e-9",
+        "1e30 * 1e30",
+        "0x" + 40 * "f",
+        40 * "9",
     ],
-)  # fmt: skip
+)
 def test_what_is_no_constant_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
         constant(tokens(text))
@@ -111,9 +144,11 @@ def test_ports_and_parameters_of_a_plain_shader(tmp_path: Path) -> None:
     ports = {name: port for name, port in found.cls.ports().items() if isinstance(port, Input)}
     assert list(ports) == ["color", "other", "shadows", "ids"]
     assert [(p.semantic.name, p.kind, p.compare, p.optional) for p in ports.values()] == [
-        ("any", "texture2d", False, False), ("any", "texture2d", False, False), ("any", "texture2d", True, False),
+        ("any", "texture2d", False, False),
+        ("any", "texture2d", False, False),
+        ("any", "texture2d", True, False),
         ("any", "texture2d_array", False, False),
-    ]  # fmt: skip
+    ]
     (output,) = found.cls.outputs().values()
     assert isinstance(output, Output)
     assert (output.name, output.format, output.size, output.semantic) == (
@@ -123,8 +158,13 @@ def test_ports_and_parameters_of_a_plain_shader(tmp_path: Path) -> None:
         ports["color"].semantic,
     )
     assert found.cls().model_dump() == {
-        "strength": 1.0, "plain": 0.0, "tint": (1.0, 0.5, 0.25), "axis": (1, 0), "count": 4, "on": True,
-    }  # fmt: skip
+        "strength": 1.0,
+        "plain": 0.0,
+        "tint": (1.0, 0.5, 0.25),
+        "axis": (1, 0),
+        "count": 4,
+        "on": True,
+    }
     assert {found.cls.role_of(name) for name in found.cls.parameters()} == {"param"}
 
 
@@ -147,9 +187,11 @@ def test_both_branches_of_an_if_are_one_declaration(tmp_path: Path) -> None:
 
 
 KINDS: dict[str, Any] = {
-    "float": st.floats(-100, 100, width=32), "int": st.integers(-100, 100), "uint": st.integers(0, 100),
+    "float": st.floats(-100, 100, width=32),
+    "int": st.integers(-100, 100),
+    "uint": st.integers(0, 100),
     "bool": st.booleans(),
-}  # fmt: skip
+}
 
 
 @given(st.data())
@@ -198,11 +240,19 @@ SIZE = 300_000
 @pytest.mark.parametrize(
     "text",
     [
-        "/* " * (SIZE // 3), "#define A 1" + SIZE * " " + "b", "#define A 1" + SIZE * "\t" + "b", SIZE // 4 * "in a{}b[",
-        "uniform float a = " + SIZE * "(", SIZE * "{", SIZE * "}", SIZE // 2 * "\\\n", SIZE * " ", SIZE // 6 * "x = y[",
+        "/* " * (SIZE // 3),
+        "#define A 1" + SIZE * " " + "b",
+        "#define A 1" + SIZE * "\t" + "b",
+        SIZE // 4 * "in a{}b[",
+        "uniform float a = " + SIZE * "(",
+        SIZE * "{",
+        SIZE * "}",
+        SIZE // 2 * "\\\n",
+        SIZE * " ",
+        SIZE // 6 * "x = y[",
     ],
     ids=lambda text: text[:8],
-)  # fmt: skip
+)
 def test_text_that_repeats_itself_is_read_in_time(tmp_path: Path, text: str) -> None:
     start = time.monotonic()
     load(tmp_path, f"out vec4 c;\nvoid main() {{ c = vec4(1.0); }}\n{text}\n")
@@ -229,29 +279,43 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("uniform mat3 turn;\nout vec4 c;",
-         "1:14: RG441 'turn' is mat3, which is no parameter; bool, int, uint, float and their vectors can be"),
-        ("out vec4 c;\nuniform float w[4];",
-         "2:15: RG441 'w' is an array of float, which is no parameter; bool, int, uint, float and their vectors can be"),
-        ("uniform sampler2D s[2];\nout vec4 c;",
-         "1:19: RG441 's' is an array of samplers; declare the input `many` and s_0, s_1, …"),
-        ("in vec2 uv;\nout vec4 c;",
-         "1:9: RG441 nothing writes the varying 'uv'; a full-screen pass has v_uv, from 0 to 1"),
+        (
+            "uniform mat3 turn;\nout vec4 c;",
+            "1:14: RG441 'turn' is mat3, which is no parameter; bool, int, uint, float and their vectors can be",
+        ),
+        (
+            "out vec4 c;\nuniform float w[4];",
+            "2:15: RG441 'w' is an array of float, which is no parameter; bool, int, uint, float and their vectors can be",
+        ),
+        (
+            "uniform sampler2D s[2];\nout vec4 c;",
+            "1:19: RG441 's' is an array of samplers; declare the input `many` and s_0, s_1, …",
+        ),
+        (
+            "in vec2 uv;\nout vec4 c;",
+            "1:9: RG441 nothing writes the varying 'uv'; a full-screen pass has v_uv, from 0 to 1",
+        ),
         ("uniform float a;\n", "1:1: RG441 the shader writes nothing; declare what it makes, as in out vec4 color;"),
         ("out mat2 c;", "1:10: RG441 output 'c' is a mat2; float, vec2 to vec4, uint and int can be"),
         ("out ivec2 c;", "1:11: RG441 no format holds the ivec2 of output 'c'; use uvec4 or int"),
-        ("out vec4 c;\nuniform float a = other;",
-         "2:15: RG442 the initialiser of 'a' cannot be worked out: the value of 'other' is not known; "
-         "give its default in a header"),
+        (
+            "out vec4 c;\nuniform float a = other;",
+            "2:15: RG442 the initialiser of 'a' cannot be worked out: the value of 'other' is not known; "
+            "give its default in a header",
+        ),
         ("out vec4 c;\nuniform int a = 1.5;", "2:13: RG442 the default of 'a' (int) is a whole number, not 1.5"),
-        ("layout(location = 1) out vec4 c;",
-         "1:31: RG441 locations of outputs go from 0 without gaps, for all or for none; leave the layouts out"),
+        (
+            "layout(location = 1) out vec4 c;",
+            "1:31: RG441 locations of outputs go from 0 without gaps, for all or for none; leave the layouts out",
+        ),
         ("#version 300 es\nout vec4 c;", "1:1: RG404 '#version' is written by rendergraph; take the line out"),
-        ("out vec4 c;\nuniform float distance;",
-         "2:15: RG490 shader 'effect.frag': 'distance' is reserved by GLSL or by the node's base class; "
-         "choose another name"),
+        (
+            "out vec4 c;\nuniform float distance;",
+            "2:15: RG490 shader 'effect.frag': 'distance' is reserved by GLSL or by the node's base class; "
+            "choose another name",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_can_be_no_node_is_said_at_its_line(tmp_path: Path, text: str, message: str) -> None:
     assert mistakes(tmp_path, text) == [message]
 

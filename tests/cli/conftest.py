@@ -88,9 +88,14 @@ class FakeFrame:
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "pipeline": "fake", "device": {"renderer": "none", "software": True}, "size": [6, 4], "passes": [],
-            "frame_ms": {"median": 1.0, "min": 1.0, "max": 1.0}, "memory": {}, "culled": {"idle": "nobody reads it"},
-        }  # fmt: skip
+            "pipeline": "fake",
+            "device": {"renderer": "none", "software": True},
+            "size": [6, 4],
+            "passes": [],
+            "frame_ms": {"median": 1.0, "min": 1.0, "max": 1.0},
+            "memory": {},
+            "culled": {"idle": "nobody reads it"},
+        }
 
 
 @pytest.fixture

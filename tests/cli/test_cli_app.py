@@ -188,9 +188,13 @@ def test_signals_end_the_process_cleanly(tmp_path: Path, name: str) -> None:
         "rendergraph.load = load\nsys.exit(main(['check', 'x']))"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path, text=True,
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+        text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job's suite ignores SIGINT
-    )  # fmt: skip
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     process.send_signal(getattr(signal, name))
@@ -243,10 +247,34 @@ def test_completion_for_the_shell() -> None:
 
 
 WORDS = [
-    "run", "check", "forward", "nope", "--json", "--size", "10x10", "-s", "a.b=1", "--set=", "-o", "x.png", "-p",
-    "--scene", "--tap", "a.b=c.exr", "--frames", "1-2", "", "-", "--", "\x00", "é𝄞", "--device", "-1", "../..",
+    "run",
+    "check",
+    "forward",
+    "nope",
+    "--json",
+    "--size",
+    "10x10",
+    "-s",
+    "a.b=1",
+    "--set=",
+    "-o",
+    "x.png",
+    "-p",
+    "--scene",
+    "--tap",
+    "a.b=c.exr",
+    "--frames",
+    "1-2",
+    "",
+    "-",
+    "--",
+    "\x00",
+    "é𝄞",
+    "--device",
+    "-1",
+    "../..",
     "9" * 400,
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("seed", range(40))

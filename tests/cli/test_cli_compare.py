@@ -150,9 +150,12 @@ def test_a_sweep_writes_its_chart_as_a_picture(cli: Any, tmp_path: Path) -> None
 def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any, tmp_path: Path) -> None:
     words = ["sweep", "forward", "-x", f"display.exposure={','.join(map(str, range(18)))}", *SMALL, "-n", "400"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "rendergraph.cli", *words, "-o", "out"], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-m", "rendergraph.cli", *words, "-o", "out"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job's suite ignores SIGINT
-    )  # fmt: skip
+    )
     while process.poll() is None and len(list(tmp_path.glob("out/*/run.json"))) < 2:
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)

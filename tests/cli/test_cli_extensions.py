@@ -41,8 +41,12 @@ def plugin(tmp_path: Path) -> Path:
 
 def test_nodes_lists_what_plugins_add(cli: Any, plugin: Path) -> None:
     words = " ".join(cli("nodes", "--plugin", str(plugin)).out.partition("\nadded ")[2].split())
-    for said in ("semantic heat sketch Temperature, kelvin.", "curve halve sketch Half of it, as an example.",
-                 "mesh loader .tri sketch", "metric darker sketch Share of values"):  # fmt: skip
+    for said in (
+        "semantic heat sketch Temperature, kelvin.",
+        "curve halve sketch Half of it, as an example.",
+        "mesh loader .tri sketch",
+        "metric darker sketch Share of values",
+    ):
         assert said in words
     told = cli("nodes", "--plugin", str(plugin), "--json").json["extensions"]
     assert {"kind": "curve", "name": "halve", "plugin": "sketch", "doc": "Half of it, as an example."} in told

@@ -129,9 +129,15 @@ def test_a_description_says_everything() -> None:
     assert "target" in outputs
     assert [port["name"] for port in found["internal"]] == ["scratch"]
     assert parameters["gain"] == {
-        "name": "gain", "type": "number", "default": 1.0, "role": "param", "unit": "EV", "doc": "Gain.",
-        "min": 0, "max": 2,
-    }  # fmt: skip
+        "name": "gain",
+        "type": "number",
+        "default": 1.0,
+        "role": "param",
+        "unit": "EV",
+        "doc": "Gain.",
+        "min": 0,
+        "max": 2,
+    }
     assert parameters["tint"]["type"] == "number | [number, number, number]"
     assert parameters["mode"]["choices"] == ["a", "b"]
     json.dumps(found)

@@ -125,10 +125,17 @@ def test_the_selection_reaches_load(cli: Any, monkeypatch: pytest.MonkeyPatch) -
     words = "run x --scene s.glb --camera c --environment e.hdr --size 4x5 -s a.b=1 -s c=2 -p p.yaml --asset-root r"
     assert cli(*words.split(), "--plugin", "n", "--limit", "yaml-depth=9").code == 3
     assert seen == {
-        "source": "x", "scene": "s.glb", "camera": "c", "environment": "e.hdr", "size": (4, 5),
-        "sets": ["a.b=1", "c=2"], "patches": [Path("p.yaml")], "asset_roots": [Path("r")], "plugins": [Path("n")],
+        "source": "x",
+        "scene": "s.glb",
+        "camera": "c",
+        "environment": "e.hdr",
+        "size": (4, 5),
+        "sets": ["a.b=1", "c=2"],
+        "patches": [Path("p.yaml")],
+        "asset_roots": [Path("r")],
+        "plugins": [Path("n")],
         "limits": {"yaml-depth": 9},
-    }  # fmt: skip
+    }
 
 
 def test_a_failure_keeps_the_frames_that_are_done(cli: Any, fake: Any, tmp_path: Path) -> None:

@@ -99,9 +99,15 @@ def test_names_are_text_everywhere(comparison: Comparison) -> None:
     results = [replace(result, name=f"{HOSTILE}{number}") for number, result in enumerate(comparison.results)]
     graph = replace(comparison.base[1], name=HOSTILE)
     hostile = replace(
-        comparison, results=tuple(results), base=(HOSTILE, graph), scene=HOSTILE, camera=HOSTILE, notes=(HOSTILE,),
-        device={HOSTILE: HOSTILE}, reference=replace(comparison.reference, name=HOSTILE, kind="file"),
-    )  # fmt: skip
+        comparison,
+        results=tuple(results),
+        base=(HOSTILE, graph),
+        scene=HOSTILE,
+        camera=HOSTILE,
+        notes=(HOSTILE,),
+        device={HOSTILE: HOSTILE},
+        reference=replace(comparison.reference, name=HOSTILE, kind="file"),
+    )
     page = comparison_page(hostile, HOSTILE)
     assert "alert(1)</script>" not in page
     assert "<b>" not in page

@@ -193,10 +193,13 @@ def test_results_are_kept_only_as_long_as_what_they_were_drawn_from(gl: rg.Sessi
     assert drawn() == 2
     assert drawn() == 0
     for name, old, new in (
-        ("plugin/shape.glsl", "1.0", "0.9"), ("plugin/glow.frag", "* much", "* 0.5 * much"),
-        ("plugin/glow.py", "ONE)", "ONE * 0.5)"), ("plugin/_strength.py", "0.5", "0.6"),
-        ("plugin/more/helpers.py", "1.0", "0.7"), ("scene.yaml", "[1, 1]", "[2, 1]"),
-    ):  # fmt: skip
+        ("plugin/shape.glsl", "1.0", "0.9"),
+        ("plugin/glow.frag", "* much", "* 0.5 * much"),
+        ("plugin/glow.py", "ONE)", "ONE * 0.5)"),
+        ("plugin/_strength.py", "0.5", "0.6"),
+        ("plugin/more/helpers.py", "1.0", "0.7"),
+        ("scene.yaml", "[1, 1]", "[2, 1]"),
+    ):
         file = tmp_path / name
         file.write_text(file.read_text().replace(old, new))
         assert drawn() == 2, name

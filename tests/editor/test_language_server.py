@@ -27,10 +27,13 @@ ROOT = Path(__file__).parents[2]
 PATIENCE = 60.0  # seconds for one answer: node starts slowly on a busy machine
 SETTINGS = {
     "yaml": {
-        "validate": True, "hover": True, "completion": True, "yamlVersion": "1.2",
+        "validate": True,
+        "hover": True,
+        "completion": True,
+        "yamlVersion": "1.2",
         "schemaStore": {"enable": False},  # or every file would be looked up on the net
     }
-}  # fmt: skip
+}
 
 
 PIPELINE = """\
@@ -103,10 +106,18 @@ class Editor:
         self._said: queue.Queue[dict[str, Any] | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        self._ask("initialize", processId=os.getpid(), rootUri=None, capabilities={
-            "workspace": {"configuration": True},
-            "textDocument": {"hover": {"contentFormat": ["markdown"]}, "completion": {"completionItem": {"documentationFormat": ["markdown"]}}},
-        })  # fmt: skip
+        self._ask(
+            "initialize",
+            processId=os.getpid(),
+            rootUri=None,
+            capabilities={
+                "workspace": {"configuration": True},
+                "textDocument": {
+                    "hover": {"contentFormat": ["markdown"]},
+                    "completion": {"completionItem": {"documentationFormat": ["markdown"]}},
+                },
+            },
+        )
         self._tell("initialized")
 
     def close(self) -> None:

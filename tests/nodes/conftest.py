@@ -90,7 +90,16 @@ def shading_defines() -> Callable[..., dict[str, object]]:
 
     def make(shading: str, **more: object) -> dict[str, object]:
         table: dict[str, object] = {f"SHADING_{name}": number for name, number in SHADING.items()}
-        return table | {"SHADING": f"SHADING_{shading.upper()}", "SMITH_EXACT": 0, "SMITH_FAST": 1, "SMITH": 0,
-                        "MATERIAL_COUNT": 1} | more  # fmt: skip
+        return (
+            table
+            | {
+                "SHADING": f"SHADING_{shading.upper()}",
+                "SMITH_EXACT": 0,
+                "SMITH_FAST": 1,
+                "SMITH": 0,
+                "MATERIAL_COUNT": 1,
+            }
+            | more
+        )
 
     return make

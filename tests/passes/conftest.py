@@ -22,9 +22,13 @@ class Bench:
         self.session = session
 
     def pipeline(
-        self, text: str, *classes: type[Node], shaders: Mapping[str, str] | None = None, scene: str | None = None,
+        self,
+        text: str,
+        *classes: type[Node],
+        shaders: Mapping[str, str] | None = None,
+        scene: str | None = None,
         size: tuple[int, int] = (16, 8),
-    ) -> rg.Pipeline:  # fmt: skip
+    ) -> rg.Pipeline:
         """A pipeline of YAML text, with the classes as its only node types."""
         for name, source in (shaders or {}).items():
             (self.folder / name).write_text(source)

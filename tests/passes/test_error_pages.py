@@ -154,11 +154,19 @@ class Unfilled(Node):
 @pytest.mark.parametrize(
     ("code", "node"),
     [
-        ("RG420", Broken), ("RG421", Backwards), ("RG422", Feedback), ("RG423", Quoted), ("RG424", Borrower),
-        ("RG425", Both), ("RG426", Stores), ("RG429", Adds), ("RG433", Viewless), ("RG601", Early),
+        ("RG420", Broken),
+        ("RG421", Backwards),
+        ("RG422", Feedback),
+        ("RG423", Quoted),
+        ("RG424", Borrower),
+        ("RG425", Both),
+        ("RG426", Stores),
+        ("RG429", Adds),
+        ("RG433", Viewless),
+        ("RG601", Early),
         ("RG603", Unfilled),
     ],
-)  # fmt: skip
+)
 def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
     shaders = {"a.frag": "out vec4 color; void main() { color = vec4(1.0); }"}
     text = f"nodes:\n        a: {{type: {node.__name__.lower()}}}\noutputs: {{image: a.color}}"

@@ -104,9 +104,16 @@ class Maps(Node):
 
     views = Views(count=lambda node, facts: len(_spots(facts)), lights=lambda node, facts: _spots(facts), doc="Views.")
     shadow_map = Output(
-        ShadowMap, kind="texture2d_array", format="depth32f", size=(4, 4), clear=0.25, view="views",
-        layers=lambda node, facts: len(_spots(facts)), lights=lambda node, facts: _spots(facts), doc="Depth.",
-    )  # fmt: skip
+        ShadowMap,
+        kind="texture2d_array",
+        format="depth32f",
+        size=(4, 4),
+        clear=0.25,
+        view="views",
+        layers=lambda node, facts: len(_spots(facts)),
+        lights=lambda node, facts: _spots(facts),
+        doc="Depth.",
+    )
 
     def record(self, steps: Steps) -> None:
         steps.clear(self.shadow_map, 0.25)

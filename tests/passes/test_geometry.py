@@ -22,7 +22,7 @@ from rendergraph.api import (
     View,
     Views,
     structural,
-)  # fmt: skip
+)
 from rendergraph.api import Frame as FrameOfNode
 from rendergraph.errors import InputError
 
@@ -124,9 +124,14 @@ class Behind(Node):
     def record(self, steps: Steps) -> None:
         steps.fullscreen("shown.frag", out=self.color, depth=self.depth)
         steps.geometry(
-            "ids.frag", out=self.color, objects="all", materials="none", depth=self.depth.tested(), view=self.depth,
+            "ids.frag",
+            out=self.color,
+            objects="all",
+            materials="none",
+            depth=self.depth.tested(),
+            view=self.depth,
             state=State(depth_write=False, depth_func="less"),
-        )  # fmt: skip
+        )
 
 
 class Back(Node):
@@ -261,9 +266,15 @@ orbit: {camera: main, degrees_per_second: 180}
     text = "nodes: {b: {type: blended}}\noutputs: {image: b.color}"
     seen: list[float] = []
     draw(
-        text, Blended, shaders=BLEND, scene=scene, size=(8, 8), frames=range(1, 3), fps=1.0,
+        text,
+        Blended,
+        shaders=BLEND,
+        scene=scene,
+        size=(8, 8),
+        frames=range(1, 3),
+        fps=1.0,
         on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])),
-    )  # fmt: skip
+    )
     assert seen == [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2]
 
 
@@ -294,6 +305,14 @@ keyframes: {objects.a.at: {0: [0, 0, -1], 1: [0, 0, 1]}}
 cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 50}}
 """
     seen: list[float] = []
-    draw("nodes: {b: {type: blended}}\noutputs: {image: b.color}", Blended, shaders=BLEND, scene=scene, size=(8, 8),
-         frames=range(1, 3), fps=1.0, on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])))  # fmt: skip
+    draw(
+        "nodes: {b: {type: blended}}\noutputs: {image: b.color}",
+        Blended,
+        shaders=BLEND,
+        scene=scene,
+        size=(8, 8),
+        frames=range(1, 3),
+        fps=1.0,
+        on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])),
+    )
     np.testing.assert_allclose(seen, [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2])

@@ -83,8 +83,14 @@ def test_history_goes_back_a_frame_whichever_are_drawn_and_however_few_units_the
     seen: list[list[float]] = []
     text = "nodes: {c: {type: counter}}\noutputs: {image: c.color}"
     size = (8, 8 if units is None else 9)  # another plan, so that it is compiled anew
-    draw(text, Counter, shaders=SHADERS, size=size, frames=range(2, 9, 2),
-         on_frame=lambda frame: seen.append(frame["image"][0, 0].tolist()))  # fmt: skip
+    draw(
+        text,
+        Counter,
+        shaders=SHADERS,
+        size=size,
+        frames=range(2, 9, 2),
+        on_frame=lambda frame: seen.append(frame["image"][0, 0].tolist()),
+    )
     assert seen == [[6, 5], [7, 6], [8, 7], [9, 8]]
 
 

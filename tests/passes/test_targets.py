@@ -205,9 +205,13 @@ def test_stencil_marks_where_the_next_step_draws(draw: Draw) -> None:
         def record(self, steps: Steps) -> None:
             mark = StencilFace(func="always", reference=1, depth_pass="replace")
             steps.draw(
-                None, vertex="triangle.vert", vertices=3, out=self.marks, height=0.0,
+                None,
+                vertex="triangle.vert",
+                vertices=3,
+                out=self.marks,
+                height=0.0,
                 state=State(stencil=Stencil(mark), depth_write=False),
-            )  # fmt: skip
+            )
             for value, func in ((1.0, "equal"), (2.0, "notequal")):
                 test = State(stencil=Stencil(StencilFace(func=func, reference=1)))  # type: ignore[arg-type]
                 steps.fullscreen(

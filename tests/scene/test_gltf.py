@@ -64,14 +64,30 @@ def with_arrays(*arrays: tuple[np.ndarray, str, int, dict[str, Any]], **parts: A
 
 
 ASSETS = [
-    "AlphaBlendModeTest.glb", "AnisotropyStrengthTest.glb", "Box/Box.gltf", "BoxInterleaved.glb", "BoxTextured.glb",
-    "BoxVertexColors.glb", "Cameras/Cameras.gltf", "DamagedHelmet.glb", "EmissiveStrengthTest.glb",
-    "LightsPunctualLamp/LightsPunctualLamp.gltf", "MetalRoughSpheresNoTextures.glb", "NormalTangentTest.glb",
-    "SimpleInstancing.glb", "SimpleMeshes.gltf", "SimpleSparseAccessor/SimpleSparseAccessor.gltf",
-    "Suzanne/Suzanne.gltf", "TextureCoordinateTest.glb", "TextureSettingsTest.glb",
-    "TextureTransformTest/TextureTransformTest.gltf", "TriangleWithoutIndices/TriangleWithoutIndices.gltf",
-    "TwoSidedPlane/TwoSidedPlane.gltf", "UnlitTest.glb", "WaterBottle/WaterBottle.gltf",
-]  # fmt: skip
+    "AlphaBlendModeTest.glb",
+    "AnisotropyStrengthTest.glb",
+    "Box/Box.gltf",
+    "BoxInterleaved.glb",
+    "BoxTextured.glb",
+    "BoxVertexColors.glb",
+    "Cameras/Cameras.gltf",
+    "DamagedHelmet.glb",
+    "EmissiveStrengthTest.glb",
+    "LightsPunctualLamp/LightsPunctualLamp.gltf",
+    "MetalRoughSpheresNoTextures.glb",
+    "NormalTangentTest.glb",
+    "SimpleInstancing.glb",
+    "SimpleMeshes.gltf",
+    "SimpleSparseAccessor/SimpleSparseAccessor.gltf",
+    "Suzanne/Suzanne.gltf",
+    "TextureCoordinateTest.glb",
+    "TextureSettingsTest.glb",
+    "TextureTransformTest/TextureTransformTest.gltf",
+    "TriangleWithoutIndices/TriangleWithoutIndices.gltf",
+    "TwoSidedPlane/TwoSidedPlane.gltf",
+    "UnlitTest.glb",
+    "WaterBottle/WaterBottle.gltf",
+]
 
 
 @pytest.mark.parametrize("name", ASSETS)
@@ -139,9 +155,10 @@ def test_strips_and_fans(tmp_path: Path) -> None:
     square = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32)
     for mode, order in ((5, [0, 1, 2, 3]), (6, [0, 1, 3, 2])):
         top = with_arrays(
-            (square, "VEC3", 5126, {}), (np.array(order, np.uint8), "SCALAR", 5121, {}),
+            (square, "VEC3", 5126, {}),
+            (np.array(order, np.uint8), "SCALAR", 5121, {}),
             meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": mode}]}],
-        )  # fmt: skip
+        )
         mesh = read(tmp_path, top).meshes[0]
         assert len(mesh.indices) == 2
         assert np.allclose(mesh.normals, (0, 0, 1)), "both triangles have the same winding"
@@ -175,14 +192,18 @@ def test_sparse_accessor_without_a_view(tmp_path: Path) -> None:
         bufferViews=[{"buffer": 0, "byteLength": 4}, {"buffer": 0, "byteOffset": 4, "byteLength": 24}],
         accessors=[
             {
-                "componentType": 5126, "type": "VEC3", "count": 3,
+                "componentType": 5126,
+                "type": "VEC3",
+                "count": 3,
                 "sparse": {
-                    "count": 2, "indices": {"bufferView": 0, "componentType": 5123}, "values": {"bufferView": 1},
+                    "count": 2,
+                    "indices": {"bufferView": 0, "componentType": 5123},
+                    "values": {"bufferView": 1},
                 },
             }
         ],
         meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}],
-    )  # fmt: skip
+    )
     assert np.array_equal(read(tmp_path, top).meshes[0].positions, TRIANGLE)
 
 
@@ -312,13 +333,17 @@ def test_glb_and_what_follows_its_end(tmp_path: Path) -> None:
 
 
 BROKEN: dict[str, tuple[dict[str, Any], str]] = {
-    "index": (gltf(accessors=[gltf()["accessors"][0] | {"count": 2, "max": [1, 0, 0]}, gltf()["accessors"][1]]),
-              "RG305 .*index 2 is out of range; there are 2 vertices"),
+    "index": (
+        gltf(accessors=[gltf()["accessors"][0] | {"count": 2, "max": [1, 0, 0]}, gltf()["accessors"][1]]),
+        "RG305 .*index 2 is out of range; there are 2 vertices",
+    ),
     "accessor past its view": (gltf(accessors=[gltf()["accessors"][0] | {"count": 4}]), "needs 48 bytes"),
     "view past its buffer": (gltf(bufferViews=[{"buffer": 0, "byteLength": 360}]), "ends at byte 360"),
     "buffer shorter": (gltf(buffers=[{"byteLength": 99, "uri": uri(b"abc")}]), "truncated: 'byteLength' is 99"),
-    "accessor unused": (gltf(accessors=[*gltf()["accessors"], {"componentType": 1, "type": "VEC3", "count": 1}]),
-                        r"accessors\[2\]: 'componentType' 1"),
+    "accessor unused": (
+        gltf(accessors=[*gltf()["accessors"], {"componentType": 1, "type": "VEC3", "count": 1}]),
+        r"accessors\[2\]: 'componentType' 1",
+    ),
     "misaligned": (gltf(accessors=[gltf()["accessors"][0] | {"byteOffset": 2, "count": 2}]), "not aligned"),
     "stride": (gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 8}]), "stride of 8"),
     "min": (gltf(accessors=[gltf()["accessors"][0] | {"min": [0]}]), "'min' must be 3 numbers"),
@@ -342,7 +367,7 @@ BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "null": (gltf(meshes=None), "'meshes' is null"),
     "infinite place": (gltf(nodes=[{"scale": [1e308] * 3, "children": [1]}, {"scale": [1e308] * 3}]), "RG306"),
     "many": (gltf(accessors=[{"componentType": 5126, "type": "VEC3", "count": 4_000_000_000}]), "RG307 .*48,000,"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BROKEN)
@@ -380,18 +405,20 @@ def test_json_is_utf8(tmp_path: Path) -> None:
 
 def test_nan_in_any_accessor_is_found(tmp_path: Path) -> None:
     top = with_arrays(
-        (TRIANGLE, "VEC3", 5126, {}), (np.array([np.nan], np.float32), "SCALAR", 5126, {}),
+        (TRIANGLE, "VEC3", 5126, {}),
+        (np.array([np.nan], np.float32), "SCALAR", 5126, {}),
         meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}],
-    )  # fmt: skip
+    )
     with pytest.raises(InputError, match=r"RG306 accessors\[1\] holds NaN"):
         read(tmp_path, top)
 
 
 def test_zero_normals_are_computed_and_said(tmp_path: Path) -> None:
     top = with_arrays(
-        (TRIANGLE, "VEC3", 5126, {}), (np.zeros((3, 3), np.float32), "VEC3", 5126, {}),
+        (TRIANGLE, "VEC3", 5126, {}),
+        (np.zeros((3, 3), np.float32), "VEC3", 5126, {}),
         meshes=[{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}}]}],
-    )  # fmt: skip
+    )
     scene = read(tmp_path, top)
     assert np.allclose(scene.meshes[0].normals, (0, 0, 1))
     assert "3 normals of length zero" in str(scene.warnings[0])

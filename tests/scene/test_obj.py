@@ -245,7 +245,11 @@ illum 1
     scene = read(tmp_path, text, mtl)
     phong, pbr, matt = scene.materials
     assert (phong.ambient, phong.diffuse, phong.specular_phong, phong.shininess) == (
-        (0.1, 0.1, 0.1), (0.2, 0.3, 0.7), (0.4, 0.4, 0.4), 12)  # fmt: skip
+        (0.1, 0.1, 0.1),
+        (0.2, 0.3, 0.7),
+        (0.4, 0.4, 0.4),
+        12,
+    )
     assert phong.base_color == (0.2, 0.3, 0.7, 0.5)
     assert phong.alpha_mode == "blend"
     alpha = phong.roughness**2

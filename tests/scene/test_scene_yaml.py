@@ -171,7 +171,7 @@ WRONG = {
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {a: [1, 2, 3]}}": "'a' is no time in seconds",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {}}": "are empty, not a mapping of seconds to values",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {1: null}}": "keyframe 1 s of 'cameras.m.eye' has no value",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", WRONG)

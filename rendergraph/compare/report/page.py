@@ -20,7 +20,7 @@ from rendergraph.compare.report.parts import (
     shown,
     software_note,
     table,
-)  # fmt: skip
+)
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.values import Comparison, Result, machine
 from rendergraph.diff import diff, diff_svg, diff_text
@@ -87,15 +87,20 @@ def sweep_page(found: Sweep, command: str) -> str:
         comparison,
         [
             section("axes", "Axes", axes, saved),
-            section("quality", "Quality against time", drawing(quality_svg(comparison, front), _QUALITY),
-                    _front_words(front), software_note(comparison.software)),
+            section(
+                "quality",
+                "Quality against time",
+                drawing(quality_svg(comparison, front), _QUALITY),
+                _front_words(front),
+                software_note(comparison.software),
+            ),
             section("summary", "Runs", _summary(comparison, front=front), software_note(comparison.software)),
             section("pictures", "Pictures", _viewer(comparison), _sheet(comparison)),
             section("passes", "Time of each pass", _passes(best), software_note(comparison.software)),
             section("memory", "Memory", _memory(best)),
         ],
         command,
-    )  # fmt: skip
+    )
 
 
 def _page(title: str, comparison: Comparison, sections: Sequence[str], command: str) -> str:
@@ -136,8 +141,21 @@ def _page(title: str, comparison: Comparison, sections: Sequence[str], command: 
 
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
     plugins = list(dict.fromkeys(name for result in comparison.results for name in result.metrics.plugins))
-    heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", *(f"#{name}" for name in plugins), "#light RMSE", "#GPU ms",
-             "#CPU ms", "#frame ms", "#passes", "#textures", ""]  # fmt: skip
+    heads = [
+        "",
+        "#FLIP",
+        "#RMSE",
+        "#PSNR dB",
+        "#SSIM",
+        *(f"#{name}" for name in plugins),
+        "#light RMSE",
+        "#GPU ms",
+        "#CPU ms",
+        "#frame ms",
+        "#passes",
+        "#textures",
+        "",
+    ]
     whole = any(result.times.frame_ms for result in comparison.results)
     heads = heads if whole else [head for head in heads if head != "#frame ms"]
     most = max(result.times.headline.median for result in comparison.results)
@@ -321,10 +339,15 @@ def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
         time = result.times.headline
         points.append(
             Point(
-                result.name, " · ".join(result.settings.values()) or result.name, time.median, time.p10, time.p90,
-                result.metrics.flip, result.name in best,
+                result.name,
+                " · ".join(result.settings.values()) or result.name,
+                time.median,
+                time.p10,
+                time.p90,
+                result.metrics.flip,
+                result.name in best,
             )
-        )  # fmt: skip
+        )
     kind = "GPU" if results[0].times.gpu_ms else "frame"
     note = ", software rasteriser" if comparison.software else ""
     return scatter_svg(points, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")

@@ -23,9 +23,13 @@ from rendergraph.api import (
 from rendergraph.api import Any as AnyTexel
 
 WEIGHT = Signature(
-    name="weight", declaration="vec3 weight(vec2 uv, int n)", arguments=("uv", "n"), combine="*", neutral="vec3(1.0)",
+    name="weight",
+    declaration="vec3 weight(vec2 uv, int n)",
+    arguments=("uv", "n"),
+    combine="*",
+    neutral="vec3(1.0)",
     doc="A weight.",
-)  # fmt: skip
+)
 
 
 class Zoo(Node):
@@ -54,10 +58,18 @@ class Zoo(Node):
     def record(self, steps: Steps) -> None:
         """Steps of every kind."""
         steps.fullscreen(
-            "zoo.frag", out={"result": self.result, "past": self.past}, sky=self.sky, layers=self.layers,
-            samples=self.samples, many=self.many, shadow_map=self.shadow_map, depth=self.depth, words=self.words,
-            weights=self.weights, before=self.past.previous,
-        )  # fmt: skip
+            "zoo.frag",
+            out={"result": self.result, "past": self.past},
+            sky=self.sky,
+            layers=self.layers,
+            samples=self.samples,
+            many=self.many,
+            shadow_map=self.shadow_map,
+            depth=self.depth,
+            words=self.words,
+            weights=self.weights,
+            before=self.past.previous,
+        )
         steps.fullscreen("zoo_add.frag", out=self.lit, state=State(blend=ADD), result=self.result)
         steps.fullscreen("zoo_mark.frag", out=self.marks, result=self.result)
         steps.compute("zoo.comp", groups=(1, 1, 1), out=self.numbers, result=self.result)

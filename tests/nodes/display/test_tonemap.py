@@ -55,9 +55,14 @@ def hable(c: Floats) -> Floats:
 
 
 CURVES: dict[str, Any] = {
-    "neutral": neutral, "aces": aces, "reinhard": lambda c: c / (1 + c), "none": lambda c: c, "hable": hable,
-    "reinhard_luminance": lambda c: c / (1 + luminance(c)), "reinhard_extended": extended,
-}  # fmt: skip
+    "neutral": neutral,
+    "aces": aces,
+    "reinhard": lambda c: c / (1 + c),
+    "none": lambda c: c,
+    "hable": hable,
+    "reinhard_luminance": lambda c: c / (1 + luminance(c)),
+    "reinhard_extended": extended,
+}
 
 
 def srgb(c: Floats) -> Floats:
@@ -90,9 +95,13 @@ outputs: {{image: display.color}}"""
 PLAIN = """  display: {{type: float_tonemap, inputs: {{radiance: picture.radiance}}, params: {{{0}}}}}
 outputs: {{image: display.color}}"""
 REFERENCE = {
-    "reinhard": "reinhard_channel", "reinhard_luminance": "reinhard_luminance", "aces": "aces_fit", "hable": "hable",
-    "reinhard_extended": "reinhard_extended_luminance", "none": "exposed",
-}  # fmt: skip
+    "reinhard": "reinhard_channel",
+    "reinhard_luminance": "reinhard_luminance",
+    "aces": "aces_fit",
+    "hable": "hable",
+    "reinhard_extended": "reinhard_extended_luminance",
+    "none": "exposed",
+}
 
 
 @pytest.mark.parametrize("curve", REFERENCE)

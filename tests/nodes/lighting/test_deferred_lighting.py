@@ -89,8 +89,10 @@ def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shad
 
 
 def test_the_fast_visibility(radiance: Any, steps_off: Any) -> None:
-    pictures = [radiance(name, "spheres", "light.smith=fast", *more) for name, more in
-                (("deferred", [FULL]), ("forward-prepass", []))]  # fmt: skip
+    pictures = [
+        radiance(name, "spheres", "light.smith=fast", *more)
+        for name, more in (("deferred", [FULL]), ("forward-prepass", []))
+    ]
     same(steps_off(*pictures))
 
 
@@ -165,10 +167,11 @@ def test_compact_is_off_by_half_a_step_of_eight_bit_base_colour(session: rg.Sess
     draw = {
         precision: session.render(
             rg.load("deferred", scene=scene, size=(120, 90), sets=[f"gbuffer.precision={precision}"]),
-            outputs=["radiance"], taps=["gbuffer.albedo", "gbuffer.emissive"],
+            outputs=["radiance"],
+            taps=["gbuffer.albedo", "gbuffer.emissive"],
         )
         for precision in ("compact", "full")
-    }  # fmt: skip
+    }
     full, compact = (np.asarray(draw[name]["radiance"], np.float64)[..., :3] for name in ("full", "compact"))
     base = np.asarray(draw["full"]["gbuffer.albedo"], np.float64)[..., :3]
     emitted = np.asarray(draw["full"]["gbuffer.emissive"], np.float64)[..., :3]

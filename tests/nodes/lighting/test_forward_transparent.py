@@ -102,9 +102,20 @@ def test_shadows_fall_on_panes(radiance: Any, tmp_path: Path, pipeline: str) -> 
 
 def test_occlusion_is_that_of_the_surface_behind(radiance: Any, tmp_path: Path) -> None:
     """An opaque pane that is blended: nothing of what is known of the corners behind it shows."""
-    lines = shipped_scenes()["stairs"].read_text().replace("lights:", """  sheet: {base_color: [0.5, 0.5, 0.5, 1], alpha_mode: blend}
-lights:""").replace("materials:", """  sheet: {shape: plane, size: [3, 3], at: [1.7, 1.8, 2.3], rotate_degrees: [90, 34, 0], material: sheet}
-materials:""")  # fmt: skip
+    lines = (
+        shipped_scenes()["stairs"]
+        .read_text()
+        .replace(
+            "lights:",
+            """  sheet: {base_color: [0.5, 0.5, 0.5, 1], alpha_mode: blend}
+lights:""",
+        )
+        .replace(
+            "materials:",
+            """  sheet: {shape: plane, size: [3, 3], at: [1.7, 1.8, 2.3], rotate_degrees: [90, 34, 0], material: sheet}
+materials:""",
+        )
+    )
     (tmp_path / "sheet.yaml").write_text(lines)
     picture = radiance("ssao-disc", tmp_path / "sheet.yaml", "light.terms=ambient", "gbuffer.precision=full")
     sheet = np.abs(picture[..., :3] - 0.015).max(-1) < 1e-5

@@ -36,9 +36,12 @@ def occlusion(tmp_path: Path, session: rg.Session) -> Occlusion:
             file.write_text("scene: 1\n" + scene)
             scene = file
         pipeline = rg.load(
-            f"ssao-{technique}", scene=scene, size=size, sets=[f"ao.{name}={value}" for name, value in params.items()],
+            f"ssao-{technique}",
+            scene=scene,
+            size=size,
+            sets=[f"ao.{name}={value}" for name, value in params.items()],
             patches=[{"outputs": {"occlusion": "ao.occlusion"}}],
-        )  # fmt: skip
+        )
         frame = session.render(pipeline, outputs=["occlusion"])
         with session.device.current():
             assert session.device.raw.error() is None

@@ -52,9 +52,10 @@ def test_disc_occlusion(evaluate: Evaluate) -> None:
     r, area = rng.uniform(0.01, 3, 500), rng.uniform(1e-4, 4, 500)
     emitter, receiver = rng.uniform(-1, 1, 500), rng.uniform(-1, 1, 500)
     found = evaluate(
-        "disc_to_disc.glsl", {"r": r, "area": area, "emitter": emitter, "receiver": receiver},
+        "disc_to_disc.glsl",
+        {"r": r, "area": area, "emitter": emitter, "receiver": receiver},
         "result.x = disc_occlusion(r, area, emitter, receiver);",
-    )[:, 0]  # fmt: skip
+    )[:, 0]
     share = 1 - r / np.sqrt(area / np.pi + r**2)
     expected = share * np.maximum(emitter, 0) * np.minimum(np.maximum(4 * receiver, 0), 1)
     np.testing.assert_allclose(found, expected, atol=2e-6)

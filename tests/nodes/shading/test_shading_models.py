@@ -105,10 +105,14 @@ def test_no_white_surface_reflects_more_than_it_gets(
         for cosine in (0.2, 0.6, 1.0):
             ones = np.ones((len(light), 1))
             given = {
-                "n": ones * [0.0, 0, 1], "v": ones * [np.sqrt(1 - cosine**2), 0, cosine], "l": light,
-                "t": ones * [1.0, 0, 0], "b": ones * [0.0, 1, 0], "base": ones * [1.0, 1, 1],
+                "n": ones * [0.0, 0, 1],
+                "v": ones * [np.sqrt(1 - cosine**2), 0, cosine],
+                "l": light,
+                "t": ones * [1.0, 0, 0],
+                "b": ones * [0.0, 1, 0],
+                "base": ones * [1.0, 1, 1],
                 "surface": ones * [1.0, roughness, 0.7, 1],
-            }  # fmt: skip
+            }
             found = evaluate("shading.glsl", given, SPECULAR, shading_defines(shading))[:, 0]
             assert found.mean() * 2 * np.pi < 1.002
 

@@ -66,9 +66,12 @@ def look(session: rg.Session) -> Callable[..., Looked]:
     """Draw a pipeline with neither bias nor offset and say what its shadow node read."""
 
     def run(
-        pipeline: str, *sets: str, scene: str | Path | None = None, size: tuple[int, int] = (96, 64),
+        pipeline: str,
+        *sets: str,
+        scene: str | Path | None = None,
+        size: tuple[int, int] = (96, 64),
         resolution: int = 128,
-    ) -> Looked:  # fmt: skip
+    ) -> Looked:
         fixed = ("shadows.bias=0", "shadows.normal_offset=0", f"sun.resolution={resolution}")
         loaded = rg.load(pipeline, size=size, scene=scene, sets=(*fixed, *sets))
         taps = ("sun.shadow_map", "shadows.visibility", "gbuffer.depth")
@@ -93,9 +96,14 @@ def look(session: rg.Session) -> Callable[..., Looked]:
             return np.asarray((distance - view.near) / (view.far - view.near))
 
         return Looked(
-            visibility[0], depth[0], np.where(depth[0] == 1, 1.0, linear(depth[0])), places,
-            linear(np.minimum(places[..., 2], 1.0)), world[..., :3], seen < 1,
-        )  # fmt: skip
+            visibility[0],
+            depth[0],
+            np.where(depth[0] == 1, 1.0, linear(depth[0])),
+            places,
+            linear(np.minimum(places[..., 2], 1.0)),
+            world[..., :3],
+            seen < 1,
+        )
 
     return run
 

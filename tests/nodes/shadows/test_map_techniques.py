@@ -51,8 +51,9 @@ def test_narrow_filters_are_the_ray_cast_shadow(session: rg.Session, shared: Pat
     assert np.abs(seen - (masks["cls"] == 1))[judged].mean() <= 2e-3
 
 
-@pytest.mark.parametrize(("kind", "name", "widths"), [("shadow_pcf", "taps", (16, 8, 4, 2)),
-                                                      ("shadow_vsm", "radius", (8, 4, 2, 0))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "name", "widths"), [("shadow_pcf", "taps", (16, 8, 4, 2)), ("shadow_vsm", "radius", (8, 4, 2, 0))]
+)
 def test_filters_that_shrink_lead_to_the_same_hard_shadow(look: Any, kind: str, name: str, widths: Any) -> None:
     """Narrower and narrower in texels, then in metres."""
     size = (192, 128)
@@ -125,8 +126,9 @@ def test_several_lights_are_the_sum_of_each(session: rg.Session, tmp_path: Path,
         assert together.max() > 0.5
         wrong = np.abs(together - sum(alone)) > together.max() / 255
         assert wrong.mean() <= 1e-3
-    unshadowed = rg.load("forward", scene=stage(tmp_path, *LIGHTS), size=(160, 120),
-                         sets=("light.lookup=null", "light.ambient=0"))  # fmt: skip
+    unshadowed = rg.load(
+        "forward", scene=stage(tmp_path, *LIGHTS), size=(160, 120), sets=("light.lookup=null", "light.ambient=0")
+    )
     bare = np.asarray(session.render(unshadowed, warm_up=False)["radiance"][..., :3], np.float64)
     assert np.mean(bare - together > 0.02 * bare.max()) > 0.05
 

@@ -22,10 +22,14 @@ def brute_force(
 ) -> Floats:
     """The mean of bilinear tests at offsets in texels, (n, 2) or (…, n, 2)."""
     each = [
-        bilinear(depth, places[..., 0] + o[..., 0] / depth.shape[1], places[..., 1] + o[..., 1] / depth.shape[0],
-                 np.minimum(places[..., 2], 1.0))
+        bilinear(
+            depth,
+            places[..., 0] + o[..., 0] / depth.shape[1],
+            places[..., 1] + o[..., 1] / depth.shape[0],
+            np.minimum(places[..., 2], 1.0),
+        )
         for o in np.moveaxis(offsets, -2, 0)
-    ]  # fmt: skip
+    ]
     return np.average(each, axis=0, weights=weights)
 
 
@@ -47,10 +51,20 @@ def test_brute_force_is_the_reference(shared: Path, bilinear: Bilinear, taps: in
 
 @pytest.mark.parametrize(
     ("kernel", "taps", "edges"),
-    [("box", 2, "false"), ("box", 3, "true"), ("box", 4, "false"), ("box", 16, "true"), ("tent", 2, "false"),
-     ("tent", 5, "true"), ("tent", 16, "false"), ("poisson", 4, "false"), ("poisson", 16, "true"),
-     ("rotated", 3, "true"), ("rotated", 12, "false")],
-)  # fmt: skip
+    [
+        ("box", 2, "false"),
+        ("box", 3, "true"),
+        ("box", 4, "false"),
+        ("box", 16, "true"),
+        ("tent", 2, "false"),
+        ("tent", 5, "true"),
+        ("tent", 16, "false"),
+        ("poisson", 4, "false"),
+        ("poisson", 16, "true"),
+        ("rotated", 3, "true"),
+        ("rotated", 12, "false"),
+    ],
+)
 def test_each_kernel_is_the_mean_of_its_tests(
     look: Any, bilinear: Bilinear, poisson_disc: Floats, kernel: str, taps: int, edges: str
 ) -> None:

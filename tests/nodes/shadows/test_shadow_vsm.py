@@ -23,8 +23,9 @@ def test_the_bound_on_given_moments(glsl_function: Callable[..., float], shared:
     for case in cases:
         call = f"share_behind(vec2({case['mean']!r}, {case['mean_square']!r}), {case['receiver']!r})"
         for bleeding, expected in ((0.0, case["p"]), (case["p_min"], case["p_reduced"])):
-            found = glsl_function("shadow_vsm.glsl", "share_behind", call, min_variance=case["min_variance"],
-                                  light_bleeding=bleeding)  # fmt: skip
+            found = glsl_function(
+                "shadow_vsm.glsl", "share_behind", call, min_variance=case["min_variance"], light_bleeding=bleeding
+            )
             assert found == pytest.approx(expected, rel=2e-3, abs=1e-5)
 
 
@@ -35,12 +36,19 @@ def test_the_filter_is_the_reference(shared: Path, boxed: Callable[[Floats, int]
         np.testing.assert_allclose(boxed(maps["vsm_depth"] ** power, 7), expected, atol=1e-6)
 
 
-@pytest.mark.parametrize(("scene", "radius"), [("shadow_study", 7), ("shadow_study", 2), ("shadow_study", 0),
-                                              ("cornell_box", 4)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("scene", "radius"), [("shadow_study", 7), ("shadow_study", 2), ("shadow_study", 0), ("cornell_box", 4)]
+)
 def test_the_whole_chain_in_numpy(look: Any, boxed: Any, bilinear: Any, scene: str, radius: int) -> None:
     """Moments of the map that was drawn, blurred, interpolated, bounded: under a sun and under a spot light."""
-    seen = look("shadow-vsm", f"shadows.radius={radius}", "shadows.min_variance=1e-4", "shadows.light_bleeding=0.2",
-                scene=scene, resolution=512)  # fmt: skip
+    seen = look(
+        "shadow-vsm",
+        f"shadows.radius={radius}",
+        "shadows.min_variance=1e-4",
+        "shadows.light_bleeding=0.2",
+        scene=scene,
+        resolution=512,
+    )
     there = (seen.depth < 1).astype(float)
     u, v, t = seen.places[..., 0], seen.places[..., 1], seen.receiver
     mean, square, covered = (
@@ -79,8 +87,14 @@ def test_light_bleeds_under_two_casters_as_much_as_it_must(look: Any, tmp_path: 
     (tmp_path / "two.yaml").write_text(TWO_CASTERS)
 
     def beneath(bleeding: float) -> Floats:
-        seen = look("shadow-vsm", f"shadows.light_bleeding={bleeding}", "shadows.radius=7", size=(240, 60),
-                    scene=tmp_path / "two.yaml", resolution=256)  # fmt: skip
+        seen = look(
+            "shadow-vsm",
+            f"shadows.light_bleeding={bleeding}",
+            "shadows.radius=7",
+            size=(240, 60),
+            scene=tmp_path / "two.yaml",
+            resolution=256,
+        )
         floor = (
             seen.seen & (np.abs(seen.position[..., 1]) < 1e-3) & np.all(np.abs(seen.position[..., ::2]) < 1, axis=-1)
         )
