@@ -158,11 +158,11 @@ class Entries:
         for found in self._outs:
             if "location" in found.layout:
                 try:
-                    number = self.globals.value(found.layout["location"])
+                    number = self.globals.number(found.layout["location"])
                 except ValueError as error:
-                    self.say("RG441", f"the location of '{found.name}': {error}; leave the layout out", found)
+                    self.say("RG441", f"the location of '{found.name}': {error}, or leave the layout out", found)
                     continue
-                located[int(number) if isinstance(number, int) else -1] = self._renamed.get(found.name, found.name)
+                located[number] = self._renamed.get(found.name, found.name)
         if not located:
             return []
         if sorted(located) != list(range(len(self._outs))):
@@ -307,7 +307,7 @@ class Entries:
     def _add_parameter(self, name: str, entry: Mapping[str, Value]) -> None:
         plain = (found for found in self.globals.declared if found.type in _SCALAR or _VECTOR.match(found.type))
         known = [found.name for found in plain if found.storage == "uniform"]
-        reader = Parameter(name, entry, self.header.names.get(name), self.declared.get(name), self.globals, self._words)
+        reader = Parameter(name, entry, self.header.names.get(name), self.declared.get(name), self._words)
         field = reader.field([other for other in known if other not in self.header.names])
         self.problems += reader.problems
         for text in reader.said:

@@ -10,7 +10,8 @@ from typing import Any, Literal
 from rendergraph.declare import define, param, structural
 from rendergraph.document import Value
 from rendergraph.errors import Problem, suggestion
-from rendergraph.glsl.globals import Global, Globals
+from rendergraph.glsl.globals import Global
+from rendergraph.glsl.literals import literal
 
 _SCALAR: dict[str, type] = {"float": float, "int": int, "uint": int, "bool": bool}
 _VECTOR = re.compile(r"([iu]?)vec([234])\Z")
@@ -32,17 +33,15 @@ class Parameter:
         entry: Mapping[str, Value],
         named: Value | None,
         found: Global | None,
-        known: Globals,
         words: Set[str],
     ) -> None:
-        """Args are the name, the header's keys, its entry where there is one, the declaration with its file's, and
-        all words of the text.
+        """Args are the name, the header's keys, its entry where there is one, the declaration, and all words of
+        the text.
         """
         self.name = name
         self.entry = entry
         self.named = named
         self.found = found
-        self.globals = known
         self.words = words
         self.problems: list[Problem] = []
         self.said: list[tuple[str, str]] = []
@@ -130,9 +129,9 @@ class Parameter:
             value = self.entry["default"].plain()
         elif found.initialiser:
             try:
-                value = self.globals.value(found.initialiser)
+                value = literal(found.initialiser)
             except ValueError as error:
-                text = f"the initialiser of '{self.name}' cannot be worked out: {error}; give its default in a header"
+                text = f"the initialiser of '{self.name}': {error}; write a number, or say its default in the header"
                 self.said.append(("RG442", text))
         parts = list(value) if isinstance(value, list | tuple) else [value] * count
         if len(parts) != count or not all(_fits(number, part) for number in parts):

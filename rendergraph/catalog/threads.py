@@ -56,11 +56,11 @@ def _local(entries: Entries, name: str) -> int:
     if words is None:
         return 1
     try:
-        value = entries.globals.value(words)
+        value = entries.globals.number(words)
     except ValueError as error:
-        entries.say("RG443", f"{name}: {error}; write a number", None)
+        entries.say("RG443", f"{name}: {error}", None)
         return 1
-    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 1024:
+    if 1 <= value <= 1024:
         return value
     entries.say("RG443", f"{name} is a whole number from 1 to 1024, not {value}", None)
     return 1

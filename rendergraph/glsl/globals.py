@@ -1,4 +1,4 @@
-"""The global `uniform`, `in`, `out` and `buffer` declarations of a text with their types, values and places. No GL.
+"""The global `uniform`, `in`, `out` and `buffer` declarations of a text, with initialisers and places. No GL.
 
 Like `names`, a scanner that also sees what stands inside `#if`: which branch is compiled depends on macros that only a
 pipeline knows.
@@ -10,10 +10,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rendergraph.glsl.constants import Constant, constant
 from rendergraph.glsl.names import TOKEN, Storage, declarators, head, statements, without_directives
 
-_MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\S.*)$", re.MULTILINE)
+_MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\d{1,9})[ \t]*$", re.MULTILINE)
 
 
 class Word(str):
@@ -37,7 +36,7 @@ class Global:
         array: whether it is an array.
         qualifiers: `readonly`, `flat`, …
         layout: `location`, `binding`, … with the text behind `=`, empty for words alone (`rgba16f`).
-        initialiser: tokens behind `=`, empty where there is none.
+        initialiser: the text behind `=`, empty where there is none.
     """
 
     storage: Storage
@@ -47,7 +46,7 @@ class Global:
     array: bool = False
     qualifiers: frozenset[str] = frozenset()
     layout: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    initialiser: tuple[str, ...] = ()
+    initialiser: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,31 +55,34 @@ class Globals:
 
     Attributes:
         declared: in the order of the text; a name that stands in several branches of an `#if` is there once.
-        constants: values of macros and `const` variables that are numbers.
+        numbers: macros that are a whole number.
         input_layout: the words of `layout(…) in;`, such as `local_size_x`.
     """
 
     declared: tuple[Global, ...]
-    constants: Mapping[str, Constant]
+    numbers: Mapping[str, int]
     input_layout: Mapping[str, tuple[str, ...]]
 
-    def value(self, words: Sequence[str]) -> Constant:
-        """The value of a constant expression of this text.
+    def number(self, words: Sequence[str]) -> int:
+        """The whole number behind a layout's `=`: written there, or `#define`d as one.
 
         Raises:
-            ValueError: it is more than numbers.
+            ValueError: it is neither.
         """
-        return constant(words, self.constants)
+        text = "".join(words)
+        if re.fullmatch(r"\d{1,9}", text):
+            return int(text)
+        if text not in self.numbers:
+            raise ValueError(f"'{text}' is no number, nor a macro that is one; write a number")
+        return self.numbers[text]
 
 
 def globals_of(text: str) -> Globals:
     """What a text without comments declares."""
-    constants: dict[str, Constant] = {}
-    for macro in _MACRO.finditer(text):
-        _learn(constants, macro[1], TOKEN.findall(macro[2]))
+    plain = without_directives(text)
     found: dict[str, Global] = {}
     input_layout: dict[str, tuple[str, ...]] = {}
-    for statement, body in statements(_words(without_directives(text))):
+    for statement, body in statements(_words(plain)):
         begin = head(statement)
         storage, rest, more = begin.storage, begin.rest, (begin.qualifiers, begin.layout)
         if storage == "in" and not rest:
@@ -90,19 +92,10 @@ def globals_of(text: str) -> Globals:
                 found.setdefault(rest[0], Global("buffer", "", str(rest[0]), _at(rest[0]), False, *more))
         elif storage and rest:
             for name, array, value in declarators(rest[1:]):
-                one = Global(storage, str(rest[0]), str(name), _at(name), array, *more, tuple(map(str, value)))
+                initialiser = plain[_at(value[0]) : _at(value[-1]) + len(value[-1])] if value else ""
+                one = Global(storage, str(rest[0]), str(name), _at(name), array, *more, initialiser)
                 found.setdefault(one.name, one)
-        elif "const" in begin.qualifiers and rest:
-            for name, _, value in declarators(rest[1:]):
-                _learn(constants, str(name), value)
-    return Globals(tuple(found.values()), constants, input_layout)
-
-
-def _learn(constants: dict[str, Constant], name: str, words: Sequence[str]) -> None:
-    try:
-        constants[name] = constant(words, constants)
-    except ValueError:
-        constants.pop(name, None)
+    return Globals(tuple(found.values()), {one[1]: int(one[2]) for one in _MACRO.finditer(text)}, input_layout)
 
 
 def _words(text: str) -> list[str]:

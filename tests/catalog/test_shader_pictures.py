@@ -40,7 +40,7 @@ void main() {
     darkened = vec4(seen.rgb * (1.0 - strength * corner), seen.a);
 }
 """
-PLAIN = "#version 330\nconst int POWER = 3;\n" + BODY.replace("0.5", "1.5 / 2.0").replace("darkened", "fragColor")
+PLAIN = "#version 330\nconst int POWER = 3;\n" + BODY.replace("0.5", "0.75").replace("darkened", "fragColor")
 
 
 def drawn(gl: rg.Session, folder: Path, files: Mapping[str, str], output: str = "image") -> npt.NDArray[np.float32]:

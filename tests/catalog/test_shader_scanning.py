@@ -16,9 +16,8 @@ from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Input, Made, Output
 from rendergraph.errors import InputError
 from rendergraph.glsl import strip_comments
-from rendergraph.glsl.constants import constant
 from rendergraph.glsl.globals import globals_of
-from rendergraph.glsl.names import tokens
+from rendergraph.glsl.literals import literal
 
 TAKEN = set("out uniform float int bool vec sampler half filter copy json schema image".split())  # noqa: SIM905 - as text
 WORDS = st.from_regex(r"\A[a-z]{3,8}\Z").filter(lambda word: word not in TAKEN)
@@ -50,24 +49,16 @@ def mistakes(folder: Path, text: str, name: str = "effect.frag") -> list[str]:
         ("0x1F", 31),
         ("-2", -2),
         ("true", True),
-        ("1.0 / 4.0", 0.25),
-        ("7 / 2", 3),
-        ("-7 / 2", -3),
-        ("2 * (3 + 4) - 1", 13),
-        ("- -1", 1),
+        ("- 1.5", -1.5),
         ("vec3(1)", (1.0, 1.0, 1.0)),
-        ("vec3(1.0, 2.0, 3.0)", (1.0, 2.0, 3.0)),
-        ("2.0 * vec2(1, 3)", (2.0, 6.0)),
-        ("vec4(vec2(1, 2), vec2(3, 4))", (1.0, 2.0, 3.0, 4.0)),
+        ("vec3(1.0, -2.0, 3e-1)", (1.0, -2.0, 0.3)),
+        ("vec2 ( 1 ,\n 2 )", (1.0, 2.0)),
         ("ivec2(1.9, -1.9)", (1, -1)),
-        ("float(3)", 3.0),
-        ("vec2(4, 9) / vec2(2, 3)", (2.0, 3.0)),
-        ("radius * 2.0", 3.0),
-        ("1e-3 - 1", -0.999),
+        ("uvec2(1u, 0x2u)", (1, 2)),
     ],
 )
-def test_constant_expressions(text: str, value: object) -> None:
-    found = constant(tokens(text), {"radius": 1.5})
+def test_literals(text: str, value: object) -> None:
+    found = literal(text)
     assert found == value
     assert type(found) is type(value)
 
@@ -76,42 +67,38 @@ def test_constant_expressions(text: str, value: object) -> None:
     "text",
     [
         "",
-        "unknown",
-        "1.0 /",
-        "1 / 0",
+        "other",
+        "1.0 / 4.0",
+        "2.0 * HALF",
+        "(1.0)",
+        "- -1",
         "vec3(1, 2)",
+        "vec4(vec2(1, 2), vec2(3, 4))",
+        "vec2(one, 2)",
+        "float(3)",
         "(1",
         "1 2",
-        "sin(1.0)",
-        "true + 1",
-        "vec2(1) + vec3(1)",
         "1e39",
-        "int(1e999)",
         "ivec2(1e999)",
-        "1e38 / 1e-9",
-        "1e30 * 1e30",
         "0x" + 40 * "f",
         40 * "9",
+        10_000 * "9",
     ],
 )
-def test_what_is_no_constant_is_refused(text: str) -> None:
+def test_what_is_no_literal_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"."):
-        constant(tokens(text))
+        literal(text)
 
 
-def test_everything_has_an_end() -> None:
-    with pytest.raises(ValueError, match="nested too deeply"):
-        constant(["("] * 1000)
-    with pytest.raises(ValueError, match="too long"):
-        constant(["1", "+"] * 10_000)
-    squares = "#define A0 99999\n" + "\n".join(f"#define A{n + 1} A{n}*A{n}" for n in range(100))
-    assert list(globals_of(squares).constants) == ["A0", "A1", "A2"]
+def test_a_macro_is_a_number_only_where_it_is_written_as_one() -> None:
+    text = "#define SIDE 8\n#define TWICE (2 * SIDE)\n # define  NONE 0 \n#define REAL 1.5\n"
+    assert globals_of(text).numbers == {"SIDE": 8, "NONE": 0}
 
 
 @given(st.floats(min_value=-1e30, max_value=1e30), st.sampled_from(["", "f", "F"]))
 def test_every_float_is_read_as_it_is_written(number: float, suffix: str) -> None:
     text = f"{number!r}{suffix}" if "." in repr(number) or "e" in repr(number) else f"{number!r}.0{suffix}"
-    found = constant(tokens(text))
+    found = literal(text)
     assert isinstance(found, float | int)
     assert math.isclose(found, number, rel_tol=0, abs_tol=0)
 
@@ -123,13 +110,11 @@ def test_ports_and_parameters_of_a_plain_shader(tmp_path: Path) -> None:
     found = load(
         tmp_path,
         """#version 330 core
-        #define HALF 0.5
-        const float both = 2.0 * HALF;
         uniform sampler2D color, other;
         uniform sampler2DShadow shadows; // a comment; uniform float no;
         layout(binding = 3) uniform usampler2DArray ids;
-        uniform float strength = both, plain;
-        uniform vec3 tint = vec3(1.0, HALF, 0.25);
+        uniform float strength = 1.0, plain;
+        uniform vec3 tint = vec3(1.0, 0.5, 0.25);
         uniform ivec2 axis = ivec2(1, 0);
         uniform uint count = 4u;
         uniform bool on = true;
@@ -300,10 +285,19 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
         ("out ivec2 c;", "1:11: RG441 no format holds the ivec2 of output 'c'; use uvec4 or int"),
         (
             "out vec4 c;\nuniform float a = other;",
-            "2:15: RG442 the initialiser of 'a' cannot be worked out: the value of 'other' is not known; "
-            "give its default in a header",
+            "2:15: RG442 the initialiser of 'a': it is no literal; write a number, or say its default in the header",
+        ),
+        (
+            "out vec4 c;\nuniform vec3 a = vec3(1, 2);",
+            "2:14: RG442 the initialiser of 'a': vec3 takes 1 or 3 numbers, not 2; write a number, or say its default "
+            "in the header",
         ),
         ("out vec4 c;\nuniform int a = 1.5;", "2:13: RG442 the default of 'a' (int) is a whole number, not 1.5"),
+        (
+            "layout(location = 1 + 0) out vec4 c;",
+            "1:35: RG441 the location of 'c': '1+0' is no number, nor a macro that is one; write a number, or leave the "
+            "layout out",
+        ),
         (
             "layout(location = 1) out vec4 c;",
             "1:31: RG441 locations of outputs go from 0 without gaps, for all or for none; leave the layouts out",
