@@ -5,15 +5,34 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from textwrap import dedent, indent
+from typing import Any
 
 import pytest
 
-if TYPE_CHECKING:
-    from rendergraph import Session
-    from rendergraph.catalog import Catalog
+import rendergraph as rg
+from rendergraph.api import Node
+from rendergraph.catalog import Catalog
+from rendergraph.errors import RendergraphError
+
+HEAD = '''"""A node of a stranger's."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy
+
+from rendergraph.api import *
+from rendergraph.api import Any as AnyTexel
+
+
+'''
+PIPELINE = "nodes:\n  a: {type: wrong}\noutputs: {image: a.color}\n"
+WHITE = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
 
 
 @pytest.fixture(scope="session")
@@ -26,10 +45,8 @@ def shared() -> Path:
 
 
 @pytest.fixture(scope="session")
-def gl() -> Iterator[Session]:
+def gl() -> Iterator[rg.Session]:
     """One GL session for all tests."""
-    import rendergraph as rg
-
     with rg.Session() as session:
         yield session
 
@@ -45,3 +62,98 @@ def toy_catalog() -> Catalog:
     spec.loader.exec_module(module)
     catalog: Catalog = module.CATALOG
     return catalog
+
+
+class Bench:
+    """Makes pipelines of node classes and shader texts, and draws them on the shared session."""
+
+    def __init__(self, folder: Path, session: rg.Session) -> None:
+        self.folder = folder
+        self.session = session
+
+    def pipeline(
+        self,
+        text: str,
+        *classes: type[Node],
+        shaders: Mapping[str, str] | None = None,
+        scene: str | None = None,
+        size: tuple[int, int] = (16, 8),
+    ) -> rg.Pipeline:
+        """A pipeline of YAML text, with the classes as its only node types."""
+        for name, source in (shaders or {}).items():
+            (self.folder / name).write_text(source)
+        head = f"rendergraph: 1\nsize: [{size[0]}, {size[1]}]\n"
+        if scene is not None:
+            (self.folder / "scene.yaml").write_text("scene: 1\n" + scene)
+            head += "scene: scene.yaml\n"
+        (self.folder / "test.yaml").write_text(head + text)
+        loaded = rg.load(self.folder / "test.yaml")
+        return replace(loaded, known_catalog=Catalog.of(*classes, shaders=self.folder))
+
+    def draw(self, text: str, *classes: type[Node], **options: Any) -> rg.Frame:
+        """Draw it; options of `pipeline` and of `Session.render` mixed."""
+        own = {key: options.pop(key) for key in ("shaders", "scene", "size") if key in options}
+        frame = self.session.render(self.pipeline(text, *classes, **own), **options)
+        with self.session.device.current():
+            assert self.session.device.raw.error() is None
+        return frame
+
+
+@pytest.fixture
+def bench(tmp_path: Path, gl: rg.Session) -> Bench:
+    return Bench(tmp_path, gl)
+
+
+@pytest.fixture
+def draw(bench: Bench) -> Callable[..., rg.Frame]:
+    return bench.draw
+
+
+class Author:
+    """Writes plugins and uses them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.plugins = folder / "plugins"
+        self.plugins.mkdir()
+
+    def write(self, **files: str) -> None:
+        """Files of the plugin; `__` stands for the dot."""
+        for name, text in files.items():
+            (self.plugins / name.replace("__", ".")).write_text(text)
+
+    def node(self, body: str, name: str = "wrong", before: str = "") -> None:
+        """A module with one node class of this body."""
+        lines = indent(dedent(body).strip("\n"), "    ")
+        text = f'{HEAD}{dedent(before)}class {name.title()}(Node):\n    """A node of a stranger\'s."""\n\n{lines}\n'
+        self.write(**{f"{name}__py": text})
+
+    def line(self, marker: str = "# here", file: str = "wrong.py") -> int:
+        """The line of the plugin's file that holds a marker."""
+        lines = (self.plugins / file).read_text().splitlines()
+        return next(number for number, line in enumerate(lines, start=1) if marker in line)
+
+    def pipeline(self, text: str = PIPELINE, *, scene: str | None = None, size: str = "[16, 8]") -> rg.Pipeline:
+        """A pipeline that uses the plugin."""
+        head = f"rendergraph: 1\nsize: {size}\n"
+        if scene is not None:
+            (self.folder / "scene.yaml").write_text("scene: 1\n" + scene)
+            head += "scene: scene.yaml\n"
+        (self.folder / "test.yaml").write_text(head + text)
+        return rg.load(self.folder / "test.yaml", plugins=[self.plugins])
+
+    def said(self, act: Any) -> list[str]:
+        """What is said, without folders: places read `wrong.py:12`."""
+        with pytest.raises(RendergraphError) as caught:
+            act()
+        return [
+            str(problem).splitlines()[0].replace(f"{self.plugins}/", "").replace(f"{self.folder}/", "")
+            for problem in caught.value.problems
+        ]
+
+
+@pytest.fixture
+def author(tmp_path: Path) -> Author:
+    made = Author(tmp_path)
+    made.write(wrong__frag=WHITE)
+    return made

@@ -1,4 +1,4 @@
-"""The grammar of pipeline files. Its messages are in `wrong_files/`."""
+"""The grammar of pipeline files. Its messages are in `errors/wrong_files/`."""
 
 from __future__ import annotations
 

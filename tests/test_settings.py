@@ -1,4 +1,4 @@
-"""The project's settings file. What roots mean for pipelines is in `test_resolve.py`."""
+"""The project's settings file. What roots mean for pipelines is in `resolve/`."""
 
 from __future__ import annotations
 

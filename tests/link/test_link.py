@@ -1,4 +1,4 @@
-"""Names, types at ports, and what textures turn out to be. Most messages are in `wrong_files/`."""
+"""Names, types at ports, and what textures turn out to be. Most messages are in `errors/wrong_files/`."""
 
 from __future__ import annotations
 
