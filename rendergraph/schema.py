@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
-from rendergraph.declare import Extensions, Function, InOut, Input, Node, Port, Views, open_name, own_choices
+from rendergraph.declare import Extensions, Function, InOut, Input, Node, Parameter, Port, Views
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.read import INPUT_KEYS, NAME, NODE_KEYS, PARAMETER_KEYS, TOP_KEYS, VERSION
@@ -26,7 +26,6 @@ Schema = dict[str, Any]
 _NAMES = {"pattern": "^" + NAME.pattern.replace("\\Z", "$")}
 _LINK: Schema = {"type": ["string", "null"], "description": "`node.port`, a node's id, or null for nothing."}
 _SIDE: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_SIDE}
-_OWN_WORDS = ("role", "unit", "glsl", "choices", "needs", "title")
 _ROLES = {
     "param": "Changing it rebuilds nothing.",
     "define": "Changing it recompiles a program.",
@@ -212,58 +211,57 @@ def port_type(port: Port) -> str:
 
 
 def _params(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
-    properties: Schema = cls.model_json_schema().get("properties", {})
-    own = {name: _param(_opened(cls, name, found, extensions)) for name, found in properties.items()}
+    types: Schema = cls.model_json_schema().get("properties", {})
+    own = {name: _param(one, types[name], extensions) for name, one in cls.parameters().items()}
     return _known_names(own, f"'{type_name}' has no such param.")
 
 
-def _opened(cls: type[Node], name: str, found: Schema, extensions: Extensions) -> Schema:
-    """A parameter that plugins add choices to: any word in its type, its own and the plugins' in the schema."""
-    info = cls.parameters()[name]
-    if not open_name(info):
-        return found
-    added = extensions.choices(open_name(info))
-    doc = " ".join([found["description"], *(f"`{one.name}` ({one.plugin}): {one.value.doc}" for one in added)])
-    words = [*own_choices(info.annotation), *(one.name for one in added)]
-    rest = {key: value for key, value in found.items() if key != "anyOf"}
-    return {**rest, "description": doc, "type": "string", "enum": list(dict.fromkeys(words))}
+def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Schema:
+    """One parameter: its own values, null for the default, or a parameter of the pipeline.
 
-
-def _param(found: Schema) -> Schema:
-    """One parameter: its own values, null for the default, or a parameter of the pipeline."""
-    own = _draft_07({key: value for key, value in found.items() if key not in ("description", "default", *_OWN_WORDS)})
-    about = {"description": _about_param(found), "default": found.get("default")}
+    Args:
+        parameter: the parameter.
+        written: its type as pydantic writes it.
+        extensions: where the choices come from that plugins add.
+    """
+    own = _draft_07({key: value for key, value in written.items() if key not in ("default", "title")})
+    doc = parameter.doc
+    if parameter.open_name:  # any word in its type, its own and the plugins' in the schema
+        added = extensions.choices(parameter.open_name)
+        doc = " ".join([doc, *(f"`{one.name}` ({one.plugin}): {one.value.doc}" for one in added)])
+        words = [*parameter.words, *(one.name for one in added)]
+        own = {"type": "string", "enum": list(dict.fromkeys(words))}
+    limits = {"minimum": parameter.minimum, "maximum": parameter.maximum}
+    limits = {key: limit for key, limit in limits.items() if limit is not None}
+    about = {"description": _about_param(parameter, doc), "default": written.get("default")}
     kind = own.get("type")
     if kind in _WORDS:  # said without alternatives: editors then name the limit that is broken
         message = f"This is {_WORDS[kind]}, or $name for a parameter of the pipeline."
         return {
             **about,
             **own,
+            **limits,
             "type": [kind, "string", "null"],
             "pattern": _REFERENCE["pattern"],
             "patternErrorMessage": message,
         }
-    alternatives = own.pop("anyOf", None)
-    if alternatives:  # limits beside alternatives hold for those that are numbers
-        limits = {key: own.pop(key) for key in ("minimum", "maximum") if key in own}
-        alternatives = [{**p, **limits} if p.get("type") in ("number", "integer") else p for p in alternatives]
-    return {**about, "anyOf": [*(alternatives or [own]), {"type": "null"}, _REFERENCE]}
+    alternatives = own.get("anyOf", [own])  # limits beside alternatives hold for those that are numbers
+    alternatives = [{**p, **limits} if p.get("type") in ("number", "integer") else p for p in alternatives]
+    return {**about, "anyOf": [*alternatives, {"type": "null"}, _REFERENCE]}
 
 
-def _about_param(found: Schema) -> str:
+def _about_param(parameter: Parameter, doc: str) -> str:
     """Its line of documentation, its default, its range and what a change of it costs."""
-    unit = f" {found['unit']}" if found.get("unit") else ""
-    low, high = found.get("minimum"), found.get("maximum")
+    unit = f" {parameter.unit}" if parameter.unit else ""
+    low, high = parameter.minimum, parameter.maximum
     limits = {
         (True, True): f", {low} to {high}",
         (True, False): f", at least {low}",
         (False, True): f", at most {high}",
         (False, False): "",
     }[low is not None, high is not None]
-    default = json.dumps(found.get("default"), ensure_ascii=False)
-    return (
-        f"{found.get('description', '')}\n\nDefault {default}{unit}{limits}. {_ROLES[found.get('role', 'structural')]}"
-    )
+    default = json.dumps(parameter.default, ensure_ascii=False)
+    return f"{doc}\n\nDefault {default}{unit}{limits}. {_ROLES[parameter.role]}"
 
 
 def _draft_07(value: Any) -> Any:

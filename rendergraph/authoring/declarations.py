@@ -26,7 +26,7 @@ def docs(cls: type[Node]) -> Iterator[tuple[str, str]]:
         for name, port in cls.ports().items()
         if isinstance(port, Input | Made | Function | Views) and (port.doc or name in {*cls.inputs(), *cls.outputs()})
     }
-    found |= {name: info.description or "" for name, info in cls.parameters().items()}
+    found |= {name: parameter.doc for name, parameter in cls.parameters().items()}
     for name, doc in found.items():
         if not doc:
             yield name, f"'{name}' has no doc"
@@ -38,10 +38,8 @@ def docs(cls: type[Node]) -> Iterator[tuple[str, str]]:
 
 def ranges(cls: type[Node]) -> Iterator[str]:
     """Number parameters that reach a shader and do not say between which limits they lie."""
-    for name, info in cls.parameters().items():
-        extra = info.json_schema_extra
-        limits = extra if isinstance(extra, dict) else {}
-        if info.annotation in (int, float) and not ("minimum" in limits and "maximum" in limits):
+    for name, parameter in cls.parameters().items():
+        if parameter.type in (int, float) and None in (parameter.minimum, parameter.maximum):
             yield name
 
 
@@ -56,10 +54,9 @@ def unused(node: NodeType, seen: Collection[str], files: Iterable[Path]) -> Iter
     text = _python_text(node)
     shaders = "".join(shader_text(file) for file in files)
     cls = node.cls
-    for name in cls.parameters():
-        role = cls.role_of(name)
-        word = name.upper() if role == "define" else name
-        in_shader = name in seen if role == "param" else bool(re.search(rf"\b{word}(_\w+)?\b", shaders))
+    for name, parameter in cls.parameters().items():
+        word = name.upper() if parameter.role == "define" else name
+        in_shader = name in seen if parameter.role == "param" else bool(re.search(rf"\b{word}(_\w+)?\b", shaders))
         if not in_shader and not re.search(rf"\.{name}\b", text):
             yield name
     for name, port in cls.inputs().items():

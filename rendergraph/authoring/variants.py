@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 from rendergraph.declare import InOut, Input, Node
 
@@ -65,23 +65,16 @@ def _usable(cls: type[Node], left_out: frozenset[str]) -> tuple[str, ...]:
 
 def _values(cls: type[Node]) -> Iterator[tuple[str, Any, bool]]:
     """Parameters that change the program or the plan, with each value to try and whether it is the end of a range."""
-    for name, info in cls.parameters().items():
-        role = cls.role_of(name)
-        extra = info.json_schema_extra
-        limits = extra if isinstance(extra, Mapping) else {}
-        if info.annotation is bool and role != "param":
-            yield name, not info.default, False
-        for choice in _choices(info.annotation):
-            if choice != info.default and role != "param":
+    for name, parameter in cls.parameters().items():
+        if parameter.role == "param":
+            continue
+        default = parameter.default
+        if parameter.type is bool:
+            yield name, not default, False
+        for choice in parameter.choices:
+            if choice != default:
                 yield name, choice, False
-        if info.annotation in (int, float) and role != "param":
-            for limit in (limits.get("minimum"), limits.get("maximum")):
-                if isinstance(limit, int | float) and limit != info.default:
-                    yield name, info.annotation(limit), True
-
-
-def _choices(annotation: Any) -> list[Any]:
-    """The words of a `Literal`, also of one beside other types."""
-    if get_origin(annotation) is Literal:
-        return list(get_args(annotation))
-    return [choice for part in get_args(annotation) for choice in _choices(part)]
+        if parameter.type in (int, float):
+            for limit in (parameter.minimum, parameter.maximum):
+                if limit is not None and limit != default:
+                    yield name, parameter.type(limit), True

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog.header import Header
-from rendergraph.catalog.parameter import Parameter
+from rendergraph.catalog.parameter import HeaderParameter
 from rendergraph.catalog.rules import number_rule, size_rule, word_rule
-from rendergraph.declare import Extensions, Input, Made, Output, Port
+from rendergraph.declare import Extensions, Input, Made, Node, Output, Port
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.glsl import SourceText, strip_comments
@@ -307,11 +307,12 @@ class Entries:
     def _add_parameter(self, name: str, entry: Mapping[str, Value]) -> None:
         plain = (found for found in self.globals.declared if found.type in _SCALAR or _VECTOR.match(found.type))
         known = [found.name for found in plain if found.storage == "uniform"]
-        reader = Parameter(name, entry, self.header.names.get(name), self.declared.get(name), self._words)
+        named, declared = self.header.names.get(name), self.declared.get(name)
+        reader = HeaderParameter(name, entry, named, declared, self._words)
         field = reader.field([other for other in known if other not in self.header.names])
         self.problems += reader.problems
         for text in reader.said:
-            self.say(text[0], text[1], self.declared.get(name))
+            self.say(text[0], text[1], declared)
         if field is not None:
             self.fields[name] = field
             self._without_range += [name] if reader.lacks_range else []
@@ -348,10 +349,10 @@ class Entries:
                     text = f"'{key}' names no input of this node: '{first.data}'{suggestion(first.data, inputs)}"
                     self.problems.append(first.problem("RG444", text))
 
-    def warnings(self) -> Iterator[Problem]:
-        """What is missing, in one line; and what only looks right."""
+    def warnings(self, cls: type[Node]) -> Iterator[Problem]:
+        """What the class lacks that was made of these, in one line; and what only looks right."""
         ports = [name for name, port in self.ports.items() if not getattr(port, "doc", "")]
-        undocumented = [*ports, *(name for name, (_, info) in self.fields.items() if not info.description)]
+        undocumented = [*ports, *(name for name, parameter in cls.parameters().items() if not parameter.doc)]
         missing = [] if self.header.doc else ["doc of the node"]
         missing += [f"doc of {_listed(undocumented)}"] if undocumented else []
         missing += [f"min and max of {_listed(self._without_range)}"] if self._without_range else []

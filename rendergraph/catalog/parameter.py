@@ -18,7 +18,7 @@ _VECTOR = re.compile(r"([iu]?)vec([234])\Z")
 _WORDS = {bool: "true or false", int: "a whole number", float: "a number"}
 
 
-class Parameter:
+class HeaderParameter:
     """Makes one parameter and collects what is wrong with it.
 
     Attributes:

@@ -88,7 +88,7 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
         raise InputError(problems)
     lines = [line.rstrip() for line in source.lines if line.strip()]
     text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", raw, re.DOTALL | re.MULTILINE)[:1], *lines])
-    return _Made(cls, tuple(entries.warnings()), text)
+    return _Made(cls, tuple(entries.warnings(cls)), text)
 
 
 def _is_forgiven(mistake: str) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
 
 if TYPE_CHECKING:
     from rendergraph.catalog import Catalog, NodeType
-    from rendergraph.declare import Extensions
+    from rendergraph.declare import Extensions, Parameter
 
 
 def summary(found: NodeType) -> str:
@@ -38,7 +38,7 @@ def describe(found: NodeType, extensions: Extensions | None = None) -> dict[str,
         "inputs": [_input(name, port) | _group(groups.get(name)) for name, port in cls.inputs().items()],
         "outputs": [_output(name, port) for name, port in outputs.items()],
         "internal": [_made(name, port) for name, port in internal.items()],
-        "parameters": [_parameter(cls, name, extensions or NO_EXTENSIONS) for name in cls.parameters()],
+        "parameters": [_parameter(one, extensions or NO_EXTENSIONS) for one in cls.parameters().values()],
     }
 
 
@@ -124,35 +124,28 @@ def _size(rule: Any) -> str:
     return "viewport" if rule == 1 else f"viewport × {rule:g}"
 
 
-def _parameter(cls: Any, name: str, extensions: Extensions) -> dict[str, Any]:
-    from rendergraph.declare import closed, open_name
-
-    info = cls.parameters()[name]
-    added = extensions.choices(open_name(info)) if open_name(info) else []
-    annotation = closed(info, tuple(one.name for one in added))
-    extra = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
+def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
+    open_name, default = parameter.open_name, parameter.default
+    added = extensions.choices(open_name) if open_name else []
+    annotation = parameter.closed(tuple(one.name for one in added))
     found: dict[str, Any] = {
-        "name": name,
-        "type": type_words(annotation) + (" | …" if open_name(info) else ""),  # plugins may add to it
-        "default": list(info.default) if isinstance(info.default, tuple) else info.default,
-        "role": cls.role_of(name),
-        "unit": extra.get("unit", ""),
-        "doc": info.description or "",
+        "name": parameter.name,
+        "type": type_words(annotation) + (" | …" if open_name else ""),  # plugins may add to it
+        "default": list(default) if isinstance(default, tuple) else default,
+        "role": parameter.role,
+        "unit": parameter.unit,
+        "doc": parameter.doc,
     }
-    if choices := _choices(annotation):
-        found["choices"] = choices
-    if open_name(info):
-        found["open"] = open_name(info)
+    if get_origin(annotation) is Literal:
+        found["choices"] = list(get_args(annotation))
+    if open_name:
+        found["open"] = open_name
         found["added"] = [
             {"name": one.name, "plugin": one.plugin, "doc": one.value.doc, "needs": list(one.value.needs)}
             for one in added
         ]
-    found |= {word: extra[key] for word, key in (("min", "minimum"), ("max", "maximum")) if key in extra}
-    return found
-
-
-def _choices(annotation: Any) -> list[Any]:
-    return list(get_args(annotation)) if get_origin(annotation) is Literal else []
+    limits = {"min": parameter.minimum, "max": parameter.maximum}
+    return found | {word: limit for word, limit in limits.items() if limit is not None}
 
 
 def type_words(annotation: Any) -> str:

@@ -7,7 +7,7 @@ from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Sou
 from rendergraph.declare.facts import Facts, LightFacts, TextureInfo
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes, mistake_place
 from rendergraph.declare.node import Node
-from rendergraph.declare.parameters import closed, define, open_name, own_choices, param, structural
+from rendergraph.declare.parameters import Parameter, define, param, structural
 from rendergraph.declare.ports import (
     PORT_TYPES,
     Function,
@@ -44,6 +44,7 @@ __all__ = [
     "MeshData",
     "Node",
     "Output",
+    "Parameter",
     "Part",
     "Port",
     "Ruled",
@@ -51,13 +52,10 @@ __all__ = [
     "Source",
     "TextureInfo",
     "Views",
-    "closed",
     "declaration_mistakes",
     "define",
     "extension_mistakes",
     "mistake_place",
-    "open_name",
-    "own_choices",
     "param",
     "raised_at",
     "structural",

@@ -8,15 +8,14 @@ import math
 import re
 import types
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
 from rendergraph.declare.node import Node
-from rendergraph.declare.parameters import open_name, own_choices
+from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
 from rendergraph.declare.ports import History, Internal
 from rendergraph.errors import Place, shown_file
@@ -25,7 +24,7 @@ _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 _OF_THE_BASE = frozenset(
     """
-    copy json dict schema construct fields validate record update ports inputs outputs groups parameters shader role_of
+    copy json dict schema construct fields validate record update ports inputs outputs groups parameters shader
     """.split()  # noqa: SIM905 - as below
 )
 
@@ -90,7 +89,7 @@ def mistake_place(file: Path, mistake: str) -> Place:
 
 def _names(cls: type[Node]) -> Iterator[str]:
     ports, parameters = cls.ports(), cls.parameters()
-    plan = {name for name in parameters if cls.role_of(name) == "structural"}  # these never reach a shader
+    plan = {name for name in parameters if parameters[name].role == "structural"}  # these never reach a shader
     for name in [*ports, *parameters]:
         if not _IDENTIFIER.match(name) or name.startswith("gl_") or "__" in name:
             yield f"'{name}' is not a lower-case GLSL identifier"
@@ -120,10 +119,10 @@ def _docs(cls: type[Node]) -> Iterator[str]:
             yield f"port '{name}' has a doc that is no text"
         elif not doc and not isinstance(port, Internal | History):
             yield f"port '{name}' has no doc"
-    for name, info in cls.parameters().items():
-        if _extra(info).get("role") is None:
+    for name, parameter in cls.parameters().items():
+        if parameter.role == "plain":
             yield f"parameter '{name}' is a plain value; declare it with {_ROLES}"
-        elif not info.description:
+        elif not parameter.doc:
             yield f"parameter '{name}' has no doc"
 
 
@@ -132,12 +131,12 @@ def _macros(cls: type[Node]) -> Iterator[str]:
     made: list[tuple[str, str]] = []
     for name in cls.inputs():
         made += [(f"{word}", f"input '{name}'") for word in (f"HAS_{name}".upper(), f"{name}_LAYERS".upper())]
-    for name, info in cls.parameters().items():
-        if cls.role_of(name) == "define":
+    for name, parameter in cls.parameters().items():
+        if parameter.role == "define":
             made.append((name.upper(), f"define '{name}'"))
             made += [
                 (f"{name}_{choice}".upper().replace("-", "_"), f"choice '{choice}' of '{name}'")
-                for choice in own_choices(info.annotation)
+                for choice in parameter.words
             ]
     counted = Counter(macro for macro, _ in made)
     for macro, source in made:
@@ -149,21 +148,19 @@ def _macros(cls: type[Node]) -> Iterator[str]:
 
 
 def _parameters(cls: type[Node]) -> Iterator[str]:
-    for name, info in cls.parameters().items():
-        role, extra = cls.role_of(name), _extra(info)
-        if open_name(info) and str not in get_args(info.annotation):
+    for name, parameter in cls.parameters().items():
+        if parameter.open_name and str not in get_args(parameter.type):
             yield f"plugins add choices to '{name}', so its type is a Literal of its own `| str`"
-        wrong = _not_for_a_shader(info, role) if role != "structural" else None
-        if wrong:
+        if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
             yield f"parameter '{name}' is {wrong}"
-        low, high = extra.get("minimum"), extra.get("maximum")
+        low, high = parameter.minimum, parameter.maximum
         for word, limit in (("min", low), ("max", high)):
             if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int | float)):
                 yield f"parameter '{name}' has {word}={limit!r}, which is no number"
         if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
             yield f"parameter '{name}' goes from {low} to {high}, which is nothing"
-        if extra.get("glsl") and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(extra["glsl"])):
-            yield f"parameter '{name}' has glsl={extra['glsl']!r}, which is no GLSL type"
+        if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):
+            yield f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type"
     yield from _defaults(cls)
 
 
@@ -194,17 +191,16 @@ def _defaults(cls: type[Node]) -> Iterator[str]:
         yield f"its own checks fail on the defaults: {type(error).__name__}: {error}"
 
 
-def _not_for_a_shader(info: FieldInfo, role: str) -> str | None:
+def _not_for_a_shader(parameter: Parameter) -> str | None:
     """Why a parameter's type cannot become a uniform, or program text."""
-    kinds = set(_leaves(info.annotation))
+    role, kinds = parameter.role, set(_leaves(parameter.type))
     if role == "define":
-        words = own_choices(info.annotation)
-        odd = [word for word in words if not re.fullmatch(r"[A-Za-z0-9_-]+", word)]
+        odd = [word for word in parameter.words if not re.fullmatch(r"[A-Za-z0-9_-]+", word)]
         if odd:
             return f"a define with the choice '{odd[0]}', which cannot stand in a macro's name"
         if tuple in kinds or list in kinds:
             return "a define of several numbers; macros hold one, make it a param"
-        if str in kinds and not open_name(info):
+        if str in kinds and not parameter.open_name:
             return "a define of free text; list its choices as Literal[…]"
     elif str in kinds or any(isinstance(kind, str) for kind in kinds):
         return "a param of text, which no uniform holds; make it a define with Literal[…]"
@@ -236,10 +232,6 @@ def _leaves(annotation: Any) -> Iterator[Any]:
         yield origin
     else:
         yield annotation
-
-
-def _extra(info: FieldInfo) -> Mapping[str, Any]:
-    return info.json_schema_extra if isinstance(info.json_schema_extra, Mapping) else {}
 
 
 def _finite(value: object) -> bool:

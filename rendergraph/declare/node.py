@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
-from pydantic.fields import FieldInfo
 
+from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.ports import PORT_TYPES, Function, InOut, Input, Output, Port, Views
 
 if TYPE_CHECKING:
@@ -36,12 +35,13 @@ def _inputs_of(cls: type[Node]) -> dict[str, Input | InOut]:
 
 
 @cache
-def _roles_of(cls: type[Node]) -> dict[str, Literal["param", "define", "structural"]]:
-    extras = {name: info.json_schema_extra for name, info in cls.model_fields.items()}
-    return {
-        name: extra["role"] if isinstance(extra, Mapping) and "role" in extra else "structural"  # type: ignore[misc]
-        for name, extra in extras.items()
-    }
+def _parameters_of(cls: type[Node]) -> dict[str, Parameter]:
+    cls.model_rebuild(raise_errors=False)  # a type that was named before it was made
+    found: dict[str, Parameter] = {}
+    for name, info in cls.model_fields.items():
+        declared = next((one for one in info.metadata if isinstance(one, Parameter)), Parameter("plain", info.default))
+        found[name] = replace(declared, name=name, type=info.annotation)
+    return found
 
 
 class Node(BaseModel):
@@ -67,18 +67,8 @@ class Node(BaseModel):
     @classmethod
     def _within_limits(cls, value: Any, info: ValidationInfo) -> Any:
         # Not pydantic's ge and le: a parameter may be a number or a colour, and the limits hold for each component.
-        extra = cls.model_fields[str(info.field_name)].json_schema_extra
-        limits = extra if isinstance(extra, Mapping) else {}
-        for number in value if isinstance(value, tuple) else (value,):
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                continue
-            if not math.isfinite(number):
-                raise ValueError("must be finite")
-            low, high = limits.get("minimum"), limits.get("maximum")
-            if isinstance(low, int | float) and number < low:
-                raise ValueError(f"must be at least {low}")
-            if isinstance(high, int | float) and number > high:
-                raise ValueError(f"must be at most {high}")
+        if wrong := cls.parameters()[str(info.field_name)].beyond(value):
+            raise ValueError(wrong)
         return value
 
     shader: ClassVar[str | None] = None
@@ -128,11 +118,6 @@ class Node(BaseModel):
         return table
 
     @classmethod
-    def parameters(cls) -> dict[str, FieldInfo]:
-        """Parameter name to its pydantic field; `role_of` tells uniform, define and structural apart."""
-        return cls.model_fields
-
-    @classmethod
-    def role_of(cls, parameter: str) -> Literal["param", "define", "structural"]:
-        """How a parameter reaches the program."""
-        return _roles_of(cls)[parameter]
+    def parameters(cls) -> dict[str, Parameter]:
+        """Parameters by name, in the order of declaration."""
+        return _parameters_of(cls)

@@ -2,18 +2,117 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal, get_args, get_origin
+import math
+import types
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, Union, get_args, get_origin
 
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
+Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 
-def _parameter(
-    role: str, default: Any, unit: str, doc: str, min: float | None, max: float | None, extra: dict[str, Any]
-) -> Any:
-    limits = {key: value for key, value in (("minimum", min), ("maximum", max)) if value is not None}
-    return Field(default=default, description=doc, json_schema_extra={"role": role, "unit": unit} | limits | extra)
+
+@dataclass(frozen=True)
+class Parameter:
+    """What a node declares of one parameter; `Node.parameters()` has them by name.
+
+    Attributes:
+        role: how it reaches the program: as a uniform (`param`), as text (`define`) or as part of the plan
+            (`structural`). A bare value on the class is `plain`, which is a mistake.
+        default: value where the file gives none.
+        doc: one line.
+        unit: the unit's symbol, empty for a pure number.
+        minimum, maximum: smallest and largest legal value of each number in it, inclusive; None for no limit.
+        glsl: the uniform's type where it is not what `type` says.
+        open_name: the name under which plugins add choices, empty where they cannot.
+        needs: what a choice that a plugin adds may say that it needs.
+        name: the field's name.
+        type: the field's annotation.
+    """
+
+    role: Role
+    default: Any
+    doc: str = ""
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    glsl: str = ""
+    open_name: str = ""
+    needs: tuple[str, ...] = ()
+    name: str = ""
+    type: Any = None
+
+    @property
+    def choices(self) -> tuple[Any, ...]:
+        """The values that its type lists, also beside other types."""
+        return tuple(_listed(self.type))
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Those of its choices that are words."""
+        return tuple(choice for choice in self.choices if isinstance(choice, str))
+
+    def closed(self, added: tuple[str, ...] = ()) -> Any:
+        """Its type; where plugins add choices a `Literal` of its own and of those added."""
+        return Literal[(*self.words, *added)] if self.open_name else self.type
+
+    def takes(self, added: tuple[str, ...] = ()) -> str:
+        """What a file may give for it: `a whole number from 1 to 64`, `one of soft, hard`.
+
+        Args:
+            added: the choices that plugins add.
+        """
+        return self._takes(self.closed(added))
+
+    def beyond(self, value: object) -> str | None:
+        """What a value that is not finite or outside the limits must be; None where it is fine."""
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                continue
+            if not math.isfinite(number):
+                return "must be finite"
+            if isinstance(self.minimum, int | float) and number < self.minimum:
+                return f"must be at least {self.minimum}"
+            if isinstance(self.maximum, int | float) and number > self.maximum:
+                return f"must be at most {self.maximum}"
+        return None
+
+    def _takes(self, annotation: Any) -> str:
+        origin, arguments = get_origin(annotation), get_args(annotation)
+        if origin in (Union, types.UnionType):
+            return " or ".join(self._takes(part) for part in arguments if part is not types.NoneType)
+        if origin is Literal:
+            listed = ", ".join(map(str, arguments))
+            return f"one of {listed}" if len(arguments) > 1 else f"only {listed}"
+        if origin in (tuple, list):
+            of = {int: "whole numbers", str: "words"}.get(next(iter(arguments), float), "numbers")
+            count = "" if origin is list or Ellipsis in arguments else f"{len(arguments)} "
+            return f"a list of {count}{of}"
+        words = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
+        word = words.get(annotation, "a mapping")
+        low, high = self.minimum, self.maximum
+        if annotation not in (int, float) or (low is None and high is None):
+            return word
+        if low is None:
+            return f"{word} up to {high}"
+        return f"{word} from {low}" + (f" to {high}" if high is not None else " up")
+
+
+def _listed(annotation: Any) -> Iterator[Any]:
+    if get_origin(annotation) is Literal:
+        yield from get_args(annotation)
+    else:
+        for part in get_args(annotation):
+            yield from _listed(part)
+
+
+def _field(parameter: Parameter) -> Any:
+    """A pydantic field that carries its declaration as metadata, which pydantic hands on and does not look at."""
+    field: FieldInfo = Field(default=parameter.default)
+    field.metadata.append(parameter)
+    return field
 
 
 def param(
@@ -28,7 +127,7 @@ def param(
         min, max: smallest and largest legal value, inclusive.
         glsl: the uniform's type where it is not what the annotation says (`vec3` for a number or a colour).
     """
-    return _parameter("param", default, unit, doc, min, max, {"glsl": glsl} if glsl else {})
+    return _field(Parameter("param", default, doc, unit, min, max, glsl))
 
 
 def define(
@@ -56,30 +155,9 @@ def define(
         needs: what such a choice may say that it needs, which others do without: `NEEDS_…` in the shader,
             `steps.needs(…)` in `record`.
     """
-    extra = {"choices": choices, "needs": list(needs)} if choices else {}
-    return _parameter("define", default, unit, doc, min, max, extra)
+    return _field(Parameter("define", default, doc, unit, min, max, open_name=choices, needs=needs))
 
 
 def structural(*, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None) -> Any:
     """A parameter that is part of the plan: a resolution, a light's name."""
-    return _parameter("structural", default, unit, doc, min, max, {})
-
-
-def open_name(info: FieldInfo) -> str:
-    """The name under which plugins add choices to a parameter, empty where they cannot."""
-    extra = info.json_schema_extra
-    return str(extra.get("choices", "")) if isinstance(extra, Mapping) else ""
-
-
-def own_choices(annotation: Any) -> tuple[str, ...]:
-    """The words that a parameter's type lists."""
-    if get_origin(annotation) is Literal:
-        return tuple(choice for choice in get_args(annotation) if isinstance(choice, str))
-    return tuple(choice for part in get_args(annotation) for choice in own_choices(part))
-
-
-def closed(info: FieldInfo, more: tuple[str, ...] = ()) -> Any:
-    """A parameter's type; with what plugins add as the only other words where they can."""
-    if not open_name(info):
-        return info.annotation
-    return Literal[(*own_choices(info.annotation), *more)]
+    return _field(Parameter("structural", default, doc, unit, min, max))

@@ -16,7 +16,7 @@ from rendergraph.expand.recording import Recorder, now
 from rendergraph.expand.rules import cleared_to, filter_of, view_table
 from rendergraph.expand.targets import feedback, misfit, no_image, onto_nothing, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
-from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Write
+from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Use, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 
@@ -184,11 +184,10 @@ class Numbering:
             ]
         own = Endpoint(recorder.node.id, port.name, part.previous)
         resource, _ = self.at_end[now(own)]
-        use = "buffer" if isinstance(self.resources[resource].desc, BufferDesc) else "sample"
-        return [self._read(name, own, part, part.sampler or Sampler(), use, self.version[resource])]
+        return [self._read(name, own, part, part.sampler or Sampler(), "sample", self.version[resource])]
 
     def _read(
-        self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: str, version: int | None = None
+        self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
         resource, at_end = self.at_end.get(self.behind(end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port]
@@ -197,19 +196,9 @@ class Numbering:
         desc = self._desc_of(end, resource)
         if isinstance(desc, BufferDesc):
             use = "buffer"
-        whole = part.layer is None
-        kind = desc.kind if isinstance(desc, TextureDesc) and whole else "texture2d"
-        return Read(
-            name,
-            resource,
-            at_end if version is None else version,
-            use,
-            sampler,  # type: ignore[arg-type]
-            part.mip,
-            part.layer,
-            end.previous,
-            kind,
-        )
+        version = at_end if version is None else version
+        kind = desc.kind if isinstance(desc, TextureDesc) and part.layer is None else "texture2d"
+        return Read(name, resource, version, use, sampler, part.mip, part.layer, end.previous, kind)
 
     def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
         if resource in self.resources:

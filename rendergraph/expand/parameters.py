@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rendergraph.declare import Choice, Node, own_choices
+from rendergraph.declare import Choice, Node
 from rendergraph.steps import UniformValue, define_text
 
 
@@ -15,12 +15,12 @@ def define_parameters(node: Node, plugged: Mapping[str, Choice]) -> Iterator[tup
         node: the node.
         plugged: parameters whose choice is a plugin's; other choices of plugins leave the text as it is.
     """
-    for name, info in type(node).parameters().items():
-        if type(node).role_of(name) != "define":
+    for name, parameter in node.parameters().items():
+        if parameter.role != "define":
             continue
         value = getattr(node, name)
         if isinstance(value, str):
-            choices = [*own_choices(info.annotation), *([value] if name in plugged else [])]
+            choices = [*parameter.words, *([value] if name in plugged else [])]
             for number, choice in enumerate(choices):
                 yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
             for need in plugged[name].needs if name in plugged else ():
@@ -32,12 +32,10 @@ def define_parameters(node: Node, plugged: Mapping[str, Choice]) -> Iterator[tup
 
 def param_uniforms(node: Node) -> Iterator[tuple[str, UniformValue]]:
     """Names and values of a node's `param` parameters; a number given for a vector fills it."""
-    for name, info in type(node).parameters().items():
-        if type(node).role_of(name) != "param":
+    for name, parameter in node.parameters().items():
+        if parameter.role != "param":
             continue
         value = getattr(node, name)
-        extra = info.json_schema_extra
-        glsl = str(extra.get("glsl", "")) if isinstance(extra, Mapping) else ""
-        if glsl.startswith("vec") and not isinstance(value, tuple):
-            value = (float(value),) * int(glsl[3])
+        if parameter.glsl.startswith("vec") and not isinstance(value, tuple):
+            value = (float(value),) * int(parameter.glsl[3])
         yield name, value

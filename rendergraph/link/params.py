@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-import types
-from collections.abc import Mapping
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any
 
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Added, Choice, Extensions, Node, closed, open_name, own_choices
+from rendergraph.declare import Added, Choice, Extensions, Node, Parameter
 from rendergraph.declare.blame import what_happened
 from rendergraph.document import Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem, node_named, suggestion
@@ -54,38 +51,37 @@ def plugged(spec: NodeSpec, node: Node, extensions: Extensions) -> tuple[dict[st
     """
     found: dict[str, Choice] = {}
     problems: list[Problem] = []
-    for name, info in type(node).parameters().items():
-        chosen, value = getattr(node, name), spec.params.get(name)
-        if not open_name(info) or not isinstance(chosen, str) or chosen in own_choices(info.annotation):
+    for name, parameter in node.parameters().items():
+        chosen, value, open_name = getattr(node, name), spec.params.get(name), parameter.open_name
+        if not open_name or not isinstance(chosen, str) or chosen in parameter.words:
             continue
         try:
-            added = extensions.choice(open_name(info), chosen)
+            added = extensions.choice(open_name, chosen)
             if added is None:
-                known = tuple(added.name for added in extensions.choices(open_name(info)))
-                text = f"'{spec.id}.{name}' takes {words_for(closed(info, known), {})}, this is '{shown(chosen, 40)}'"
-                hint = suggestion(chosen, (*own_choices(info.annotation), *known), most=0)
+                known = tuple(added.name for added in extensions.choices(open_name))
+                text = f"'{spec.id}.{name}' takes {parameter.takes(known)}, this is '{shown(chosen, 40)}'"
+                hint = suggestion(chosen, (*parameter.words, *known), most=0)
                 problems += [(value or spec.value).problem("RG104", text + hint), *extensions.problems]
             else:
                 found[name] = added.value
-                problems += _unmet(open_name(info), added, info)
+                problems += _unmet(parameter, added)
         except InputError as error:
             problems += error.problems
     return found, problems
 
 
-def _unmet(parameter: str, added: Added[Choice], info: FieldInfo) -> list[Problem]:
+def _unmet(parameter: Parameter, added: Added[Choice]) -> list[Problem]:
     """What a plugin's choice needs and nobody offers."""
-    extra = info.json_schema_extra
-    offered = [str(need) for need in extra["needs"]] if isinstance(extra, Mapping) else []  # type: ignore[union-attr]
+    name = parameter.open_name
     return [
         Problem(
             "RG495",
-            f"choices['{parameter}']['{added.name}'] of plugin '{added.plugin}' needs '{need}', which "
-            f"'{parameter}' does not offer{suggestion(need, offered)}",
+            f"choices['{name}']['{added.name}'] of plugin '{added.plugin}' needs '{need}', which "
+            f"'{name}' does not offer{suggestion(need, parameter.needs)}",
             Place(str(added.file)),
         )
         for need in added.value.needs
-        if need not in offered
+        if need not in parameter.needs
     ]
 
 
@@ -114,13 +110,9 @@ def _wrong(spec: NodeSpec, node_type: NodeType, name: str, details: list[Any]) -
     if detail["type"] in ("value_error", "assertion_error"):
         text = f"'{spec.id}.{name}' is {_short(value)}, it {message}"
         return value.problem("RG104", text)
-    info = node_type.cls.parameters()[name]
-    extra = info.json_schema_extra
-    words = words_for(closed(info), extra if isinstance(extra, Mapping) else {})
-    hint = ""
-    if isinstance(value.data, str):
-        hint = suggestion(value.data, _choices(info.annotation), most=0)
-    return value.problem("RG104", f"'{spec.id}.{name}' takes {words}, this is {_short(value)}{hint}")
+    parameter = node_type.cls.parameters()[name]
+    hint = suggestion(value.data, parameter.words, most=0) if isinstance(value.data, str) else ""
+    return value.problem("RG104", f"'{spec.id}.{name}' takes {parameter.takes()}, this is {_short(value)}{hint}")
 
 
 def _short(value: Value) -> str:
@@ -130,31 +122,3 @@ def _short(value: Value) -> str:
     if isinstance(data, list) and len(data) <= 8 and not any(isinstance(part.data, list | dict) for part in data):
         return shown([part.data for part in data])
     return kind_of(data) if isinstance(data, list | dict | bool) or data is None else shown(data)
-
-
-def _choices(annotation: Any) -> list[str]:
-    if get_origin(annotation) is Literal:
-        return [str(choice) for choice in get_args(annotation)]
-    return [choice for part in get_args(annotation) for choice in _choices(part)]
-
-
-def words_for(annotation: Any, limits: Mapping[str, Any]) -> str:
-    """What a parameter takes, in words: `a whole number from 1 to 64`."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin in (Union, types.UnionType):
-        return " or ".join(words_for(part, limits) for part in arguments if part is not types.NoneType)
-    if origin is Literal:
-        return (
-            f"one of {', '.join(map(str, arguments))}" if len(arguments) > 1 else f"only {''.join(map(str, arguments))}"
-        )
-    if origin in (tuple, list):
-        of = {int: "whole numbers", str: "words"}.get(next(iter(arguments), float), "numbers")
-        count = "" if origin is list or Ellipsis in arguments else f"{len(arguments)} "
-        return f"a list of {count}{of}"
-    words = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}.get(annotation, "a mapping")
-    low, high = limits.get("minimum"), limits.get("maximum")
-    if annotation not in (int, float) or (low is None and high is None):
-        return words
-    if low is None:
-        return f"{words} up to {high}"
-    return f"{words} from {low}" + (f" to {high}" if high is not None else " up")

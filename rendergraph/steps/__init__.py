@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Frame, FrameScene, ViewMatrices
-from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, UniformValue, Write
+from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, UniformValue, Use, Write
 from rendergraph.steps.recorder import Recorder, Request, Steps, Target
 from rendergraph.steps.state import (
     ADD,
@@ -48,6 +48,7 @@ __all__ = [
     "Steps",
     "Target",
     "UniformValue",
+    "Use",
     "ViewMatrices",
     "Write",
     "define_text",

@@ -15,6 +15,7 @@ Topology = Literal["points", "lines", "line_strip", "triangles", "triangle_strip
 TOPOLOGIES: tuple[str, ...] = get_args(Topology)
 MATERIAL_LEVELS = ("full", "alpha", "none")
 DRAW_ORDERS = ("front_to_back", "back_to_front", "scene")
+Use: TypeAlias = Literal["sample", "depth_test", "image", "buffer", "attach"]
 UniformValue: TypeAlias = "float | int | bool | Sequence[float] | Sequence[int]"
 
 
@@ -37,7 +38,7 @@ class Read:
     name: str
     resource: str
     version: int
-    use: Literal["sample", "depth_test", "image", "buffer", "attach"] = "sample"
+    use: Use = "sample"
     sampler: Sampler = Sampler()
     mip: int | None = None
     layer: int | None = None

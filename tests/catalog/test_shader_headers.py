@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
@@ -70,8 +69,14 @@ def test_a_header_says_everything_that_a_class_can(tmp_path: Path) -> None:
         "smooth_it": True,
         "scale": 0.5,
     }
-    assert [cls.role_of(name) for name in cls.parameters()] == ["param", "define", "define", "define", "structural"]
-    assert get_args(cls.parameters()["curve"].annotation) == ("soft", "hard")
+    assert [parameter.role for parameter in cls.parameters().values()] == [
+        "param",
+        "define",
+        "define",
+        "define",
+        "structural",
+    ]
+    assert cls.parameters()["curve"].choices == ("soft", "hard")
     desc = TextureDesc("texture2d", "rgba16f", 101, 50)
     assert callable(darkened.size)
     assert darkened.size(cls(), Facts((64, 64), inputs={"color": (TextureInfo(desc, Radiance),)})) == (51, 25)
@@ -286,7 +291,7 @@ def test_what_is_compiled_in_stands_in_the_text(tmp_path: Path, body: str) -> No
     (tmp_path / "more.glsl").write_text("int mode = MODE;\n")
     header = "/*---\ndoc: It has a MODE.\nparams: {mode: {choices: [a, b]}}\n---*/\n// MODE\n"
     if body:
-        assert load(tmp_path, header + body + BODY).cls.role_of("mode") == "define"
+        assert load(tmp_path, header + body + BODY).cls.parameters()["mode"].role == "define"
     else:
         assert "nor MODE" in mistakes(tmp_path, header + BODY)[0]
 

@@ -150,7 +150,7 @@ def test_ports_and_parameters_of_a_plain_shader(tmp_path: Path) -> None:
         "count": 4,
         "on": True,
     }
-    assert {found.cls.role_of(name) for name in found.cls.parameters()} == {"param"}
+    assert {parameter.role for parameter in found.cls.parameters().values()} == {"param"}
 
 
 def test_whole_numbers_have_their_formats(tmp_path: Path) -> None:
