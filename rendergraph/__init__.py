@@ -18,13 +18,12 @@ __version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:
-    # Looked up on first use: `rendergraph --help` needs none of it.
     if name == "RendergraphError":
-        from rendergraph.errors import RendergraphError
+        from rendergraph.errors import RendergraphError  # `rendergraph --help` needs none of it
 
         return RendergraphError
     if name in __all__:
-        import rendergraph.session
+        import rendergraph.session  # nor of this
 
         return getattr(rendergraph.session, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

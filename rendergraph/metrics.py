@@ -175,7 +175,7 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
     OpenImageIO takes linear light for both forms, so display values are decoded first. HDR-FLIP chooses its exposures
     from the reference alone: a `maxluminance` of 0 is what the authors' own program computes.
     """
-    import OpenImageIO as oiio
+    import OpenImageIO as oiio  # for this metric alone
 
     hdr = encoding == "linear"
     if np.array_equal(a, b) and np.isfinite(a).all():
@@ -193,7 +193,7 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
 
 def description() -> dict[str, Any]:
     """Versions and parameters of the metrics, for results that outlive the program."""
-    from importlib.metadata import version
+    from importlib.metadata import version  # for a report alone
 
     return {
         "rmse": {"on": "sRGB-encoded R, G, B, 0…1; linear values for scene-linear references"},

@@ -65,7 +65,7 @@ def load(file: Path) -> Settings:
     Raises:
         InputError: it is no TOML, or has other keys than `asset_roots` and `plugins`, each a list of paths.
     """
-    import tomllib
+    import tomllib  # most projects have no such file
 
     place = Place(str(file))
     try:

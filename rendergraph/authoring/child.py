@@ -47,7 +47,7 @@ def main() -> None:
 
     file = Path(asked["file"])
     try:
-        from rendergraph.authoring.examine import examine_file
+        from rendergraph.authoring.examine import examine_file  # what fails here is told, too
 
         plugins = [Path(plugin) for plugin in asked["plugins"]]
         report = examine_file(file, plugins, asked["scene"], lambda stage, what: send(stage=stage, what=what))

@@ -52,7 +52,7 @@ class Catalog:
         Raises:
             InputError: a path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
         """
-        from importlib.metadata import entry_points
+        from importlib.metadata import entry_points  # takes longer than reading a pipeline
 
         named = {entry.path.resolve(): entry for entry in surroundings()} if installed else {}
         named |= {path.resolve(): Named(path) for path in plugin_paths}

@@ -37,7 +37,7 @@ def extensions(
 
 
 def _sources(folders: Iterable[tuple[str, Path]], installed: bool, without: Collection[str]) -> Iterator[Source]:
-    from importlib.metadata import entry_points
+    from importlib.metadata import entry_points  # takes longer than reading a pipeline
 
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.value) if installed else ():
         plugin = entry.dist.name if entry.dist is not None else entry.name

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeAlias, get_args
 
 from rendergraph.document import BROKEN, Value, parse, shown
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.textures import FORMATS, Filter, Wrap
 
 BEGIN, END = "/*---", "---*/"
@@ -84,8 +84,6 @@ def read_header(text: str, file: Path, name: str) -> Header:
 
 
 def _problem(name: str, lines: list[str], number: int, text: str) -> Problem:
-    from rendergraph.errors import Place
-
     line = lines[number]
     column = len(line) - len(line.lstrip()) + 1
     return Problem("RG440", text, Place(name, number + 1, column), line)

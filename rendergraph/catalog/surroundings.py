@@ -72,7 +72,7 @@ def _project(folder: Path) -> str:
     look(file)
     if not file.is_file():
         return ""
-    import tomllib
+    import tomllib  # most folders lie in no project
 
     try:
         name = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["name"]

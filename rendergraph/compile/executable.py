@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
+from rendergraph.program import prefix
 from rendergraph.steps import Step
 
 if TYPE_CHECKING:
@@ -197,8 +198,6 @@ class Executable:
 
 def step_uniforms(step: Step) -> dict[str, Any]:
     """A step's uniforms and, under their prefixed names, those of the functions it calls."""
-    from rendergraph.program import prefix
-
     values: dict[str, Any] = dict(step.uniforms)
     for function in step.functions:
         values |= {prefix(function.node) + name: value for name, value in function.uniforms}

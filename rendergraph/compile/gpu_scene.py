@@ -186,7 +186,7 @@ class GpuScene:
         missing = list(dict.fromkeys((t.image, t.srgb) for t in wanted if (t.image, t.srgb) not in self._images))
         if not missing:
             return
-        from concurrent.futures import ThreadPoolExecutor
+        from concurrent.futures import ThreadPoolExecutor  # for scenes with images alone
 
         with ThreadPoolExecutor() as pool:
             for key, pixels in zip(missing, pool.map(lambda k: self.decode(*k), missing), strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from opcode import opmap
 from types import CodeType, FrameType, TracebackType
 
 from rendergraph.declare.node import Node
@@ -33,8 +34,6 @@ def own_place(error: BaseException, module: str) -> tuple[str, int] | None:
 
 def is_deliberate(error: BaseException, cls: type) -> bool:
     """Whether the author's own code says `raise`: a message for users and no accident."""
-    from opcode import opmap
-
     last = error.__traceback__
     while last is not None and last.tb_next is not None:
         last = last.tb_next

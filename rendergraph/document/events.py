@@ -69,7 +69,7 @@ class _Builder:
             raise self.stop("RG007", over_limit("nodes", self.limits.nodes), mark)
 
     def build(self, parser: Any, event: Any, depth: int, key: tuple[int, int] | None = None) -> Value:
-        import yaml
+        import yaml  # loaded with the first file
 
         mark = event.start_mark
         line, column = mark.line + 1, mark.column + 1
@@ -160,7 +160,7 @@ def build(text: str, source: Source, limits: Limits, keep_going: bool) -> Docume
     Raises:
         InputError: it is no YAML of ours.
     """
-    import yaml
+    import yaml  # loaded with the first file
 
     if len(text) > limits.bytes or len(text.encode("utf-8", "surrogatepass")) > limits.bytes:
         raise InputError(Problem("RG007", over_limit("bytes", limits.bytes), Place(source.name)))
@@ -195,7 +195,7 @@ def _parser(text: str) -> object:
     try:
         from yaml.cyaml import CParser  # type: ignore[attr-defined]  # the stubs leave it out
     except ImportError:  # PyYAML built without libyaml: the same events, ten times slower
-        from yaml import SafeLoader
+        from yaml import SafeLoader  # in its stead
 
         return SafeLoader(text)
     return CParser(text)

@@ -116,7 +116,7 @@ class _Image:
 
     def read(self, channels: range, kind: str | None) -> Pixels:
         """Decoded pixels of these channels, as `kind` or as the file holds them."""
-        import OpenImageIO as oiio
+        import OpenImageIO as oiio  # loaded with the first picture read
 
         wanted = oiio.TypeDesc(kind) if kind else self.spec.format
         _check_size(self, len(channels), wanted.basesize())
@@ -130,7 +130,7 @@ class _Image:
 
 @contextlib.contextmanager
 def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
-    import OpenImageIO as oiio
+    import OpenImageIO as oiio  # loaded with the first picture read
 
     start, size = _beginning(source)
     kind = _kind_of(source, start)
@@ -138,7 +138,7 @@ def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
         path = os.path.abspath(source.path)
         if source.data is not None or Path(path).suffix.lower() != kind:
             # OpenImageIO chooses the decoder by the extension and reads no memory: give the file the name it deserves.
-            import tempfile
+            import tempfile  # for such images alone
 
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))
             named = Path(folder, f"image{kind}")

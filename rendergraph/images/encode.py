@@ -124,7 +124,7 @@ def _refused(path: Path, reason: str) -> InputError:
 def _write_file(
     path: Path, part: Path, pixels: Pixels, names: Sequence[str] | None, kind: str, metadata: Mapping[str, str]
 ) -> None:
-    import OpenImageIO as oiio
+    import OpenImageIO as oiio  # loaded with the first picture written
 
     height, width, count = pixels.shape
     spec = oiio.ImageSpec(width, height, count, kind)

@@ -94,7 +94,7 @@ class Graph:
         Each link is an edge with `source_port`, `target_port` and `previous`, which says that it reads last frame's
         value. Made when asked for: importing networkx takes longer than checking a pipeline.
         """
-        import networkx as nx
+        import networkx as nx  # takes longer than checking a pipeline
 
         dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
         for name, node in self.members.items():

@@ -25,7 +25,7 @@ def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
         TopologicalSorter(sources(nodes)).prepare()
         return []
     except CycleError:
-        import networkx as nx
+        import networkx as nx  # for the message of a mistake alone
     graph: nx.DiGraph[str] = nx.DiGraph()
     graph.add_nodes_from(nodes)
     graph.add_edges_from(links)

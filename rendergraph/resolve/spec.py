@@ -10,6 +10,7 @@ from typing import Any
 from rendergraph.catalog import Catalog
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Place, Problem
+from rendergraph.resolve.write import to_yaml
 from rendergraph.settings import Roots
 
 DEFAULT_SIZE = (1280, 720)
@@ -145,7 +146,5 @@ class PipelineSpec:
         Raises:
             InputError: something is wrong with it.
         """
-        from rendergraph.resolve.write import to_yaml
-
         self.check()
         return to_yaml(self.tree, origins)

@@ -43,7 +43,7 @@ def load(
     if suffix in EXTENSIONS:
         reading.exists(path, "scene file")
     if suffix in (".yaml", ".yml"):
-        from rendergraph.scene.scene_yaml import read_scene
+        from rendergraph.scene.scene_yaml import read_scene  # the largest of the readers
 
         scene = read_scene(path, reading)
     else:

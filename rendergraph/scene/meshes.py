@@ -25,11 +25,11 @@ def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, 
     """
     ending = path.suffix.lower()
     if ending == ".obj":
-        from rendergraph.scene.obj import read_obj
+        from rendergraph.scene.obj import read_obj  # each reader comes with its first file
 
         return read_obj(path, reading)
     if ending in (".gltf", ".glb"):
-        from rendergraph.scene.gltf import read_gltf
+        from rendergraph.scene.gltf import read_gltf  # each reader comes with its first file
 
         return read_gltf(path, reading)
     loader = reading.extensions.mesh_loader(ending)
@@ -38,6 +38,6 @@ def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, 
         text = f"{unknown.text} {', '.join(dict.fromkeys(endings))}"
         problem = Problem(unknown.code, text, unknown.place)
         raise InputError([problem, *reading.extensions.problems])
-    from rendergraph.scene.plugin_mesh import read_plugin_mesh
+    from rendergraph.scene.plugin_mesh import read_plugin_mesh  # each reader comes with its first file
 
     return read_plugin_mesh(path, loader, reading)

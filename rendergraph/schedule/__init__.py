@@ -68,7 +68,7 @@ class Schedule:
     @cached_property
     def dependencies(self) -> nx.DiGraph[StepKey]:
         """The same as a networkx graph: an edge from what must run earlier, with `resource` and `why`."""
-        import networkx as nx
+        import networkx as nx  # takes longer than scheduling
 
         dag: nx.DiGraph[StepKey] = nx.DiGraph()
         dag.add_nodes_from(self.waits)

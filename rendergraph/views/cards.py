@@ -127,7 +127,7 @@ def links(graph: Graph) -> list[Link]:
 
 def generations(graph: Graph) -> list[list[str]]:
     """Node ids in layers: everything a node waits for lies in layers before its own."""
-    import networkx as nx
+    import networkx as nx  # takes longer than checking a pipeline
 
     dag: nx.DiGraph[str] = nx.DiGraph()
     dag.add_nodes_from(node.id for node in graph.nodes)
