@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "scene", "function"]
+Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "function"]
 TEXTURE_KINDS: frozenset[str] = frozenset({"texture2d", "texture2d_array", "texture_cube"})
 
 Family = Literal["float", "unorm", "snorm", "uint", "int", "depth", "depth_stencil"]
@@ -116,7 +116,6 @@ Luminance = Semantic("luminance", "Scene luminance, relative to white at 1.")
 IrradianceSH = Semantic("irradiance_sh", "L2 spherical harmonics of the environment's radiance.")
 Any = Semantic("any", "Whatever is connected.")
 View = Semantic("view", "Matrices and size that geometry is drawn with.")
-SceneRef = Semantic("scene", "The scene that is drawn.")
 
 SEMANTICS: tuple[Semantic, ...] = (
     Radiance,
@@ -134,7 +133,6 @@ SEMANTICS: tuple[Semantic, ...] = (
     IrradianceSH,
     Any,
     View,
-    SceneRef,
 )
 
 

@@ -97,7 +97,7 @@ def _pictures(found: NodeType, outputs: list[dict[str, Any]], studio: Studio) ->
     """What its textures hold, and before it what they were made of; without textures, what its readers make of it."""
     figures = []
     for port in outputs:
-        textures = port["kind"] not in ("view", "function", "buffer", "scene")
+        textures = port["kind"] not in ("view", "function", "buffer")
         if textures and (shown := exhibit(found, port["name"])):
             figures += _pair(studio, f"{found.name}-{port['name']}", *shown)
     if not figures:

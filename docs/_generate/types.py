@@ -49,8 +49,8 @@ def pages() -> Iterator[tuple[str, str]]:
 
 
 def _linked(types: list[NodeType], meaning: str, side: str) -> str:
-    """The standard nodes with such a port; of `any`, `view` and `scene`, which most have, none."""
-    if meaning in ("any", "view", "scene"):
+    """The standard nodes with such a port; of `any` and `view`, which most have, none."""
+    if meaning in ("any", "view"):
         return ""
     found = [one.name for one in types if any(_means(port) == meaning for port in getattr(one.cls, side)().values())]
     return ", ".join(f"[`{name}`](generated/nodes/{name}.md)" for name in found)

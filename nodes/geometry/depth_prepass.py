@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Depth, Input, Node, Output, SceneRef, Steps, View
+from rendergraph.api import Depth, Input, Node, Output, Steps, View
 
 
 class DepthPrepass(Node):
@@ -12,7 +12,6 @@ class DepthPrepass(Node):
     """
 
     view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
     depth = Output(Depth, format="depth32f", clear=1.0, doc="Window depth, 1 where nothing is.")
 
     def record(self, steps: Steps) -> None:

@@ -17,7 +17,6 @@ from rendergraph.api import (
     Normal,
     Output,
     Port,
-    SceneRef,
     Steps,
     View,
     structural,
@@ -40,7 +39,6 @@ class GBuffer(Node):
     """
 
     view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
     depth = Output(Depth, format="depth32f", clear=1.0, doc="Window depth, 1 where nothing is.")
     albedo = Output(Albedo, format=_format("srgb8_a8"), clear=0.0, doc="Base colour; alpha is 1 where a surface is.")
     normal = Output(

@@ -12,7 +12,6 @@ from rendergraph.api import (
     Occlusion,
     Part,
     Port,
-    SceneRef,
     ShadowLookup,
     State,
     Steps,
@@ -119,7 +118,6 @@ class GeometryLighting(SurfaceLighting):
     """What every node that lights while the geometry is drawn takes beside its parameters."""
 
     view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
     depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
 
     background: Color = structural(default=0.0, min=0, doc="Radiance where nothing is, a number or RGB.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Depth, InOut, Input, Radiance, SceneRef, Steps
+from rendergraph.api import Depth, InOut, Input, Radiance, Steps
 
 from ._lighting import Lighting
 
@@ -15,7 +15,6 @@ class ForwardTransparent(Lighting):
     surfaces to it. They are ordered by their objects' centres, and seen as the depth was that hides them.
     """
 
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What is drawn; the pipeline's scene by default.")
     depth = Input(Depth, use="depth_test", doc="Depth of the opaque surfaces, with their view; tested, not written.")
     radiance = InOut(Radiance, doc="Scene-linear radiance; alpha is coverage, and colour is multiplied with it.")
 

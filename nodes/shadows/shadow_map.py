@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Facts, Frame, Input, Node, Output, SceneRef, ShadowMap, State, Steps, Views, structural
+from rendergraph.api import Facts, Frame, Node, Output, ShadowMap, State, Steps, Views, structural
 
 from ._light_views import layer_lights, light_views
 
@@ -23,7 +23,6 @@ class ShadowMapNode(Node):
     layers, the faces of a cube. The layers stand in the scene's order of lights.
     """
 
-    scene = Input(SceneRef, kind="scene", optional=True, doc="What casts; the pipeline's scene by default.")
     views = Views(count=_layers, lights=_lights, doc="The lights' views, one a layer.")
     shadow_map = Output(
         ShadowMap,

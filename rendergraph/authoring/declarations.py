@@ -60,7 +60,7 @@ def unused(node: NodeType, seen: Collection[str], files: Iterable[Path]) -> Iter
         if not in_shader and not re.search(rf"\.{name}\b", text):
             yield name
     for name, port in cls.inputs().items():
-        if isinstance(port, Input) and port.kind in ("view", "scene", "function"):
+        if isinstance(port, Input) and port.kind in ("view", "function"):
             continue
         looks = name in seen or any(re.fullmatch(rf"{name}_\d+", other) for other in seen)
         uses = getattr(port, "use", "sample") != "sample" or not isinstance(port, Input)

@@ -61,10 +61,7 @@ def examine(node: NodeType, scene: str = SCENE, tell: Tell = lambda stage, what:
         tell("pass", "default")
         trial = Trial(node, Path(folder), scene)
         trial.check_scene()
-        for name in trial.around.unfed:
-            text = f"nothing can be made up for input '{name}', so the node is not drawn"
-            problems.append(Problem("RG459", text, port_place(node, name), severity="warning"))
-        for variant in variants(node.cls) if not trial.around.unfed else ():
+        for variant in variants(node.cls):
             tell("pass", variant.name or "default")
             trial.run(variant)
         problems += _drawn(node, trial.close())

@@ -57,22 +57,16 @@ class Surrounded:
         folder: where shaders and pipelines of the surroundings are written.
         sources: input to the type that feeds it.
         readers: output to the type that reads it.
-        unfed: required inputs that nothing can be made for.
     """
 
     checked: NodeType
     folder: Path
     sources: dict[str, NodeType] = field(default_factory=dict)
     readers: dict[str, NodeType] = field(default_factory=dict)
-    unfed: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         for name, port in self.checked.cls.inputs().items():
-            cls = _source(name, port, self.folder)
-            if cls is not None:
-                self.sources[name] = self._added("feed", name, cls)
-            elif not port.optional:
-                self.unfed.append(name)
+            self.sources[name] = self._added("feed", name, _source(name, port, self.folder))
         for name, output in self.checked.cls.outputs().items():
             reader = _reader(name, output, self.folder)
             if reader is not None:
@@ -132,19 +126,17 @@ class Surrounded:
 # --- sources ---------------------------------------------------------------------------------------------------------
 
 
-def _source(name: str, port: Input | InOut, folder: Path) -> type[Node] | None:
-    """The class of a node that feeds a port, None where none can."""
+def _source(name: str, port: Input | InOut, folder: Path) -> type[Node]:
+    """The class of a node that feeds a port."""
     semantic = port.semantic
-    if port.kind == "function":
-        return _function_source(semantic, folder) if isinstance(semantic, Signature) else None
+    if isinstance(semantic, Signature):
+        return _function_source(semantic, folder)
     if port.kind == "view":
         return _node("Seen", made=Views(doc="The camera's view."), update=_camera("made"))
     if port.kind == "buffer":
         made = Output(AnyTexel, kind="buffer", bytes=_BUFFER_BYTES, doc="Zeros.")
         return _node("Zeros", made=made, record=lambda self, steps: steps.clear(self.made))
-    if port.kind not in TEXTURE_KINDS:
-        return None
-    meaning = semantic if isinstance(semantic, Semantic) and semantic.name != "any" else Radiance
+    meaning = Radiance if semantic is None or semantic.name == "any" else semantic
     given = port.format if isinstance(port, InOut) and isinstance(port.format, str) else None
     image = isinstance(port, Input) and port.use == "image"
     depth = meaning.name in _DEPTHS or (given is not None and FORMATS[given].is_depth)

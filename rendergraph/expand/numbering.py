@@ -125,7 +125,7 @@ class Numbering:
                 functions += self._own_function(recorder, port)
             elif isinstance(port, Input) and port.kind == "function":
                 functions += [f for end in recorder.links.get(port.name, ()) for f in self._function(end)]
-            elif not (isinstance(port, Input) and port.kind in ("view", "scene")):
+            elif not (isinstance(port, Input) and port.kind == "view"):
                 reads += self._reads(recorder, name, target if isinstance(target, Part) else Part(port))
         writes: list[Write] = []
         for name, part in request.out:

@@ -388,7 +388,7 @@ class Steps:
         """What a step reads, every input where it names none."""
         for target in named.values() or self.node.inputs().values():
             part = target if isinstance(target, Part) else Part(target)
-            if getattr(part.port, "kind", "function") not in ("view", "scene", "function"):
+            if getattr(part.port, "kind", "function") not in ("view", "function"):
                 yield part
 
 

@@ -330,17 +330,6 @@ void main() {
     assert check(python).messages == []
 
 
-def test_an_input_that_nothing_can_be_made_up_for_is_a_warning(check: Check) -> None:
-    python = GOOD.replace("Steps,", "SceneRef, Steps,").replace(
-        "    brighter", '    other = Input(SceneRef, kind="scene", doc="Another scene.")\n    brighter'
-    )
-    answer = check(python)
-    assert answer.code == 0
-    assert answer.messages == [
-        "glow.py:8:5: warning: RG459 nothing can be made up for input 'other', so the node is not drawn"
-    ]
-
-
 RECORDS = {
     "raises": ("raise KeyError('lamp')", r"glow.py:15:1: RG420 node 'glow' failed while recording: KeyError: 'lamp'$"),
     "samples its target": (

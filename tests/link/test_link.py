@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rendergraph.api import Facts, Input, Node, Output, Radiance, SceneRef, Views, structural
+from rendergraph.api import Facts, Input, Node, Output, Radiance, Views, structural
 from rendergraph.catalog import Catalog
 from rendergraph.declare import LightFacts
 from rendergraph.document import parse
@@ -241,7 +241,6 @@ def test_a_failing_count_of_views_is_the_authors_mistake() -> None:
         """Views that fail."""
 
         views = Views(count=count, doc="Views.")
-        scene = Input(SceneRef, kind="scene", optional=True, doc="Scene.")
         radiance = Output(Radiance, doc="Light.")
         size: int = structural(default=1, doc="Nothing.")
 
