@@ -23,6 +23,7 @@ from rendergraph.declare import (
     param,
     structural,
 )
+from rendergraph.errors import SceneError
 from rendergraph.steps import (
     ADD,
     ALPHA,
@@ -92,6 +93,7 @@ __all__ = [
     "Part",
     "Port",
     "Radiance",
+    "SceneError",
     "Semantic",
     "ShadowLookup",
     "ShadowMap",

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from rendergraph.compile import Executable
 from rendergraph.declare import Node, Port, Views
-from rendergraph.declare.blame import author_line, what_happened
-from rendergraph.errors import Misuse, Problem, RenderError, node_named, shown_file
+from rendergraph.declare.blame import happened
+from rendergraph.errors import Misuse, Problem, RenderError, node_named
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.surroundings import settle
@@ -234,11 +234,9 @@ class Runner:
             raise
         except (Exception, SystemExit) as error:  # a stranger's code
             code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
-            happened = what_happened(error, type(node.node))
-            if not author_line(error, type(node.node)) and node.type.file.name:
-                happened = f"{shown_file(node.type.file)}: {happened}"
-            text = f"{node_named(node.id, node.type.name)} failed in update: {happened}"
-            raise RenderError(Problem(code, text, node.place)) from error
+            mistake = happened(error, type(node.node), node.type.file)
+            doing = f"{node_named(node.id, node.type.name)} failed in update"
+            raise RenderError(mistake.problem(code, doing, node.place)) from error
 
     def _check_views(self) -> None:
         """Every table of a node that runs has been filled by its `update`."""

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api import ViewMatrices
+from rendergraph.api import SceneError, ViewMatrices
 
 Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
@@ -31,7 +31,7 @@ def layer_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[in
         lights: the scene's lights, with `name`, `type` and `casts_shadow`, which `auto` asks for.
 
     Raises:
-        ValueError: no light has that name.
+        SceneError: no light has that name.
     """
     kinds = [light.type for light in lights]
     if wanted == "auto":
@@ -48,7 +48,7 @@ def _index(name: str, names: list[str]) -> int:
         return names.index(name)
     near = get_close_matches(name, names, n=1)
     way_out = f"did you mean '{near[0]}'?" if near else f"there is {', '.join(names) or 'no light'}"
-    raise ValueError(f"the scene has no light '{name}'; {way_out}")
+    raise SceneError(f"the scene has no light '{name}'; {way_out}", name)
 
 
 def light_views(table: Sequence[int], scene: Any, camera: ViewMatrices, resolution: int) -> list[ViewMatrices]:

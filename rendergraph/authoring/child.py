@@ -17,8 +17,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from rendergraph.authoring.places import causes, line_through
-from rendergraph.errors import Problem, RendergraphError, shown_file
+from rendergraph.declare.blame import causes, raised_at
+from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 
 ENDED, OUT_OF_MEMORY = "RG450", "RG453"
 
@@ -63,9 +63,10 @@ def main() -> None:
 
 
 def _shown(problem: Problem) -> Problem:
-    """The same with its file as messages print it."""
+    """The same with its file as messages print it, and no more than the parent wants."""
     place = problem.place
-    return replace(problem, place=replace(place, file=shown_file(place.file))) if place is not None else problem
+    file = replace(place, file=shown_file(place.file)) if place is not None else None
+    return replace(problem, place=file, mistake=None)
 
 
 def _memory(file: Path, limit: int, error: BaseException) -> Problem | None:
@@ -73,13 +74,13 @@ def _memory(file: Path, limit: int, error: BaseException) -> Problem | None:
     if not any(isinstance(cause, MemoryError) for cause in causes(error)):
         return None
     text = f"it takes more than the {limit / 2**20:.0f} MiB of memory that it may; --limit memory=MiB allows more"
-    return Problem(OUT_OF_MEMORY, text, line_through(error, file))
+    return Problem(OUT_OF_MEMORY, text, raised_at(error, file) or Place(shown_file(file)))
 
 
 def _other(file: Path, error: BaseException) -> dict[str, Any]:
     """What to send for anything else: the author's where it came through the author's lines, else our own mistake."""
-    place = line_through(error, file)
-    if not place.line:
+    place = raised_at(error, file)
+    if place is None:
         return {"mistake": "".join(traceback.format_exception(error))}
     text = f"it raises {type(error).__name__}: {' '.join(str(error).split())[:300]}"
     return {"failed": [asdict(Problem(ENDED, text, place))], "exit_code": 3}

@@ -8,19 +8,20 @@ from pathlib import Path
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Function, Input, Made, Node, Views
+from rendergraph.errors import Mistake
 from rendergraph.glsl import expand
 from rendergraph.resources import folder
 
 LONGEST_DOC = 160
 
 
-def docs(cls: type[Node]) -> Iterator[tuple[str, str]]:
-    """Port or parameter (empty for the class) and what is wrong with its doc: each is one line that ends in a stop."""
+def docs(cls: type[Node]) -> Iterator[Mistake]:
+    """What is wrong with the docs of the class, its ports and parameters: each is one line that ends in a stop."""
     first = (cls.__doc__ or "").strip().partition("\n")[0]
     if not first:
-        yield "", "has no docs"
+        yield Mistake("", "has no docs")
     elif not first.endswith("."):
-        yield "", "the first line of its docs is no sentence that ends in '.'"
+        yield Mistake("", "the first line of its docs is no sentence that ends in '.'")
     found = {
         name: port.doc
         for name, port in cls.ports().items()
@@ -29,11 +30,12 @@ def docs(cls: type[Node]) -> Iterator[tuple[str, str]]:
     found |= {name: parameter.doc for name, parameter in cls.parameters().items()}
     for name, doc in found.items():
         if not doc:
-            yield name, f"'{name}' has no doc"
+            yield Mistake(name, f"'{name}' has no doc")
         elif not doc.endswith("."):
-            yield name, f"the doc of '{name}' is no sentence that ends in '.'"
+            yield Mistake(name, f"the doc of '{name}' is no sentence that ends in '.'")
         elif len(doc) >= LONGEST_DOC:
-            yield name, f"the doc of '{name}' has {len(doc)} letters; one line takes less than {LONGEST_DOC}"
+            text = f"the doc of '{name}' has {len(doc)} letters; one line takes less than {LONGEST_DOC}"
+            yield Mistake(name, text)
 
 
 def ranges(cls: type[Node]) -> Iterator[str]:

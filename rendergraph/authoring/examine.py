@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 from rendergraph.authoring import declarations
-from rendergraph.authoring.places import port_place
 from rendergraph.authoring.report import Report
 from rendergraph.authoring.trial import SCENE, Trial
 from rendergraph.authoring.variants import variants
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.declare.blame import declared_by
+from rendergraph.errors import InputError, Problem, shown_file
 
 Tell = Callable[[str, str], None]
 """Called with the stage, `import` or `pass`, and what is about to be done."""
@@ -70,19 +70,19 @@ def examine(node: NodeType, scene: str = SCENE, tell: Tell = lambda stage, what:
     ):  # what is not drawn looks at nothing
         for name in declarations.unused(node, trial.seen, trial.files):
             text = f"'{name}' is declared, but no program looks at it: none uses it, or it changes nothing"
-            problems.append(Problem("RG455", text, port_place(node, name), severity=_mild(node)))
+            problems.append(Problem("RG455", text, declared_by(node.cls, node.file, name), severity=_mild(node)))
     return Report(node.name, tuple(trial.tried), tuple(dict.fromkeys(problems)))
 
 
 def _declared(node: NodeType) -> list[Problem]:
     """What is wrong with docs and ranges; of a shader file, what it lacks is a warning that its type has already."""
     found = list(node.warnings)
-    for name, text in declarations.docs(node.cls) if not node.is_shader else ():
-        place = port_place(node, name) if name else Place(shown_file(node.file))
-        found.append(Problem("RG490", f"node type '{node.name}': {text}", place))
+    for mistake in declarations.docs(node.cls) if not node.is_shader else ():
+        place = declared_by(node.cls, node.file, mistake.subject)
+        found.append(mistake.problem("RG490", f"node type '{node.name}'", place))
     for name in declarations.ranges(node.cls) if not node.is_shader else ():
         text = f"parameter '{name}' does not say between which values it lies (min, max)"
-        found.append(Problem("RG460", text, port_place(node, name), severity="warning"))
+        found.append(Problem("RG460", text, declared_by(node.cls, node.file, name), severity="warning"))
     return found
 
 

@@ -46,6 +46,7 @@ _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 
 _ANY_VALUE = "vec4(at, wave, 1.0)"
 _DEPTHS = ("depth", "shadow_map")
 _BUFFER_BYTES = 1 << 20
+_FROM = "from-"  # before the name of what feeds an input; no port has it
 
 
 @dataclass
@@ -104,17 +105,21 @@ class Surrounded:
             link = f"{source.name}.made"
             inputs[name] = [link] if isinstance(port, Input) and port.many else link
             if name in self.fed:
-                outputs[f"from_{name}"] = link
+                outputs[_FROM + name] = link
         if variant.outputs:
             nodes[node] = {"type": node, "inputs": inputs, "params": dict(variant.params)}
         for name in variant.outputs:
             reader = self.readers.get(name)
             if reader is None:
-                outputs[f"to_{name}"] = f"{node}.{name}"
+                outputs[name] = f"{node}.{name}"
             else:
                 nodes[reader.name] = {"type": reader.name, "inputs": {"read": f"{node}.{name}"}}
-                outputs[f"to_{name}"] = f"{reader.name}.made"
+                outputs[name] = f"{reader.name}.made"
         return {"rendergraph": 1, "size": list(SIZE), "scene": scene, "nodes": nodes, "outputs": outputs}
+
+    def input_of(self, output: str) -> str:
+        """The input that an output of the pipeline feeds; empty for an output of the node."""
+        return output.removeprefix(_FROM) if output.startswith(_FROM) else ""
 
     def write(self, variant: Variant, scene: str) -> Path:
         """The pipeline of a variant as a file; JSON is YAML."""

@@ -45,13 +45,13 @@ def let_go(device: Device) -> None:
     device.ctx.gc()
 
 
-def watched(cls: type[Node], device: Device, tell: Callable[[str], None]) -> type[Node]:
+def watched(cls: type[Node], device: Device, tell: Callable[[str, str], None]) -> type[Node]:
     """The same class, whose `record` and `update` are held against the GL state before and after.
 
     Args:
         cls: an author's class.
         device: the current context.
-        tell: called with a sentence for each thing that was changed.
+        tell: called with the method and what it does wrong, for each thing that was changed.
     """
     names = [name for name in ("record", "update") if getattr(cls, name) is not getattr(Node, name)]
     if not names:
@@ -61,7 +61,7 @@ def watched(cls: type[Node], device: Device, tell: Callable[[str], None]) -> typ
     return types.new_class(cls.__name__, (cls,), exec_body=lambda space: space.update(body))
 
 
-def _compared(cls: type[Node], name: str, device: Device, tell: Callable[[str], None]) -> Any:
+def _compared(cls: type[Node], name: str, device: Device, tell: Callable[[str, str], None]) -> Any:
     inner = getattr(cls, name)
 
     def call(self: Node, argument: Any) -> None:
@@ -70,10 +70,10 @@ def _compared(cls: type[Node], name: str, device: Device, tell: Callable[[str], 
         error = device.raw.error()
         after = _state(device)
         if error:
-            tell(f"'{name}' leaves the GL error {error} behind")
+            tell(name, f"leaves the GL error {error} behind")
         for key, words in _KEPT.items():
             if before[key] != after[key]:
-                tell(f"'{name}' changes OpenGL's state: {words}")
+                tell(name, f"changes OpenGL's state: {words}")
 
     return call
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,12 +12,12 @@ import numpy.typing as npt
 
 from rendergraph.authoring.feed import Surrounded
 from rendergraph.authoring.gl_watch import let_go, living, watched
-from rendergraph.authoring.places import causes, declared_at, line_through, port_place
 from rendergraph.authoring.variants import Variant
 from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import Draw
 from rendergraph.declare import Node
-from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
+from rendergraph.declare.blame import causes, declared_by, declared_in, raised_at
+from rendergraph.errors import InputError, Mistake, Place, Problem, RendergraphError, shown_file
 from rendergraph.execute import Runner
 from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
@@ -100,8 +99,8 @@ class Trial:
 
     def _is_missing(self, output: str, error: RendergraphError) -> bool:
         """Whether an error says that the node did not write an output in this variant."""
-        shows = f"'{self.type.name}.{output}'"
-        return any(problem.code == "RG604" and shows in problem.text for problem in error.problems)
+        of = [problem.mistake.subject for problem in error.problems if problem.code == "RG604" and problem.mistake]
+        return f"{self.type.name}.{output}" in of
 
     def check_scene(self) -> None:
         """Read the scene, which is no matter of the node's.
@@ -153,7 +152,7 @@ class Trial:
 
     def port_place(self, name: str) -> Place:
         """Where a port or parameter is declared."""
-        return port_place(self.type, name)
+        return declared_by(self.type.cls, self.type.file, name)
 
     # Running ----------------------------------------------------------------------------------------------------------
 
@@ -211,7 +210,7 @@ class Trial:
         runner.check()
         drawn = {}
         for name, shown in plan.schedule.wanted.items():
-            own = f"{self.type.name}.{name.removeprefix('to_')}"  # the bytes themselves, instead of what shows some
+            own = f"{self.type.name}.{name}"  # the bytes themselves, instead of what shows some
             is_buffer = own in plan.placement and isinstance(plan.resources[own].desc, BufferDesc)
             drawn[name] = runner.read(own if is_buffer else shown)
         return drawn
@@ -227,15 +226,15 @@ class Trial:
 
         colors = [write.name for write in step.writes if write.use == "color"]
         if step.node == self.type.name and colors and not outputs_of(program):
-            place = declared_at(self.type.shaders / dict(step.shaders)["fragment"], colors[0])
+            place = declared_in(self.type.shaders / dict(step.shaders)["fragment"], colors[0])
             self.say(Problem("RG454", f"the shader never writes '{colors[0]}', which its step draws to", place))
 
     def _compare(
         self, variant: Variant, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]
     ) -> None:
         for name in one:
-            port = name.partition("_")[2]
-            if name.startswith("from_"):
+            port = self.around.input_of(name)
+            if port:
                 if not np.array_equal(self._fed[name], one[name]):
                     text = f"the node changes its input '{port}'; an InOut port may be continued, inputs are only read"
                     self.say(Problem("RG457", text, self.port_place(port)))
@@ -246,35 +245,28 @@ class Trial:
             count = int(_texels(differ, one[name]).sum())
             total = _texels(differ, one[name]).size
             if count and not any(problem.code == "RG454" for problem in self.problems):
-                text = f"{count} of {total} texels of '{port}' are not written; write them all, or declare `clear=`"
+                text = f"{count} of {total} texels of '{name}' are not written; write them all, or declare `clear=`"
                 if one[name].ndim == 1:
-                    text = f"{count} of {total} bytes of '{port}' are not written, or added to what nobody has cleared"
+                    text = f"{count} of {total} bytes of '{name}' are not written, or added to what nobody has cleared"
                     text += "; write them all, or declare `clear=0`"
-                self.say(Problem("RG454", text, self.port_place(port)))
+                self.say(Problem("RG454", text, self.port_place(name)))
             elif not count and one[name].dtype.kind == "f" and not np.isfinite(one[name]).all():
                 bad = int(_texels(~np.isfinite(one[name]), one[name]).sum())
-                text = f"{bad} of {total} texels of '{port}' are not finite (NaN or infinite)"
-                self.say(Problem("RG458", text, self.port_place(port), severity="warning"))
+                text = f"{bad} of {total} texels of '{name}' are not finite (NaN or infinite)"
+                self.say(Problem("RG458", text, self.port_place(name), severity="warning"))
 
-    def _state(self, sentence: str) -> None:
-        self.say(Problem("RG456", sentence, self.port_place(sentence.split("'")[1])))
+    def _state(self, method: str, does: str) -> None:
+        self.say(Problem("RG456", f"'{method}' {does}", self.port_place(method)))
 
     def _own(self, problem: Problem, error: RendergraphError | None) -> Problem:
         """The same at a place in the author's files instead of one in the surroundings'."""
-        if found := re.match(r"output 'to_(\w+)'", problem.text):  # the surroundings' output is named for the node's
-            text = f"output '{found[1]}'{problem.text[found.end() :]}"
-            return replace(problem, text=text, place=self.port_place(found[1]), line_text="")
         if problem.place is not None and not Path(problem.place.file).resolve().is_relative_to(self.folder.resolve()):
             return problem
-        if error is None:
-            return replace(problem, place=None, line_text="")
-        place = line_through(error, self.type.file)
-        found = re.search(rf"{re.escape(self.shown)}:(\d+): ", problem.text)
-        if found:  # a step's own line stands in the text, and once is enough
-            place = Place(self.shown, int(found[1]), 1)
-            return replace(problem, text=problem.text.replace(found[0], "", 1), place=place, line_text="")
-        ports = [word for word in re.findall(r"'(\w+)'", problem.text) if word in self.type.cls.ports()]
-        return replace(problem, place=self.port_place(ports[0]) if ports and not place.line else place, line_text="")
+        mistake = problem.mistake or Mistake("", problem.text)
+        place = mistake.place or (raised_at(error, self.type.file) if error is not None else None)
+        if place is None and error is not None:
+            place = self.port_place(mistake.subject.rpartition(".")[2])
+        return replace(problem, text=mistake.text, place=place, line_text="")
 
     def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:
         met = list(dict.fromkeys(names))

@@ -87,14 +87,11 @@ class Entries:
         else:
             self.problems.append(Problem(code, text, *self.place(found.at)))
 
-    def place_of(self, text: str) -> Place:
-        """Where the first name is declared that a message quotes."""
-        for name in re.findall(r"'(\w+)'", text):
-            if name in self.declared and (place := self.place(self.declared[name].at)[0]):
-                return place
-            if name in self.header.names:
-                return self.header.names[name].key_place
-        return Place(self.shown)
+    def place_of(self, name: str) -> Place:
+        """Where a name is declared, in the text or else in the header."""
+        if name in self.declared and (place := self.place(self.declared[name].at)[0]):
+            return place
+        return self.header.names[name].key_place if name in self.header.names else Place(self.shown)
 
     # Everything ------------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog.surroundings import plain
-from rendergraph.declare import Extension, Extensions, Source, extension_mistakes, raised_at
+from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
+from rendergraph.declare.blame import raised_at
 from rendergraph.errors import Place, Problem, shown_file
 from rendergraph.stamps import look
 
@@ -79,5 +80,5 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     defined = sys.modules.get(value.partition(":")[0])
     file = file if file.name else Path(getattr(defined, "__file__", None) or "")
     mistakes = extension_mistakes(found, file.parent)
-    problems = tuple(Problem("RG495", f"plugin '{plugin}': {mistake}", place) for mistake in mistakes)
+    problems = tuple(mistake.problem("RG495", f"plugin '{plugin}'", place) for mistake in mistakes)
     return Source(plugin, file, None if mistakes else found, problems)

@@ -82,16 +82,11 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
     parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record, **entries.ports}
     base = new_class(words, (Node,), {}, lambda space: space.update(parts))
     cls: type[Node] = create_model(words, __base__=base, __module__=__name__, __doc__=doc, **entries.fields)
-    mistakes = [mistake for mistake in declaration_mistakes(cls) if not _is_forgiven(mistake)]
+    # Docs may be missing, which a warning says; and other tools' shaders have names with capitals.
+    mistakes = [mistake for mistake in declaration_mistakes(cls) if mistake.kind not in ("doc", "case")]
     if mistakes:
-        problems = [Problem("RG490", f"shader '{file.name}': {text}", entries.place_of(text)) for text in mistakes]
-        raise InputError(problems)
+        where = f"shader '{file.name}'"
+        raise InputError([mistake.problem("RG490", where, entries.place_of(mistake.subject)) for mistake in mistakes])
     lines = [line.rstrip() for line in source.lines if line.strip()]
     text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", raw, re.DOTALL | re.MULTILINE)[:1], *lines])
     return _Made(cls, tuple(entries.warnings(cls)), text)
-
-
-def _is_forgiven(mistake: str) -> bool:
-    """What only a warning says of a shader file: docs, and names with capitals, which other tools' shaders have."""
-    odd = re.match(r"'([A-Za-z]\w*)' is not a lower-case GLSL identifier\Z", mistake, re.ASCII)
-    return mistake.endswith("has no doc") or (odd is not None and "__" not in odd[1] and not odd[1].startswith("gl_"))

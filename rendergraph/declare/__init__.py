@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from rendergraph.declare.extension import READ_IMAGES, Choice, Extension, MeshData, extension_mistakes
-from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source, raised_at
+from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source
 from rendergraph.declare.facts import Facts, LightFacts, TextureInfo
-from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes, mistake_place
+from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter, define, param, structural
 from rendergraph.declare.ports import (
@@ -55,8 +55,6 @@ __all__ = [
     "declaration_mistakes",
     "define",
     "extension_mistakes",
-    "mistake_place",
     "param",
-    "raised_at",
     "structural",
 ]

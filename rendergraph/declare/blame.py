@@ -1,52 +1,120 @@
-"""Where in its author's own files an exception came from."""
+"""Where in its author's own files something is declared, and which of their lines an exception came through."""
 
 from __future__ import annotations
 
+import ast
+import re
+import sys
 from collections.abc import Iterator
-from opcode import opmap
-from types import CodeType, FrameType, TracebackType
+from pathlib import Path
+from types import FrameType
+from typing import Any
 
 from rendergraph.declare.node import Node
-from rendergraph.errors import Misuse, nearest, shown_file, suggestion
+from rendergraph.errors import Mistake, Misuse, Place, nearest, shown_file, suggestion
 
 
-def author_line(error: BaseException, cls: type) -> str:
-    """`file:line` of the innermost line of the node's own package that an exception came through.
+def raised_at(error: BaseException, *own: Path | str) -> Place | None:
+    """The innermost line of an author's that an exception, or else what caused it, came through.
 
-    Helpers beside the node count as the author's own; the framework, NumPy and the like do not.
+    A syntax error is in its own line. Helpers beside a node count as the author's; the framework, NumPy and the like
+    do not.
 
     Args:
         error: what was raised.
-        cls: the node's class.
+        own: what is the author's: a file, a folder, or a module's name for all of its package.
 
     Returns:
-        The place, or nothing where the exception never met the author's code.
+        The place, None where the exception never met the author's code.
     """
-    found = own_place(error, cls.__module__)
-    return f"{shown_file(found[0])}:{found[1]}" if found is not None else ""
+    folders = [path for path in own if isinstance(path, Path)]
+    packages = {module.partition(".")[0] for module in own if isinstance(module, str)}
+
+    def is_own(frame: FrameType) -> bool:
+        module = str(frame.f_globals.get("__name__", ""))
+        if module.partition(".")[0] in packages and not is_framework(module):
+            return True
+        return any(Path(frame.f_code.co_filename).is_relative_to(folder) for folder in folders)
+
+    for cause in causes(error):
+        if isinstance(cause, SyntaxError) and cause.filename:
+            file = Path(cause.filename)
+            if any(file.is_relative_to(folder) for folder in folders):
+                return Place(shown_file(file), cause.lineno or 1, 1)
+        trace, found = cause.__traceback__, None
+        while trace is not None:
+            if is_own(trace.tb_frame):
+                found = Place(shown_file(trace.tb_frame.f_code.co_filename), trace.tb_lineno, 1)
+            trace = trace.tb_next
+        if found is not None:
+            return found
+    return None
 
 
-def own_place(error: BaseException, module: str) -> tuple[str, int] | None:
-    """File and line of the innermost line of a module's own package that an exception came through."""
-    own = [(code.co_filename, line) for frame, code, line in _frames(error.__traceback__) if _is_own(frame, module)]
-    return own[-1] if own else None
+def declared_by(cls: type[Node], file: Path, name: str = "") -> Place:
+    """Where a node declares a port, a parameter or a method: in its own file, or in that of a base; else its class.
+
+    Args:
+        cls: the node's class.
+        file: its module, or the shader that it is made of.
+        name: what is declared; empty for the node itself.
+    """
+    if file.suffix == ".py":
+        own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
+        for base in (base for base in own if name in {**vars(base), **vars(base).get("__annotations__", {})}):
+            module = getattr(sys.modules.get(base.__module__), "__file__", None)
+            found = declared_in(Path(module) if module else file, name)
+            if found.line:
+                return found
+        return declared_in(file, cls.__name__)
+    return declared_in(file, name)
 
 
-def is_deliberate(error: BaseException, cls: type) -> bool:
-    """Whether the author's own code says `raise`: a message for users and no accident."""
-    last = error.__traceback__
-    while last is not None and last.tb_next is not None:
-        last = last.tb_next
-    if last is None or not _is_own(last.tb_frame, cls.__module__):
-        return False
-    return last.tb_frame.f_code.co_code[last.tb_lasti] == opmap["RAISE_VARARGS"]
+def declared_in(file: Path, name: str) -> Place:
+    """Where a file declares a name: a Python class, its attribute or method, or a shader's variable.
+
+    Returns:
+        The declaration, the first line of a shader that mentions the name, or else the file.
+    """
+    try:
+        text = file.read_text(encoding="utf-8", errors="replace")
+        found = _in_module(text, name) if file.suffix == ".py" else _in_shader(text, name)
+    except (OSError, SyntaxError, ValueError):
+        found = None
+    return Place(shown_file(file), *found) if found is not None else Place(shown_file(file))
 
 
-def what_happened(error: BaseException, cls: type) -> str:
-    """`file:line: KeyError: 'x'`, without the exception's name where the framework refused a call."""
-    where = author_line(error, cls)
+def _in_module(text: str, name: str) -> tuple[int, int] | None:
+    classes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ClassDef)]
+    for statement in [*(statement for cls in classes for statement in cls.body), *classes]:
+        targets: list[Any] = getattr(statement, "targets", [getattr(statement, "target", statement)])
+        if name in [getattr(target, "id", getattr(target, "name", None)) for target in targets]:
+            return statement.lineno, statement.col_offset + 1
+    return None
+
+
+def _in_shader(text: str, name: str) -> tuple[int, int] | None:
+    word = rf"\b{re.escape(name)}\b"
+    for pattern in (rf"^\s*{word}\s*:", rf"\b(?:in|out|uniform|buffer)\b.*{word}", word):
+        for number, line in enumerate(text.splitlines(), start=1):
+            if found := re.search(pattern, line):
+                return number, found.start() + len(found[0]) - len(found[0].lstrip()) + 1
+    return None
+
+
+def happened(error: BaseException, cls: type, file: Path | None = None) -> Mistake:
+    """`KeyError: 'x'` with the author's line, without the exception's name where the framework refused a call.
+
+    Args:
+        error: what a node's own code raised.
+        cls: the node's class.
+        file: the place where the exception never met the author's code.
+    """
+    place = raised_at(error, cls.__module__)
+    if place is None and file is not None and file.name:
+        place = Place(shown_file(file))
     text = str(error) if isinstance(error, Misuse) else f"{type(error).__name__}: {error}{_meant(error)}"
-    return f"{where}: {text}" if where else text
+    return Mistake("", text, place=place)
 
 
 def _meant(error: BaseException) -> str:
@@ -61,15 +129,12 @@ def _meant(error: BaseException) -> str:
     return f"; did you mean '{near}'?" if near is not None else ""
 
 
-def _frames(trace: TracebackType | None) -> Iterator[tuple[FrameType, CodeType, int]]:
-    while trace is not None:
-        yield trace.tb_frame, trace.tb_frame.f_code, trace.tb_lineno
-        trace = trace.tb_next
-
-
-def _is_own(frame: FrameType, module: str) -> bool:
-    name = str(frame.f_globals.get("__name__", ""))
-    return name.partition(".")[0] == module.partition(".")[0] and not is_framework(name)
+def causes(error: BaseException) -> Iterator[BaseException]:
+    """An error, what it came from, and so on."""
+    found: BaseException | None = error
+    while found is not None:
+        yield found
+        found = found.__cause__
 
 
 def is_framework(module: str) -> bool:

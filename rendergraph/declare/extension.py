@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from rendergraph.errors import Mistake
 from rendergraph.textures import Semantic
 
 if TYPE_CHECKING:
@@ -98,46 +99,53 @@ READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
 _OWN_METRICS = ("flip", "rmse", "psnr", "ssim", "radiance_rmse")
 
 
-def extension_mistakes(extension: Extension, folder: Path) -> list[str]:
-    """What is wrong with an extension, one sentence each.
+def extension_mistakes(extension: Extension, folder: Path) -> list[Mistake]:
+    """What is wrong with an extension; each mistake's subject is a field of it.
 
     Args:
         extension: as the plugin wrote it.
         folder: where the files it names are.
     """
     if not isinstance(extension.semantics, Iterable):
-        return ["'semantics' is a tuple of Semantic"]
+        return [Mistake("semantics", "'semantics' is a tuple of Semantic")]
     mistakes = [
-        f"'semantics' holds {value!r}, which is no Semantic"
+        Mistake("semantics", f"'semantics' holds {value!r}, which is no Semantic")
         for value in extension.semantics
         if not isinstance(value, Semantic)
     ]
     for name in ("choices", "meshes", "images", "metrics"):
         if not isinstance(getattr(extension, name), Mapping):
-            mistakes.append(f"'{name}' is a mapping, not {type(getattr(extension, name)).__name__}")
+            mistakes.append(Mistake(name, f"'{name}' is a mapping, not {type(getattr(extension, name)).__name__}"))
     if mistakes:
         return mistakes
     for parameter, choices in extension.choices.items():
         if not isinstance(choices, Mapping):
-            mistakes.append(f"choices['{parameter}'] maps a choice to its include, it is {type(choices).__name__}")
+            text = f"choices['{parameter}'] maps a choice to its include, it is {type(choices).__name__}"
+            mistakes.append(Mistake("choices", text))
             continue
         for name, choice in choices.items():
-            mistakes += _wrong_choice(f"choices['{parameter}']['{name}']", str(name), choice, folder)
-    endings = (("meshes", extension.meshes, _READ_MESHES), ("images", extension.images, READ_IMAGES))
-    for kind, loaders, own in endings:
-        mistakes += _wrong_functions(kind, loaders)
-        for ending in map(str, loaders):
-            if not _ENDING.match(ending):
-                mistakes.append(f"{kind} has '{ending}'; a file's ending is a dot and small letters, as in '.stl'")
-            elif ending in own:
-                mistakes.append(f"{kind} has '{ending}', which rendergraph reads itself")
-    mistakes += _wrong_functions("metrics", extension.metrics)
+            texts = _wrong_choice(f"choices['{parameter}']['{name}']", str(name), choice, folder)
+            mistakes += [Mistake("choices", text) for text in texts]
+    for kind, loaders, own in (("meshes", extension.meshes, _READ_MESHES), ("images", extension.images, READ_IMAGES)):
+        mistakes += [
+            Mistake(kind, text) for text in (*_wrong_functions(kind, loaders), *_wrong_endings(kind, loaders, own))
+        ]
+    mistakes += [Mistake("metrics", text) for text in _wrong_functions("metrics", extension.metrics)]
     for name in map(str, extension.metrics):
         if not _WORD.match(name):
-            mistakes.append(f"metric '{name}' is not of small letters, digits and single '_'")
+            mistakes.append(Mistake("metrics", f"metric '{name}' is not of small letters, digits and single '_'"))
         elif name in _OWN_METRICS:
-            mistakes.append(f"metric '{name}' is one of rendergraph's own; choose another name")
+            text = f"metric '{name}' is one of rendergraph's own; choose another name"
+            mistakes.append(Mistake("metrics", text))
     return mistakes
+
+
+def _wrong_endings(kind: str, loaders: Mapping[str, object], own: Collection[str]) -> Iterator[str]:
+    for ending in map(str, loaders):
+        if not _ENDING.match(ending):
+            yield f"{kind} has '{ending}'; a file's ending is a dot and small letters, as in '.stl'"
+        elif ending in own:
+            yield f"{kind} has '{ending}', which rendergraph reads itself"
 
 
 def _wrong_choice(what: str, name: str, choice: object, folder: Path) -> Iterator[str]:

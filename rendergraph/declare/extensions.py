@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import inspect
-import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from rendergraph.declare.blame import raised_at
 from rendergraph.declare.extension import Choice, Extension, ImageLoader, MeshLoader, Metric
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.stamps import Stamp, again, looking
@@ -228,13 +228,3 @@ NO_EXTENSIONS = Extensions()
 def _absolute(choice: Choice | str | Path, folder: Path) -> Choice:
     plain = choice if isinstance(choice, Choice) else Choice(choice)
     return Choice(folder / plain.shader, tuple(plain.needs))
-
-
-def raised_at(error: BaseException, folder: Path) -> Place | None:
-    """The innermost line in a folder, or in one file, that an exception came through, or that a syntax error is in."""
-    if isinstance(error, SyntaxError) and error.filename and Path(error.filename).is_relative_to(folder):
-        return Place(shown_file(error.filename), error.lineno or 1, 1)
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        if Path(frame.filename).is_relative_to(folder):
-            return Place(shown_file(frame.filename), frame.lineno or 1, 1)
-    return None

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import math
 import re
 import types
-from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import ValidationError
@@ -18,7 +15,7 @@ from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
 from rendergraph.declare.ports import History, Internal
-from rendergraph.errors import Place, shown_file
+from rendergraph.errors import Mistake
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
@@ -61,8 +58,8 @@ _OF_THE_FRAMEWORK = frozenset(
 _ROLES = "param(…), define(…) or structural(…)"
 
 
-def declaration_mistakes(cls: type[Node]) -> list[str]:
-    """What is wrong with a node's declaration, one sentence each; empty where it is fine.
+def declaration_mistakes(cls: type[Node]) -> list[Mistake]:
+    """What is wrong with a node's declaration; each mistake's subject is a port, a parameter, or empty for the class.
 
     Checked: names are GLSL identifiers and distinct, also as macros; docs exist; types and defaults are what a shader
     can be given and lie inside their range; formats, kinds and words exist; rules name ports of this node.
@@ -70,125 +67,117 @@ def declaration_mistakes(cls: type[Node]) -> list[str]:
     return [*_names(cls), *_docs(cls), *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
 
 
-def mistake_place(file: Path, mistake: str) -> Place:
-    """Where in a module the first name is declared that a mistake quotes, else its class."""
-    try:
-        tree = ast.parse(file.read_text(encoding="utf-8"))
-    except (OSError, SyntaxError, ValueError):
-        return Place(shown_file(file))
-    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-    declared: dict[str, ast.stmt] = {}
-    for statement in (statement for cls in classes for statement in cls.body):
-        targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
-        declared |= {target.id: statement for target in targets if isinstance(target, ast.Name)}
-    named = [declared[name] for name in re.findall(r"'(\w+)'", mistake) if name in declared]
-    for node in [*named, *classes]:
-        return Place(shown_file(file), node.lineno, node.col_offset + 1)
-    return Place(shown_file(file))
+def complaint(detail: Mapping[str, Any]) -> str:
+    """What a validator's own exception says, else pydantic's words, of one entry of `ValidationError.errors()`."""
+    return str(detail["ctx"]["error"]) if "error" in detail.get("ctx", ()) else str(detail["msg"])
 
 
-def _names(cls: type[Node]) -> Iterator[str]:
+def _names(cls: type[Node]) -> Iterator[Mistake]:
     ports, parameters = cls.ports(), cls.parameters()
     plan = {name for name in parameters if parameters[name].role == "structural"}  # these never reach a shader
     for name in [*ports, *parameters]:
-        if not _IDENTIFIER.match(name) or name.startswith("gl_") or "__" in name:
-            yield f"'{name}' is not a lower-case GLSL identifier"
+        if name.startswith("gl_") or "__" in name or not _IDENTIFIER.match(name.lower()):
+            yield Mistake(name, f"'{name}' is not a lower-case GLSL identifier")
+        elif name != name.lower():
+            yield Mistake(name, f"'{name}' is not a lower-case GLSL identifier", "case")
         elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES) or name.startswith("model_"):
-            yield f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
+            text = f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
+            yield Mistake(name, text)
     for name in sorted(set(ports) & set(parameters)):
-        yield f"'{name}' is both a port and a parameter"
+        yield Mistake(name, f"'{name}' is both a port and a parameter")
     given = {f"{name}_{word}": (name, word) for name in ports for word in ("views", "lights")}
     for name in [*ports, *(name for name in parameters if name not in plan)]:
         if name in given:
-            yield f"'{name}' is what shaders are given for the {given[name][1]} of port '{given[name][0]}'; rename one"
+            port, word = given[name]
+            yield Mistake(name, f"'{name}' is what shaders are given for the {word} of port '{port}'; rename one")
     named = [getattr(port, "group", None) for port in ports.values()]
     for group in dict.fromkeys(group for group in named if isinstance(group, str)):
         if group in ports or group in parameters:
-            yield f"group '{group}' has the name of a port or parameter"
+            yield Mistake(group, f"group '{group}' has the name of a port or parameter")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
-        yield f"`shader` is {shader!r}; it is a file that ends in .frag or .comp"
+        yield Mistake("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")
 
 
-def _docs(cls: type[Node]) -> Iterator[str]:
+def _docs(cls: type[Node]) -> Iterator[Mistake]:
     if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
-        yield "the class has no docstring"
+        yield Mistake("", "the class has no docstring")
     for name, port in cls.ports().items():
         doc = getattr(port, "doc", "")
         if not isinstance(doc, str):
-            yield f"port '{name}' has a doc that is no text"
+            yield Mistake(name, f"port '{name}' has a doc that is no text")
         elif not doc and not isinstance(port, Internal | History):
-            yield f"port '{name}' has no doc"
+            yield Mistake(name, f"port '{name}' has no doc", "doc")
     for name, parameter in cls.parameters().items():
         if parameter.role == "plain":
-            yield f"parameter '{name}' is a plain value; declare it with {_ROLES}"
+            yield Mistake(name, f"parameter '{name}' is a plain value; declare it with {_ROLES}")
         elif not parameter.doc:
-            yield f"parameter '{name}' has no doc"
+            yield Mistake(name, f"parameter '{name}' has no doc", "doc")
 
 
-def _macros(cls: type[Node]) -> Iterator[str]:
+def _macros(cls: type[Node]) -> Iterator[Mistake]:
     """Two declarations that would define one macro."""
-    made: list[tuple[str, str]] = []
+    made: dict[str, list[tuple[str, str]]] = {}  # macro to the names that make it, each with what it is
     for name in cls.inputs():
-        made += [(f"{word}", f"input '{name}'") for word in (f"HAS_{name}".upper(), f"{name}_LAYERS".upper())]
+        for macro in (f"HAS_{name}".upper(), f"{name}_LAYERS".upper()):
+            made.setdefault(macro, []).append((name, f"input '{name}'"))
     for name, parameter in cls.parameters().items():
         if parameter.role == "define":
-            made.append((name.upper(), f"define '{name}'"))
-            made += [
-                (f"{name}_{choice}".upper().replace("-", "_"), f"choice '{choice}' of '{name}'")
-                for choice in parameter.words
-            ]
-    counted = Counter(macro for macro, _ in made)
-    for macro, source in made:
+            made.setdefault(name.upper(), []).append((name, f"define '{name}'"))
+            for choice in parameter.words:
+                macro = f"{name}_{choice}".upper().replace("-", "_")
+                made.setdefault(macro, []).append((name, f"choice '{choice}' of '{name}'"))
+    for macro, sources in made.items():
+        (name, first), words = sources[0], " and ".join(source for _, source in sources)
         if macro in _OF_THE_FRAMEWORK:
-            yield f"{source} would define the macro {macro}, which is rendergraph's own; choose another name"
-    for macro in [macro for macro, count in counted.items() if count > 1]:
-        sources = " and ".join(source for other, source in made if other == macro)
-        yield f"{sources} would define one macro, {macro}; rename one"
+            text = f"{first} would define the macro {macro}, which is rendergraph's own; choose another name"
+            yield Mistake(name, text)
+        if len(sources) > 1:
+            yield Mistake(name, f"{words} would define one macro, {macro}; rename one")
 
 
-def _parameters(cls: type[Node]) -> Iterator[str]:
+def _parameters(cls: type[Node]) -> Iterator[Mistake]:
     for name, parameter in cls.parameters().items():
         if parameter.open_name and str not in get_args(parameter.type):
-            yield f"plugins add choices to '{name}', so its type is a Literal of its own `| str`"
+            yield Mistake(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
         if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
-            yield f"parameter '{name}' is {wrong}"
+            yield Mistake(name, f"parameter '{name}' is {wrong}")
         low, high = parameter.minimum, parameter.maximum
         for word, limit in (("min", low), ("max", high)):
             if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int | float)):
-                yield f"parameter '{name}' has {word}={limit!r}, which is no number"
+                yield Mistake(name, f"parameter '{name}' has {word}={limit!r}, which is no number")
         if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
-            yield f"parameter '{name}' goes from {low} to {high}, which is nothing"
+            yield Mistake(name, f"parameter '{name}' goes from {low} to {high}, which is nothing")
         if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):
-            yield f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type"
+            yield Mistake(name, f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type")
     yield from _defaults(cls)
 
 
-def _defaults(cls: type[Node]) -> Iterator[str]:
+def _defaults(cls: type[Node]) -> Iterator[Mistake]:
     """Defaults go the way of values in a file."""
     try:
         node = cls()
         values = {name: getattr(node, name) for name in cls.parameters()}
         written = json.dumps(values)
     except TypeError as error:
-        yield f"a default is no value that a file can hold: {error}"
+        yield Mistake("", f"a default is no value that a file can hold: {error}")
         return
     except Exception as error:  # what the author's own validators raise
-        yield f"it cannot be made with its defaults: {type(error).__name__}: {' '.join(str(error).split())}"
+        said = " ".join(str(error).split())
+        yield Mistake("", f"it cannot be made with its defaults: {type(error).__name__}: {said}")
         return
     if not all(_finite(value) for value in values.values()):
-        yield "a default is not finite"
+        yield Mistake("", "a default is not finite")
         return
     try:
         cls.model_validate_json(written)
     except ValidationError as error:
         for detail in error.errors(include_url=False):
             name = str(detail["loc"][0]) if detail["loc"] else ""
-            said = str(detail["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
             of = f"the default of '{name}', {values[name]!r}, is" if name in values else "its defaults are"
-            yield f"{of} wrong: {said}"
+            yield Mistake(name, f"{of} wrong: {complaint(detail)}")
     except Exception as error:  # as above
-        yield f"its own checks fail on the defaults: {type(error).__name__}: {error}"
+        yield Mistake("", f"its own checks fail on the defaults: {type(error).__name__}: {error}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:

@@ -8,23 +8,25 @@ from typing import Any, get_args
 
 from rendergraph.declare.node import Node
 from rendergraph.declare.ports import Function, History, InOut, Input, Internal, Made, Part, Port, Views
-from rendergraph.errors import suggestion
+from rendergraph.errors import Mistake, suggestion
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, Filter, Kind, Semantic, Signature, Wrap
 
 
-def port_mistakes(cls: type[Node]) -> list[str]:
-    """What is wrong with a node's ports, one sentence each."""
-    found: list[str] = []
+def port_mistakes(cls: type[Node]) -> list[Mistake]:
+    """What is wrong with a node's ports."""
+    found: list[Mistake] = []
     for name, port in cls.ports().items():
+        texts: list[str] = []
         if isinstance(port, Input):
-            found += _input(name, port)
+            texts += _input(name, port)
         elif isinstance(port, Made):
-            found += _made(name, port, cls.ports())
+            texts += _made(name, port, cls.ports())
         elif isinstance(port, Views):
-            found += _views(name, port)
+            texts += _views(name, port)
         elif isinstance(port, Function):
-            found += _function(name, port)
-        found += _named(name, port, cls.ports())
+            texts += _function(name, port)
+        texts += _named(name, port, cls.ports())
+        found += [Mistake(name, text) for text in texts]
     return found
 
 

@@ -8,7 +8,7 @@ docs and `rendergraph explain RG103` read it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -32,6 +32,35 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Mistake:
+    """What is wrong with one thing, as a value: a problem is made of it by whoever knows the file and the code.
+
+    Code that must tell one mistake from another, or find its place, asks these fields and never the text.
+
+    Attributes:
+        subject: the name of what is wrong: of a port, a parameter, an argument, a resource; empty for the whole.
+        text: one sentence without its end.
+        kind: `doc` where only a doc is missing, `case` where only a capital letter is wrong in a name, else `wrong`.
+        place: the author's line, where it is known.
+    """
+
+    subject: str
+    text: str
+    kind: Literal["doc", "case", "wrong"] = "wrong"
+    place: Place | None = None
+
+    def __str__(self) -> str:
+        """`file:line: text`, or the text alone."""
+        if self.place is None:
+            return self.text
+        return f"{self.place.file}:{self.place.line}: {self.text}" if self.place.line else f"{self.place}: {self.text}"
+
+    def problem(self, code: str, before: str, place: Place | None) -> Problem:
+        """`before: file:line: text`, at a place that is not the author's."""
+        return Problem(code, f"{before}: {self}", place, mistake=replace(self, text=f"{before}: {self.text}"))
+
+
+@dataclass(frozen=True)
 class Problem:
     """One mistake: `file:line:col: RG103 text`, with the line of the file beneath.
 
@@ -41,6 +70,7 @@ class Problem:
         place: where it stands, None where it stands nowhere.
         line_text: the line of the file, empty where unknown.
         severity: an `error` stops, a `warning` is said and the work goes on.
+        mistake: what it was made of, for whoever looks for a place of their own; None where there was no such thing.
     """
 
     code: str
@@ -48,6 +78,7 @@ class Problem:
     place: Place | None = None
     line_text: str = ""
     severity: Literal["error", "warning"] = "error"
+    mistake: Mistake | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
         head = f"{self.place}: " if self.place else ""
@@ -101,6 +132,18 @@ class Misuse(Exception):
 
     def __init__(self, text: str, code: str = "RG423") -> None:
         self.code = code
+        super().__init__(text)
+
+
+class SceneError(Exception):
+    """What a node says of a scene that it cannot work on, in a rule of its ports: a message for users.
+
+    Attributes:
+        subject: the name that it speaks of, as a parameter has it; the message is shown there.
+    """
+
+    def __init__(self, text: str, subject: str = "") -> None:
+        self.subject = subject
         super().__init__(text)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Part, Port
-from rendergraph.declare.blame import author_line, what_happened
-from rendergraph.errors import InputError, Misuse, Problem, node_named, shown_file
+from rendergraph.declare.blame import happened
+from rendergraph.errors import InputError, Misuse, Problem, node_named
 from rendergraph.expand.model import is_empty
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.steps import Request, Steps
@@ -221,9 +221,7 @@ def _returns_nothing(value: object) -> None:
 def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", doing: str = "recording") -> Problem:
     """What a node's own code raised or asked for wrongly, with the author's line."""
     who = node_named(node.id, node.type.name)
-    happened = what_happened(error, type(node.node))
-    if not author_line(error, type(node.node)) and node.type.file.name:
-        happened = f"{shown_file(node.type.file)}: {happened}"
-    if not isinstance(error, Misuse):
-        return Problem(code, f"{who} failed while {doing}: {happened}", node.place)
-    return Problem(error.code, f"{who}: {happened}", node.place)
+    mistake = happened(error, type(node.node), node.type.file)
+    if isinstance(error, Misuse):
+        return mistake.problem(error.code, who, node.place)
+    return mistake.problem(code, f"{who} failed while {doing}", node.place)

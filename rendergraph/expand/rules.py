@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, get_args
 
 from rendergraph.declare import Facts, Input, Made, Port, Views
-from rendergraph.declare.blame import what_happened
-from rendergraph.errors import InputError, Problem
+from rendergraph.declare.blame import happened
+from rendergraph.errors import InputError, Mistake
 from rendergraph.expand.model import ViewTable
 from rendergraph.link import GraphNode
 from rendergraph.textures import Filter
@@ -47,13 +48,11 @@ def _asked(node: GraphNode, port: Port, what: str, rule: Any, *arguments: object
     try:
         return rule(*arguments)
     except (Exception, SystemExit) as error:  # the author's function
-        text = f"the rule for its {what} fails: {what_happened(error, type(node.node))}"
-        raise InputError(_problem(node, port, text)) from error
+        mistake = replace(happened(error, type(node.node)), subject=port.name)
+        who = f"'{node.id}.{port.name}' ({node.type.name}): the rule for its {what} fails"
+        raise InputError(mistake.problem("RG209", who, node.place)) from error
 
 
 def _wrong(node: GraphNode, port: Port, what: str, value: object, wanted: str) -> InputError:
-    return InputError(_problem(node, port, f"the rule for its {what} gives {value!r}, not {wanted}"))
-
-
-def _problem(node: GraphNode, port: Port, text: str) -> Problem:
-    return Problem("RG209", f"'{node.id}.{port.name}' ({node.type.name}): {text}", node.place)
+    mistake = Mistake(port.name, f"the rule for its {what} gives {value!r}, not {wanted}")
+    return InputError(mistake.problem("RG209", f"'{node.id}.{port.name}' ({node.type.name})", node.place))

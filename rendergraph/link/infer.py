@@ -25,9 +25,9 @@ from rendergraph.declare import (
     TextureInfo,
     Views,
 )
-from rendergraph.declare.blame import is_deliberate, what_happened
+from rendergraph.declare.blame import happened
 from rendergraph.document import shown
-from rendergraph.errors import Problem, node_named
+from rendergraph.errors import Mistake, Problem, SceneError, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Bound
 from rendergraph.resolve import MOST_SIDE
@@ -142,13 +142,14 @@ class Infer:
         try:
             return port.filter(bound.node)
         except (Exception, SystemExit) as error:  # a stranger's function
-            text = f"the rule for its filter fails: {what_happened(error, bound.type.cls)}"
+            text = f"the rule for its filter fails: {happened(error, bound.type.cls)}"
             self._say(Endpoint(bound.spec.id, port.name), "RG209", text)
             return "nearest"
 
     def _say(self, end: Endpoint, code: str, text: str) -> None:
         bound = self.nodes[end.node]
-        self.problems.append(bound.spec.value.problem(code, f"'{end}' ({bound.type.name}): {text}", key=True))
+        problem = bound.spec.value.problem(code, f"'{end}' ({bound.type.name}): {text}", key=True)
+        self.problems.append(replace(problem, mistake=Mistake(end.port, problem.text)))
 
     def _evaluate(self, end: Endpoint) -> TextureInfo | None:
         bound = self.nodes[end.node]
@@ -189,21 +190,21 @@ class Infer:
                 raise _Unknown from None  # nobody uses what lacks an input
             if missing:
                 self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
-            elif isinstance(error, ValueError) and is_deliberate(error, bound.type.cls):
-                self._refused(bound, str(error))
+            elif isinstance(error, SceneError):
+                self._refused(bound, error)
             else:
-                self._say(end, "RG209", f"the rule for its {what} fails: {what_happened(error, bound.type.cls)}")
+                self._say(end, "RG209", f"the rule for its {what} fails: {happened(error, bound.type.cls)}")
             raise _Unknown from None
 
-    def _refused(self, bound: Bound, message: str) -> None:
-        """A rule's own complaint, where the parameter stands that it speaks of; several rules may have the same."""
+    def _refused(self, bound: Bound, error: SceneError) -> None:
+        """A rule's own complaint, where a parameter has the name that it speaks of; several rules may have the same."""
         value, key = bound.spec.value, True
         for param in bound.spec.params.values():
             for part in param.data if isinstance(param.data, list) else [param]:
-                if f"'{part.data}'" in message:
+                if error.subject and part.data == error.subject:
                     value, key = part, False
         who = node_named(bound.spec.id, bound.type.name)
-        problem = value.problem("RG209", f"{who}: {shown(message, 200)}", key=key)
+        problem = value.problem("RG209", f"{who}: {shown(error, 200)}", key=key)
         if problem not in self.problems:
             self.problems.append(problem)
 

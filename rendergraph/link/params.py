@@ -9,7 +9,8 @@ from pydantic import ValidationError
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Added, Choice, Extensions, Node, Parameter
-from rendergraph.declare.blame import what_happened
+from rendergraph.declare.blame import happened
+from rendergraph.declare.mistakes import complaint
 from rendergraph.document import Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem, node_named, suggestion
 from rendergraph.read import MOST_PROBLEMS
@@ -33,7 +34,7 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
         return cls.model_validate_json(json.dumps(values)), problems
     except (Exception, SystemExit) as error:  # validators are the author's code
         if not isinstance(error, ValidationError):
-            text = f"{node_named(spec.id, node_type.name)}: its own checks fail: {what_happened(error, cls)}"
+            text = f"{node_named(spec.id, node_type.name)}: its own checks fail: {happened(error, cls)}"
             return cls.model_construct(), [*problems, spec.value.problem("RG209", text, key=True)]
         for name, details in _by_parameter(error).items():
             values.pop(name, None)
@@ -104,7 +105,7 @@ def _unknown(value: Value, name: str, node_type: NodeType) -> Problem:
 def _wrong(spec: NodeSpec, node_type: NodeType, name: str, details: list[Any]) -> Problem:
     value = spec.params.get(name)
     detail = details[0]
-    message = str(detail["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    message = complaint(detail)
     if value is None:  # a rule between parameters
         return spec.value.problem("RG104", f"node '{spec.id}': {message}", key=True)
     if detail["type"] in ("value_error", "assertion_error"):

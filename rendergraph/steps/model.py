@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
-from rendergraph.errors import Place, Problem, node_named, shown_file
+from rendergraph.errors import Mistake, Place, Problem, node_named, shown_file
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 
@@ -159,15 +159,10 @@ class Step:
     place: Place | None = field(default=None, compare=False)
     caller: tuple[str, int] | None = field(default=None, compare=False)
 
-    def problem(self, code: str, text: str) -> Problem:
+    def problem(self, code: str, text: str, subject: str = "") -> Problem:
         """What is wrong with the step, as `node 'id' (type): file:line: …`, at the node's place in the pipeline."""
-        return Problem(code, f"{self.said_of}: {text}", self.place)
-
-    @property
-    def said_of(self) -> str:
-        """The node, its type, and the author's line of the step."""
-        who = node_named(self.node, self.type)
-        return who + (f": {shown_file(self.caller[0])}:{self.caller[1]}" if self.caller is not None else "")
+        line = Place(shown_file(self.caller[0]), self.caller[1], 1) if self.caller is not None else None
+        return Mistake(subject, text, place=line).problem(code, node_named(self.node, self.type), self.place)
 
     @property
     def key(self) -> tuple[str, int]:

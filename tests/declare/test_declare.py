@@ -13,7 +13,7 @@ def test_words_of_glsl_are_refused_where_they_would_reach_a_shader() -> None:
         radiance = Output(Radiance, doc="Radiance.")
         precision: int = define(default=1, doc="A macro.")
 
-    assert any("'precision' is reserved" in mistake for mistake in declaration_mistakes(Half))
+    assert any("'precision' is reserved" in mistake.text for mistake in declaration_mistakes(Half))
 
 
 def test_a_structural_parameter_may_be_named_like_one() -> None:

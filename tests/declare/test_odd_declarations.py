@@ -140,7 +140,7 @@ def test_nothing_is_a_traceback(tmp_path: Path, port: str, name: str) -> None:
     for value in VALUES:
         node = kind(cls(**{**given, name: value}))
         mistakes = declaration_mistakes(node)
-        assert all(isinstance(mistake, str) and "\n" not in mistake for mistake in mistakes)
+        assert all(mistake.subject and "\n" not in mistake.text for mistake in mistakes)
         told += bool(mistakes)
         if mistakes:
             continue

@@ -185,4 +185,8 @@ def test_buffers_have_no_history() -> None:
         color = Output(AnyTexel, doc="Nothing.")
         count = History(kind="buffer", bytes=16)
 
-    assert declaration_mistakes(Tally) == ["'count' is a History of a buffer; only textures keep last frame's values"]
+    (mistake,) = declaration_mistakes(Tally)
+    assert (mistake.subject, mistake.text) == (
+        "count",
+        "'count' is a History of a buffer; only textures keep last frame's values",
+    )

@@ -39,7 +39,7 @@ RULES = {
     'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: ValueError: invalid literal for int() with base "
     "10: 'x'",
     'more = Output(Radiance, size=lambda node, facts: node.refuse(), doc="D.")\n'
-    'def refuse(self):\n    raise ValueError("it takes two lights")': "node 'a' (wrong): it takes two lights",
+    'def refuse(self):\n    raise SceneError("it takes two lights")': "node 'a' (wrong): it takes two lights",
     'more = Output(Radiance, size=lambda node, facts: exit(), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: SystemExit: None",
 }
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from rendergraph.nodes.shadows import _light_views as views
 
+from rendergraph.api import SceneError
 from rendergraph.scene.cameras import look_at, projection
 from rendergraph.scene.model import Camera, Light, Mesh, Object
 from rendergraph.steps import ViewMatrices
@@ -142,7 +143,7 @@ def test_layers_follow_the_scenes_order() -> None:
     assert views.layer_lights("sun", [silent]) == (0,)  # what is asked for by name is what is meant
     assert views.layer_lights(("sun", "lamp"), lights) == (0, 2)
     assert views.layer_lights("bulb", lights) == (1,) * 6
-    with pytest.raises(ValueError, match="the scene has no light 'lmap'; did you mean 'lamp'"):
+    with pytest.raises(SceneError, match="the scene has no light 'lmap'; did you mean 'lamp'"):
         views.layer_lights("lmap", lights)
 
 
