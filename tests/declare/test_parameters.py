@@ -75,7 +75,7 @@ def test_a_bare_value_is_plain() -> None:
         gain: float = 1.0
 
     assert Bare.parameters()["gain"].role == "plain"
-    assert "parameter 'gain' is a plain value" in declaration_mistakes(Bare)[0]
+    assert "parameter 'gain' is a plain value" in declaration_mistakes(Bare)[0].text
 
 
 def test_a_type_may_be_named_before_it_is_made() -> None:
