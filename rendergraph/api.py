@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rendergraph.declare import (
-    Choice,
     Extension,
     Facts,
     Function,
@@ -68,7 +67,6 @@ __all__ = [
     "Albedo",
     "Any",
     "Blend",
-    "Choice",
     "Depth",
     "DisplayColor",
     "Emissive",

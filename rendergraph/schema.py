@@ -15,6 +15,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.declare import Extensions, Function, InOut, Input, Node, Parameter, Port, Views
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.glsl.source import about
 from rendergraph.read import INPUT_KEYS, NAME, NODE_KEYS, PARAMETER_KEYS, TOP_KEYS, VERSION
 from rendergraph.resolve import MOST_SIDE
 from rendergraph.resources import shipped_pipelines, shipped_scenes
@@ -228,7 +229,7 @@ def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Sch
     doc = parameter.doc
     if parameter.open_name:  # any word in its type, its own and the plugins' in the schema
         added = extensions.choices(parameter.open_name)
-        doc = " ".join([doc, *(f"`{one.name}` ({one.plugin}): {one.value.doc}" for one in added)])
+        doc = " ".join([doc, *(f"`{one.name}` ({one.plugin}): {about(one.value)}" for one in added)])
         words = [*parameter.words, *(one.name for one in added)]
         own = {"type": "string", "enum": list(dict.fromkeys(words))}
     limits = {"minimum": parameter.minimum, "maximum": parameter.maximum}

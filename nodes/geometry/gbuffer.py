@@ -2,31 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
-from rendergraph.api import (
-    Albedo,
-    Any,
-    Depth,
-    Emissive,
-    Facts,
-    Input,
-    Material,
-    Node,
-    Normal,
-    Output,
-    Port,
-    Steps,
-    View,
-    structural,
-)
+from rendergraph.api import Depth, Input, Node, Output, Port, Steps, View, structural
+
+from ._surface_textures import SURFACE_TEXTURES
 
 _MOST_TARGETS = 8  # what every OpenGL 4.5 device draws to at once
-
-
-def _format(compact: str) -> Callable[[GBuffer, Facts], str]:
-    return lambda node, facts: compact if node.precision == "compact" else "rgba32f"
 
 
 class GBuffer(Node):
@@ -40,35 +22,15 @@ class GBuffer(Node):
 
     view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
     depth = Output(Depth, format="depth32f", clear=1.0, doc="Window depth, 1 where nothing is.")
-    albedo = Output(Albedo, format=_format("srgb8_a8"), clear=0.0, doc="Base colour; alpha is 1 where a surface is.")
-    normal = Output(
-        Normal,
-        format=_format("rgba16_snorm"),
-        clear=0.0,
-        doc="Unit normal for shading, world space; 0 where nothing is.",
-    )
-    material = Output(
-        Material,
-        format=_format("rgba16"),
-        clear=0.0,
-        doc="Metallic, roughness, occlusion, and 1 for surfaces that lights reach, 0 for unlit ones.",
-    )
-    emissive = Output(Emissive, format=_format("r11f_g11f_b10f"), clear=0.0, doc="Emitted radiance.")
-    specular = Output(
-        Any,
-        format=_format("rgba8"),
-        clear=0.0,
-        doc="Of what is not metal: root of the reflectance at normal incidence, and at grazing incidence in alpha.",
-    )
-    grain = Output(
-        Any,
-        format=_format("rgba16_snorm"),
-        clear=0.0,
-        doc="For the anisotropic model: unit direction of the grain, world space, and its strength in alpha.",
-    )
-    phong_diffuse = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of kd of the empirical models.")
-    phong_specular = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of ks of the empirical models.")
-    phong_ambient = Output(Any, format=_format("rgb10_a2"), clear=0.0, doc="Root of ka of the empirical models.")
+    albedo = SURFACE_TEXTURES["albedo"].drawn()
+    normal = SURFACE_TEXTURES["normal"].drawn()
+    material = SURFACE_TEXTURES["material"].drawn()
+    emissive = SURFACE_TEXTURES["emissive"].drawn()
+    specular = SURFACE_TEXTURES["specular"].drawn()
+    grain = SURFACE_TEXTURES["grain"].drawn()
+    phong_diffuse = SURFACE_TEXTURES["phong_diffuse"].drawn()
+    phong_specular = SURFACE_TEXTURES["phong_specular"].drawn()
+    phong_ambient = SURFACE_TEXTURES["phong_ambient"].drawn()
 
     precision: Literal["compact", "full"] = structural(
         default="compact", doc="Small formats, or float32 in every channel."

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
-from rendergraph.api import Albedo, Depth, Emissive, Input, Material, Normal, Port, Steps, param
-from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Depth, Input, Port, Steps, param
 
+from ..geometry._surface_textures import SURFACE_TEXTURES
 from ._lighting import Color, SurfaceLighting
 
 
@@ -18,33 +19,27 @@ class ImageLighting(SurfaceLighting):
     """
 
     depth = Input(Depth, group="gbuffer", doc="Window depth; positions come from it and its view.")
-    albedo = Input(Albedo, group="gbuffer", doc="Base colour.")
-    normal = Input(Normal, group="gbuffer", doc="Unit normal for shading.")
-    material = Input(Material, group="gbuffer", doc="Metallic, roughness, occlusion, and 0 for unlit surfaces.")
-    emissive = Input(Emissive, group="gbuffer", doc="Emitted radiance.")
-    specular = Input(AnyTexel, group="gbuffer", optional=True, doc="Reflectance of what is not metal; else 4 %.")
-    grain = Input(AnyTexel, group="gbuffer", optional=True, doc="Direction and strength of the grain; else none.")
-    phong_diffuse = Input(AnyTexel, group="gbuffer", optional=True, doc="kd of the empirical models; else derived.")
-    phong_specular = Input(AnyTexel, group="gbuffer", optional=True, doc="ks of the empirical models; else derived.")
-    phong_ambient = Input(AnyTexel, group="gbuffer", optional=True, doc="ka of the empirical models; else derived.")
+    albedo = SURFACE_TEXTURES["albedo"].read()
+    normal = SURFACE_TEXTURES["normal"].read()
+    material = SURFACE_TEXTURES["material"].read()
+    emissive = SURFACE_TEXTURES["emissive"].read()
+    specular = SURFACE_TEXTURES["specular"].read()
+    grain = SURFACE_TEXTURES["grain"].read()
+    phong_diffuse = SURFACE_TEXTURES["phong_diffuse"].read()
+    phong_specular = SURFACE_TEXTURES["phong_specular"].read()
+    phong_ambient = SURFACE_TEXTURES["phong_ambient"].read()
 
     background: Color = param(default=0.0, min=0, glsl="vec3", doc="Radiance where nothing is, a number or RGB.")
 
     def surface(self, steps: Steps) -> dict[str, Any]:
         """What a shader that includes `gbuffer_surface.glsl` reads for this shading model."""
-        ports: list[Port] = [self.depth, self.albedo]
-        if self.shading != "unlit":
-            ports += [self.normal, self.material, self.emissive, self.specular]
-        if self.shading == "anisotropic" or "grain" in steps.needs("shading"):
-            ports.append(self.grain)
-        if self.shading in ("phong", "blinn_phong") or "phong" in steps.needs("shading"):
-            ports += [self.phong_diffuse, self.phong_specular, self.phong_ambient]
-            ports.remove(self.specular)
-        return _connected(steps, ports)
+        needs = steps.needs("shading")
+        wanted = [name for name, texture in SURFACE_TEXTURES.items() if texture.is_looked_at(needs)]
+        return _connected(steps, [self.depth, *(self.inputs()[name] for name in wanted)])
 
     def shadows(self, steps: Steps) -> dict[str, Any]:
         """What `shadow()` is made of."""
-        return _connected(steps, [self.lookup, self.visibility] if self.wants_lights else [])
+        return _connected(steps, [self.lookup, self.visibility] if self.wants_lights(steps) else [])
 
     def ambient_light(self, steps: Steps) -> dict[str, Any]:
         """What scales ambient light."""
@@ -58,5 +53,5 @@ class ImageLighting(SurfaceLighting):
             )
 
 
-def _connected(steps: Steps, ports: list[Port]) -> dict[str, Any]:
+def _connected(steps: Steps, ports: Iterable[Port]) -> dict[str, Any]:
     return {port.name: port for port in ports if steps.connected(port)}

@@ -34,7 +34,7 @@ class Lighting(Node):
         default="pbr",
         doc="How surfaces reflect: Cook-Torrance (`pbr`), the same with a grain, or an empirical model.",
         choices="shading",
-        needs=("phong", "grain"),
+        needs=("nothing", "phong", "grain"),
     )
     smith: Literal["exact", "fast"] = define(
         default="exact", doc="Masking of `pbr`: Smith's, or a fit without roots. `anisotropic` always has Smith's."
@@ -44,10 +44,9 @@ class Lighting(Node):
     )
     ambient: Color = param(default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB.")
 
-    @property
-    def wants_lights(self) -> bool:
+    def wants_lights(self, steps: Steps) -> bool:
         """Whether punctual lights show in the picture at all."""
-        return self.shading != "unlit" and self.terms in ("all", "diffuse", "specular")
+        return "nothing" not in steps.needs("shading") and self.terms in ("all", "diffuse", "specular")
 
     def blend(
         self,
@@ -57,7 +56,7 @@ class Lighting(Node):
         depth: Port | Part | None = None,
         view: Port | None = None,
         *,
-        fragment: str = "forward_transparent.frag",
+        fragment: str = "forward_lighting.frag",
         vertex: str = "<geometry.vert>",
         geometry: str | None = None,
     ) -> None:
@@ -72,7 +71,7 @@ class Lighting(Node):
             fragment, vertex, geometry: shaders.
         """
         reads: dict[str, Any] = {} if depth is None else {"depth": depth}
-        if self.wants_lights or not reads:  # a step that names nothing would read everything
+        if self.wants_lights(steps) or not reads:  # a step that names nothing would read everything
             reads["lookup"] = shadows
         steps.geometry(
             fragment,

@@ -35,7 +35,7 @@ class DeferredStencilLights(ImageLighting):
         reads = {**surface, **shadows, **self.ambient_light(steps)}
         steps.fullscreen("deferred_lighting.frag", out=self.radiance, defines={"DIRECTIONALS_ONLY": 1}, **reads)
         local = [number for number, light in enumerate(steps.lights) if light.type != "directional"]
-        if local and self.wants_lights:
+        if local and self.wants_lights(steps):
             self._add_lights(steps, local, surface, shadows)
         self.blend_over(steps, self.radiance)
 

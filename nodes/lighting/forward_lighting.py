@@ -56,5 +56,4 @@ class ForwardLighting(GeometryLighting):
             state=State(polygon_offset=nearer),
             **self.opaque_reads(steps),
         )
-        blended = "forward_transparent.frag" if self.evaluate == "fragment" else fragment
-        self.blend_after(steps, out, fragment=blended, vertex=vertex, geometry=geometry)
+        self.blend_after(steps, out, fragment=fragment, vertex=vertex, geometry=geometry)

@@ -33,7 +33,7 @@ class ForwardMultipass(GeometryLighting):
         reads = self.opaque_reads(steps)
         steps.geometry("forward_multipass.frag", out=out, objects="opaque", defines={"FIRST_PASS": 1}, **reads)
         added = State(blend=ADD, depth_func="equal", depth_write=False)
-        for light in range(len(steps.lights) if self.wants_lights else 0):
+        for light in range(len(steps.lights) if self.wants_lights(steps) else 0):
             steps.geometry(
                 "forward_multipass.frag", out=out, objects="opaque", state=added, per_light=light, light=light, **reads
             )

@@ -7,10 +7,11 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
 from rendergraph.catalog import NodeType
+from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Made, Node, Views
 from rendergraph.errors import Mistake
-from rendergraph.glsl import expand
-from rendergraph.resources import folder
+from rendergraph.glsl import expand, strip_comments
+from rendergraph.glsl.source import read_text
 
 LONGEST_DOC = 160
 
@@ -74,7 +75,9 @@ def shader_text(file: Path) -> str:
     """A shader with its includes, comments left out."""
     if not file.is_file():
         return ""
-    return expand(file, folder("rendergraph.shaders") / "include", root=file.parent, versions=True).text
+    origins = expand(file, shared_includes(), root=file.parent, versions=True).origins
+    files = dict.fromkeys(origin.file for origin in origins if origin.file is not None)
+    return "\n".join(strip_comments(read_text(one)) for one in files)  # `#include <CURVE>` with them
 
 
 def _python_text(node: NodeType) -> str:

@@ -23,7 +23,6 @@ from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
 from rendergraph.gl.textures import Clear
 from rendergraph.program import prefix
-from rendergraph.resources import folder
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.session import Pipeline, Session, load
 from rendergraph.steps import Step
@@ -181,8 +180,7 @@ class Trial:
     def _note_files(self, step: Step) -> None:
         names = [name for _, name in step.shaders] if step.node == self.type.name else []
         names += [function.shader for function in step.functions if function.node == self.type.name]
-        include = folder("rendergraph.shaders") / "include"
-        self.files |= {include / name[1:-1] if name[:1] == "<" else self.type.shaders / name for name in names}
+        self.files |= {self.type.shader_file(name)[0] for name in names}
 
     def _is_own(self, step: Step) -> bool:
         return step.node == self.type.name or any(f.node == self.type.name for f in step.functions)
@@ -226,7 +224,7 @@ class Trial:
 
         colors = [write.name for write in step.writes if write.use == "color"]
         if step.node == self.type.name and colors and not outputs_of(program):
-            place = declared_in(self.type.shaders / dict(step.shaders)["fragment"], colors[0])
+            place = declared_in(self.type.shader_file(dict(step.shaders)["fragment"])[0], colors[0])
             self.say(Problem("RG454", f"the shader never writes '{colors[0]}', which its step draws to", place))
 
     def _compare(

@@ -125,6 +125,8 @@ def _size(rule: Any) -> str:
 
 
 def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
+    from rendergraph.glsl.source import about, needs  # only where a plugin is asked what it adds
+
     open_name, default = parameter.open_name, parameter.default
     added = extensions.choices(open_name) if open_name else []
     annotation = parameter.closed(tuple(one.name for one in added))
@@ -141,7 +143,7 @@ def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
     if open_name:
         found["open"] = open_name
         found["added"] = [
-            {"name": one.name, "plugin": one.plugin, "doc": one.value.doc, "needs": list(one.value.needs)}
+            {"name": one.name, "plugin": one.plugin, "doc": about(one.value), "needs": list(needs(one.value))}
             for one in added
         ]
     limits = {"min": parameter.minimum, "max": parameter.maximum}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.declare.extension import READ_IMAGES, Choice, Extension, MeshData, extension_mistakes
+from rendergraph.declare.extension import READ_IMAGES, Extension, MeshData, extension_mistakes
 from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source
 from rendergraph.declare.facts import Facts, LightFacts, TextureInfo
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
@@ -30,7 +30,6 @@ __all__ = [
     "READ_IMAGES",
     "RESERVED_NAMES",
     "Added",
-    "Choice",
     "Extension",
     "Extensions",
     "Facts",

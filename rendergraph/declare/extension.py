@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,27 +17,6 @@ if TYPE_CHECKING:
 Metric: TypeAlias = "Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]"
 ImageLoader: TypeAlias = "Callable[[bytes], npt.NDArray[Any]]"
 MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One more value of a parameter that plugins add choices to: GLSL that the node's shader takes in for it.
-
-    Attributes:
-        shader: the include, relative to the folder of the extension's module; what it defines, the parameter's node
-            says. Its opening comment is its documentation.
-        needs: what it looks at and other choices do not, in the words of the parameter.
-    """
-
-    shader: str | Path
-    needs: tuple[str, ...] = ()
-
-    @property
-    def doc(self) -> str:
-        """The include's opening comment, as one line; empty where it has none."""
-        lines = Path(self.shader).read_text(encoding="utf-8", errors="replace").splitlines()
-        opening = itertools.takewhile(lambda line: line.startswith("//"), lines)
-        return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +54,9 @@ class Extension:
 
     Attributes:
         semantics: meanings of ports.
-        choices: parameter name to further choices of it: a `Choice`, or the name of its include alone.
+        choices: parameter name to further choices of it, each with the include that the node's shader takes in for it,
+            relative to the folder of the extension's module. What it defines, the parameter's node says; its opening
+            comment is its documentation, and `#pragma needs(…)` says what it looks at and other choices do not.
         meshes: a file's ending (`.stl`) to the function that reads such a file, as a scene and as an object's `file`.
         images: a file's ending to the function that decodes its bytes: (height, width), or with 1 to 4 channels behind,
             the top row first, uint8 (sRGB where the slot is a colour) or floats (linear light).
@@ -85,7 +65,7 @@ class Extension:
     """
 
     semantics: tuple[Semantic, ...] = ()
-    choices: Mapping[str, Mapping[str, Choice | str | Path]] = field(default_factory=dict)
+    choices: Mapping[str, Mapping[str, str | Path]] = field(default_factory=dict)
     meshes: Mapping[str, MeshLoader] = field(default_factory=dict)
     images: Mapping[str, ImageLoader] = field(default_factory=dict)
     metrics: Mapping[str, Metric] = field(default_factory=dict)
@@ -151,14 +131,10 @@ def _wrong_endings(kind: str, loaders: Mapping[str, object], own: Collection[str
 def _wrong_choice(what: str, name: str, choice: object, folder: Path) -> Iterator[str]:
     if not _WORD.match(name):
         yield f"{what}: a choice is of small letters, digits and single '_'"
-    if isinstance(choice, str | Path):
-        choice = Choice(choice)
-    if not isinstance(choice, Choice) or not isinstance(choice.shader, str | Path):
-        yield f"{what} is {choice!r}, not a Choice or the name of an include"
-    elif not (folder / choice.shader).is_file():
-        yield f"{what}: there is no file '{choice.shader}' beside the extension"
-    elif isinstance(choice.needs, str) or not all(isinstance(need, str) for need in choice.needs):
-        yield f"{what}: 'needs' is a tuple of words"
+    if not isinstance(choice, str | Path):
+        yield f"{what} is {choice!r}, not the name of an include"
+    elif not (folder / choice).is_file():
+        yield f"{what}: there is no file '{choice}' beside the extension"
 
 
 def _wrong_functions(kind: str, table: Mapping[str, object]) -> Iterator[str]:

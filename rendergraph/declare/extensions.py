@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from rendergraph.declare.blame import raised_at
-from rendergraph.declare.extension import Choice, Extension, ImageLoader, MeshLoader, Metric
+from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
 from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.glsl.source import about
 from rendergraph.stamps import Stamp, again, looking
 from rendergraph.textures import SEMANTICS, Semantic
 
@@ -113,8 +114,8 @@ class Extensions:
         found = self._one(name, self.semantics(), "semantic")
         return found.value if found is not None else None
 
-    def choice(self, parameter: str, name: str) -> Added[Choice] | None:
-        """A plugin's choice of a parameter.
+    def choice(self, parameter: str, name: str) -> Added[Path] | None:
+        """The include of a plugin's choice of a parameter.
 
         Raises:
             InputError: two plugins have it.
@@ -152,17 +153,17 @@ class Extensions:
                     found.append(Added(value.name, value, source.plugin, source.file))
         return found
 
-    def choices(self, parameter: str) -> list[Added[Choice]]:
-        """Plugins' choices of a parameter, their files absolute."""
+    def choices(self, parameter: str) -> list[Added[Path]]:
+        """The includes of plugins' choices of a parameter, absolute."""
         return [added for name, added in self.all_choices() if name == parameter]
 
-    def all_choices(self) -> list[tuple[str, Added[Choice]]]:
+    def all_choices(self) -> list[tuple[str, Added[Path]]]:
         """Parameter and choice, of all parameters."""
         return [
-            (str(parameter), Added(name, _absolute(choice, source.file.parent), source.plugin, source.file))
+            (str(parameter), Added(name, source.file.parent / include, source.plugin, source.file))
             for source, extension in self._usable()
             for parameter, choices in extension.choices.items()
-            for name, choice in choices.items()
+            for name, include in choices.items()
         ]
 
     def meshes(self) -> list[Added[MeshLoader]]:
@@ -217,14 +218,11 @@ class Extensions:
 
 def _doc(value: object) -> str:
     """The first line of what a thing says about itself."""
-    doc = value.doc if isinstance(value, Semantic | Choice) else inspect.getdoc(value) or ""
+    if isinstance(value, Path):
+        return about(value)
+    doc = value.doc if isinstance(value, Semantic) else inspect.getdoc(value) or ""
     return doc.partition("\n")[0]
 
 
 NO_EXTENSIONS = Extensions()
 """What the framework has without plugins."""
-
-
-def _absolute(choice: Choice | str | Path, folder: Path) -> Choice:
-    plain = choice if isinstance(choice, Choice) else Choice(choice)
-    return Choice(folder / plain.shader, tuple(plain.needs))

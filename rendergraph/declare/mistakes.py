@@ -124,7 +124,7 @@ def _macros(cls: type[Node]) -> Iterator[Mistake]:
     for name, parameter in cls.parameters().items():
         if parameter.role == "define":
             made.setdefault(name.upper(), []).append((name, f"define '{name}'"))
-            for choice in parameter.words:
+            for choice in () if parameter.open_name else parameter.words:
                 macro = f"{name}_{choice}".upper().replace("-", "_")
                 made.setdefault(macro, []).append((name, f"choice '{choice}' of '{name}'"))
     for macro, sources in made.items():

@@ -27,7 +27,7 @@ class Parameter:
         minimum, maximum: smallest and largest legal value of each number in it, inclusive; None for no limit.
         glsl: the uniform's type where it is not what `type` says.
         open_name: the name under which plugins add choices, empty where they cannot.
-        needs: what a choice that a plugin adds may say that it needs.
+        needs: what the include of such a choice may say that it needs.
         name: the field's name.
         type: the field's annotation.
     """
@@ -150,10 +150,11 @@ def define(
         doc: one line.
         unit: the unit's symbol, empty for a pure number.
         min, max: smallest and largest legal value, inclusive.
-        choices: the name under which plugins add choices, for a type such as `Literal["neutral", "aces"] | str`. The
-            shader takes a plugin's choice in by `#include <CURVE>`, which is empty where the choice is the node's own.
-        needs: what such a choice may say that it needs, which others do without: `NEEDS_…` in the shader,
-            `steps.needs(…)` in `record`.
+        choices: the name under which plugins add choices, for a type such as `Literal["neutral", "aces"] | str`. Each
+            choice is then an include, the node's own `curve/aces.glsl` among its shaders or the shared includes; the
+            shader takes it in by `#include <CURVE>`, and there are no numbers.
+        needs: what such an include may say that it needs (`#pragma needs(…)`), which others do without: `NEEDS_…` in
+            the shader, `steps.needs(…)` in `record`.
     """
     return _field(Parameter("define", default, doc, unit, min, max, open_name=choices, needs=needs))
 

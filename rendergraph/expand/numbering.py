@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rendergraph.declare import Choice, Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
+from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
 from rendergraph.errors import InputError
 from rendergraph.expand.ending import mark_roles, wanted_resources
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
@@ -350,8 +350,8 @@ class Numbering:
         ]
 
 
-def _includes(plugged: Mapping[str, Choice]) -> tuple[tuple[str, Path], ...]:
-    return tuple((name.upper(), Path(choice.shader)) for name, choice in plugged.items())
+def _includes(choices: Mapping[str, Path]) -> tuple[tuple[str, Path], ...]:
+    return tuple((name.upper(), file) for name, file in choices.items())
 
 
 def _passed(graph: Graph, recorders: Mapping[str, Recorder]) -> Iterator[tuple[Endpoint, Endpoint]]:

@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
-from rendergraph.declare import Choice, Node
+from rendergraph.declare import Node
+from rendergraph.glsl.source import needs
 from rendergraph.steps import UniformValue, define_text
 
 
-def define_parameters(node: Node, plugged: Mapping[str, Choice]) -> Iterator[tuple[str, str]]:
+def define_parameters(node: Node, choices: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
     """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers.
 
     Args:
         node: the node.
-        plugged: parameters whose choice is a plugin's; other choices of plugins leave the text as it is.
+        choices: parameters whose choice is an include; what it needs, the macros say.
     """
     for name, parameter in node.parameters().items():
         if parameter.role != "define":
             continue
         value = getattr(node, name)
-        if isinstance(value, str):
-            choices = [*parameter.words, *([value] if name in plugged else [])]
-            for number, choice in enumerate(choices):
-                yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
-            for need in plugged[name].needs if name in plugged else ():
+        if name in choices:
+            for need in needs(choices[name]):
                 yield f"NEEDS_{need}".upper(), "1"
+        elif isinstance(value, str):
+            for number, choice in enumerate(parameter.words):
+                yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
             yield name.upper(), f"{name}_{value}".upper().replace("-", "_")
         else:
             yield name.upper(), define_text(value)

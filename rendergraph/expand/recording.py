@@ -9,6 +9,7 @@ from rendergraph.declare import Facts, Function, InOut, Input, Part, Port
 from rendergraph.declare.blame import happened
 from rendergraph.errors import InputError, Misuse, Problem, node_named
 from rendergraph.expand.model import is_empty
+from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.steps import Request, Steps
 from rendergraph.textures import BufferDesc, TextureDesc
@@ -59,9 +60,8 @@ class Recorder:
         return port.name in self.used_ports
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """What a plugin's choice of a parameter needs."""
-        choice = self.node.choices.get(parameter)
-        return choice.needs if choice is not None else ()
+        """What the choice of a parameter needs."""
+        return needs(self.node.choices[parameter]) if parameter in self.node.choices else ()
 
     def add(self, request: Request) -> None:
         """Keep a request, unless it would draw nothing onto what is there already."""

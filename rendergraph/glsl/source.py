@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -94,6 +95,7 @@ _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 _OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
 _CLOSES = re.compile(r"\s*#\s*endif\b")
 _FORBIDDEN = re.compile(r"\s*#\s*(version|line)\b")
+_NEEDS = re.compile(r"\s*#\s*pragma\s+needs\b\s*(.*)\Z")
 _VERSION = re.compile(r"\s*#\s*version\s+(?:3[3-9]0|4[0-6]0)(?:\s+(?:core|compatibility))?\s*\Z")
 
 
@@ -128,7 +130,7 @@ class Includes:
             source: the file.
             root: the folder that includes in quotes must stay in; the file's own by default.
             prefix: noted in the origins of every line that is not shared.
-            plugged: parameters in capitals whose choice is a plugin's: `#include <SHADING>` is the file given here,
+            plugged: parameters in capitals with the file of their choice: `#include <SHADING>` is the file given here,
                 and nothing where none is.
             versions: take a `#version` of 330 to 460 in the file itself, and leave its line empty.
 
@@ -162,6 +164,10 @@ class Includes:
                 self._take(line, origin, raw, lines, origins)
                 continue
             if self._versions and len(stack) == 1 and _VERSION.match(line):
+                lines.append("")
+                origins.append(origin)
+                continue
+            if _NEEDS.match(line):  # said to rendergraph, not to the driver
                 lines.append("")
                 origins.append(origin)
                 continue
@@ -284,6 +290,41 @@ def read_text(file: Path) -> str:
         return file.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise InputError(Problem("RG407", f"the shader is not UTF-8 text: {error}", Place(shown_file(file)))) from error
+
+
+def needs(file: Path) -> tuple[str, ...]:
+    """What the include of a choice says that it needs: the words of its `#pragma needs(…)`.
+
+    Raises:
+        InputError: the file cannot be read, or the line is written in another way (RG405).
+    """
+    raw, stripped = _lines(file)
+    words: list[str] = []
+    for number, line in enumerate(stripped, start=1):
+        if match := _NEEDS.match(line):
+            listed = re.fullmatch(r"\(\s*(\w+(?:\s*,\s*\w+)*)\s*\)", match[1])
+            if listed is None:
+                text = f"'{line.strip()[:60]}' is not '#pragma needs(word)' or '#pragma needs(word, word)'"
+                raise _error("RG405", text, Origin(file, number), raw)
+            words += re.findall(r"\w+", listed[1])
+    return tuple(words)
+
+
+def needs_place(file: Path) -> tuple[Place, str]:
+    """Where an include says what it needs, and that line."""
+    raw, stripped = _lines(file)
+    number = next((n for n, line in enumerate(stripped, start=1) if _NEEDS.match(line)), 1)
+    return Place(shown_file(file), number, 1), raw.split("\n")[number - 1]
+
+
+def about(file: Path) -> str:
+    """A shader's opening comment as one line; empty where it has none.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    opening = itertools.takewhile(lambda line: line.startswith("//"), read_text(file).split("\n"))
+    return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
 def _lines(file: Path) -> tuple[str, tuple[str, ...]]:

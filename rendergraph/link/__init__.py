@@ -14,7 +14,7 @@ from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
-from rendergraph.link.params import instance, plugged
+from rendergraph.link.params import choice_files, instance
 from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
@@ -165,7 +165,7 @@ class _Linker:
 
     def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
         node, problems = instance(spec, node_type)
-        choices, wrong = plugged(spec, node, self.catalog.extensions)
+        choices, wrong = choice_files(spec, node_type, node, self.catalog.extensions)
         self.missing += wrong if self.spec.missing else ()
         for problem in (*problems, *wrong):
             self._say(problem)

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Choice, LightFacts, Node, TextureInfo
+from rendergraph.declare import LightFacts, Node, TextureInfo
 from rendergraph.errors import Place, Problem
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class GraphNode:
         node: the instance, holding parameter values.
         inputs: connected inputs only, in the order of declaration; a `many` input has several endpoints.
         place: where it stands.
-        choices: parameters whose value a plugin brings, with the include it comes by.
+        choices: parameters whose choices are includes, with the file of the one that is chosen.
     """
 
     id: str
@@ -46,7 +47,7 @@ class GraphNode:
     node: Node
     inputs: Mapping[str, tuple[Endpoint, ...]]
     place: Place | None = None
-    choices: Mapping[str, Choice] = field(default_factory=dict)
+    choices: Mapping[str, Path] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

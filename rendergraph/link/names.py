@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Choice, InOut, Input, Node, Port
+from rendergraph.declare import InOut, Input, Node, Port
 from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
@@ -70,7 +71,7 @@ class Bound:
     inputs: Mapping[str, Input | InOut]
     links: dict[str, list[Link]]
     failed: set[str]
-    choices: Mapping[str, Choice]
+    choices: Mapping[str, Path]
 
 
 class Wrong(Exception):

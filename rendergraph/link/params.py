@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import Added, Choice, Extensions, Node, Parameter
+from rendergraph.declare import Extensions, Node, Parameter
 from rendergraph.declare.blame import happened
 from rendergraph.declare.mistakes import complaint
 from rendergraph.document import Value, kind_of, shown
-from rendergraph.errors import InputError, Place, Problem, node_named, suggestion
+from rendergraph.errors import InputError, Problem, node_named, suggestion
+from rendergraph.glsl.source import needs, needs_place
 from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec
 
@@ -45,43 +47,44 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
         return cls.model_construct(), problems
 
 
-def plugged(spec: NodeSpec, node: Node, extensions: Extensions) -> tuple[dict[str, Choice], list[Problem]]:
-    """The parameters whose value is none of the node's own choices, with what a plugin brings for it.
+def choice_files(
+    spec: NodeSpec, node_type: NodeType, node: Node, extensions: Extensions
+) -> tuple[dict[str, Path], list[Problem]]:
+    """The includes of the parameters that plugins add choices to, the node's own choices and theirs alike.
 
     Plugins are asked for words that the node does not know, and for no others.
     """
-    found: dict[str, Choice] = {}
+    found: dict[str, Path] = {}
     problems: list[Problem] = []
     for name, parameter in node.parameters().items():
         chosen, value, open_name = getattr(node, name), spec.params.get(name), parameter.open_name
-        if not open_name or not isinstance(chosen, str) or chosen in parameter.words:
+        if not open_name or not isinstance(chosen, str):
             continue
         try:
-            added = extensions.choice(open_name, chosen)
-            if added is None:
+            if chosen in parameter.words:
+                file: Path | None = node_type.choice_file(open_name, chosen)
+            else:
+                added = extensions.choice(open_name, chosen)
+                file = added.value if added is not None else None
+            if file is None:
                 known = tuple(added.name for added in extensions.choices(open_name))
                 text = f"'{spec.id}.{name}' takes {parameter.takes(known)}, this is '{shown(chosen, 40)}'"
                 hint = suggestion(chosen, (*parameter.words, *known), most=0)
                 problems += [(value or spec.value).problem("RG104", text + hint), *extensions.problems]
             else:
-                found[name] = added.value
-                problems += _unmet(parameter, added)
+                found[name] = file
+                problems += _unmet(parameter, file)
         except InputError as error:
             problems += error.problems
     return found, problems
 
 
-def _unmet(parameter: Parameter, added: Added[Choice]) -> list[Problem]:
-    """What a plugin's choice needs and nobody offers."""
-    name = parameter.open_name
+def _unmet(parameter: Parameter, file: Path) -> list[Problem]:
+    """What the include of a choice needs and its parameter does not offer."""
+    text = "'{}' offers no '{}' to need{}"
     return [
-        Problem(
-            "RG495",
-            f"choices['{name}']['{added.name}'] of plugin '{added.plugin}' needs '{need}', which "
-            f"'{name}' does not offer{suggestion(need, parameter.needs)}",
-            Place(str(added.file)),
-        )
-        for need in added.value.needs
+        Problem("RG495", text.format(parameter.name, need, suggestion(need, parameter.needs)), *needs_place(file))
+        for need in needs(file)
         if need not in parameter.needs
     ]
 

@@ -139,11 +139,9 @@ def _stage(
     includes = Includes(include_folder)
     view = includes.expand(include_folder / "view.glsl")
     view = SourceText(view.lines, tuple(replace(origin, shared=True) for origin in view.origins))
-    shared = re.match(r"<(.+)>\Z", name)
-    root = include_folder if shared else types[step.node].shaders
-    file = root / (shared[1] if shared else name)
+    file, root = types[step.node].shader_file(name, include_folder)
     # What the file calls decides which functions stand before it, so it is read once with includes of its own.
-    versions = not shared and types[step.node].is_shader
+    versions = types[step.node].is_shader and not name.startswith("<")
     called = Includes(include_folder).expand(file, root=root, plugged=dict(step.includes), versions=versions).text
     functions = SourceText()
     for signature in wanted.values():
@@ -298,14 +296,14 @@ def provider_text(
         InputError: a file is missing, or does not define the function (RG408).
     """
     before = prefix(binding.node)
-    file = node.shaders / binding.shader
-    source = includes.expand(file, root=node.shaders, prefix=before, plugged=dict(binding.includes))
+    file, root = node.shader_file(binding.shader)
+    source = includes.expand(file, root=root, prefix=before, plugged=dict(binding.includes))
     own = SourceText(*_rows((line, origin) for line, origin in _pairs(source) if not origin.shared))
     names = declared(own.text)
     if binding.signature not in names:
         signature = _declared_signatures(node)[binding.signature]
         text = f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{signature.declaration}'"
-        raise InputError(Problem("RG408", text, Origin(node.shaders / binding.shader, 1).place()))
+        raise InputError(Problem("RG408", text, Origin(file, 1).place()))
     macros = {**read_defines(binding.reads, resources, views), **dict(binding.defines)}
     names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
     for port in (*node.cls.ports(), *(read.name for read in binding.reads)):

@@ -184,7 +184,7 @@ class Session:
         expansion = pipeline.expansion(outputs, taps)
         scene = self._scene(pipeline)
         types = {node.id: node.type for node in pipeline.graph.nodes}
-        sources = tuple((name, found.shaders, _declared(found.cls)) for name, found in types.items())
+        sources = tuple((name, found.shaders, found.inherited, _declared(found.cls)) for name, found in types.items())
         key = (_structure(expansion), sources, id(pipeline.scene), alias, poison, shuffle)
         executable = self._kept.take(key)
         if executable is None:

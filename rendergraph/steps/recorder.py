@@ -30,7 +30,7 @@ class Recorder(Protocol):
         ...
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """What a plugin's choice of a parameter needs."""
+        """What the choice of a parameter needs."""
         ...
 
     def add(self, request: Request) -> None:
@@ -97,7 +97,7 @@ class Steps:
         return self._recorder.used(checks.own_port(self.node, port, "used's argument"))
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """What a plugin's choice of a parameter says that it needs; nothing where the choice is the node's own."""
+        """What the choice of a parameter says that it needs, where choices are includes."""
         return self._recorder.needs(parameter)
 
     def desc(self, port: Port) -> TextureDesc:

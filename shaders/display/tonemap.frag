@@ -1,39 +1,18 @@
 // Tone mapping: exposure, a shoulder, then the sRGB transfer function (IEC 61966-2-1).
-// A plugin's curve is an include with
+// A curve is an include with
 //
 //     vec3 tone_curve(vec3 color)
 //
 // from scene-linear after exposure, 0 to infinity, to display-linear; what leaves 0 to 1 is clipped.
-#include <tone_curves.glsl>
-#include <CURVE>
-
 uniform sampler2D radiance;  // scene-linear
 #ifdef HAS_GAIN
 uniform sampler2D gain;      // one texel: a factor beside the stops
 #endif
 uniform float exposure;      // stops
-uniform float white;         // luminance after exposure
+uniform float white;         // luminance after exposure, for curves that have one
 out vec4 color;              // display-referred
 
-vec3 shoulder(vec3 c) {
-#if CURVE == CURVE_NEUTRAL
-    return neutral_curve(c);
-#elif CURVE == CURVE_ACES
-    return aces_curve(c);
-#elif CURVE == CURVE_REINHARD
-    return reinhard_curve(c);
-#elif CURVE == CURVE_REINHARD_LUMINANCE
-    return reinhard_luminance_curve(c);
-#elif CURVE == CURVE_REINHARD_EXTENDED
-    return reinhard_extended_curve(c, white);
-#elif CURVE == CURVE_HABLE
-    return hable_curve(c);
-#elif CURVE == CURVE_NONE
-    return c;
-#else
-    return tone_curve(c);
-#endif
-}
+#include <CURVE>
 
 vec3 srgb(vec3 c) {
     return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
@@ -44,5 +23,5 @@ void main() {
 #ifdef HAS_GAIN
     scene *= texelFetch(gain, ivec2(0), 0).r;
 #endif
-    color = vec4(srgb(clamp(shoulder(min(scene, 1e9)), 0.0, 1.0)), 1.0);
+    color = vec4(srgb(clamp(tone_curve(min(scene, 1e9)), 0.0, 1.0)), 1.0);
 }

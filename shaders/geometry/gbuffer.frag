@@ -1,6 +1,6 @@
 // The surface under a fragment, as it is kept for later passes; `gbuffer_surface.glsl` reads it back.
 #include <pass_view.glsl>
-#include <textured_surface.glsl>
+#include <fragment_surface.glsl>
 
 #ifdef WRITES_ALBEDO
 out vec4 albedo;  // base colour; 1

@@ -1,5 +1,5 @@
 // Microfacet terms. GGX: Walter et al. 2007; height-correlated Smith visibility: Heitz 2014; Fresnel: Schlick 1994.
-const float PI = 3.14159265358979;
+#include <math.glsl>
 
 float distribution_ggx(float n_h, float alpha) {
     float a2 = alpha * alpha;

@@ -1,5 +1,6 @@
 // The surface that a G-buffer holds at a texel, for the shading models: what `gbuffer.frag` wrote.
 #include <depth_surface.glsl>
+#include <math.glsl>
 #include <surface.glsl>
 
 uniform sampler2D albedo;
@@ -78,7 +79,7 @@ bool surface_at(ivec2 texel, out Surface s) {
 #endif
 #ifdef NEEDS_GRAIN
     s.anisotropy = 0.0;
-    s.tangent = normalize(cross(s.normal, abs(s.normal.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
+    s.tangent = any_tangent(s.normal);
 #ifdef HAS_GRAIN
     vec4 direction = texelFetch(grain, texel, 0);
     s.anisotropy = direction.w;

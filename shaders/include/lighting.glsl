@@ -1,6 +1,6 @@
 // A surface under all lights. `shadow()` is the framework's.
 #include <lights.glsl>
-#include <terms.glsl>
+#include <radiance.glsl>
 
 // Light of one of them reflected to the viewer, by the scene's index.
 Reflected reflected_light(Surface s, int light) {

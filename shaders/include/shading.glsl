@@ -4,6 +4,8 @@
 //
 // Radiance towards the viewer for an irradiance of 1 on a surface that faces the light: the cosine is in it. The
 // diffuse part is proportional to `surface.diffuse`; light computed at vertices leaves that factor to the fragments.
+// What a model looks at and others do not it says once: `#pragma needs(phong)` for kd, ks and the exponent,
+// `needs(grain)` for the grain, `needs(nothing)` where no light shows and the base colour alone is looked at.
 #include <surface.glsl>
 
 struct Reflected {
@@ -11,16 +13,4 @@ struct Reflected {
     vec3 specular;
 };
 
-#if SHADING == SHADING_PBR
-#include <shading/pbr.glsl>
-#elif SHADING == SHADING_ANISOTROPIC
-#include <shading/anisotropic.glsl>
-#elif SHADING == SHADING_BLINN_PHONG
-#include <shading/blinn_phong.glsl>
-#elif SHADING == SHADING_PHONG
-#include <shading/phong.glsl>
-#elif SHADING == SHADING_UNLIT
-#include <shading/unlit.glsl>
-#else
 #include <SHADING>
-#endif

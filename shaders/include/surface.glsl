@@ -1,22 +1,7 @@
-// What a shading model knows of a point on a surface, whether it comes from geometry or from a G-buffer.
+// What a shading model knows of a point on a surface, whether it comes from geometry or from a G-buffer. NEEDS_PHONG
+// and NEEDS_GRAIN are defined where the model says so.
 #ifdef MATERIAL_COUNT
 #include <materials.glsl>
-#endif
-
-#ifndef SHADING  // a pass that only writes surfaces down needs no model
-#define SHADING 0
-#define SHADING_UNLIT 0
-#define SHADING_PHONG 1
-#define SHADING_BLINN_PHONG 2
-#define SHADING_ANISOTROPIC 3
-#define SHADING_PBR 4
-#endif
-
-#if SHADING == SHADING_PHONG || SHADING == SHADING_BLINN_PHONG
-#define NEEDS_PHONG
-#endif
-#if SHADING == SHADING_ANISOTROPIC
-#define NEEDS_GRAIN
 #endif
 
 struct Surface {

@@ -2,11 +2,7 @@
 #include <gbuffer_surface.glsl>
 #include <lighting.glsl>
 
-uniform vec3 ambient;
 uniform vec3 background;
-#ifdef HAS_OCCLUSION
-uniform sampler2D occlusion;
-#endif
 out vec4 radiance;  // scene-linear; alpha is coverage
 
 void main() {
@@ -16,8 +12,5 @@ void main() {
         radiance = vec4(background, 0.0);
         return;
     }
-#ifdef HAS_OCCLUSION
-    s.occlusion *= texelFetch(occlusion, texel, 0).r;
-#endif
-    radiance = vec4(s.lit > 0.0 ? radiance_of(s, reflected_lights(s), ambient) : unlit_radiance(s), 1.0);
+    radiance = vec4(s.lit > 0.0 ? radiance_of(s, reflected_lights(s)) : unlit_radiance(s), 1.0);
 }

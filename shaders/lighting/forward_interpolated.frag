@@ -1,21 +1,14 @@
 // Light that came from the vertices or the face; textures and shadows at every fragment.
 #include <pass_view.glsl>
-#include <textured_surface.glsl>
-#include <terms.glsl>
+#include <fragment_surface.glsl>
+#include <radiance.glsl>
 #define DIRECTION in
 #include "vertex_light_varyings.glsl"
 
-uniform vec3 ambient;
-#ifdef HAS_OCCLUSION
-uniform sampler2D occlusion;
-#endif
 out vec4 radiance;  // scene-linear, premultiplied; alpha is coverage
 
 void main() {
     Surface s = surface_here(PASS_VIEW);
-#ifdef HAS_OCCLUSION
-    s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
-#endif
     Reflected light = Reflected(v_diffuse, v_specular);
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
@@ -25,5 +18,5 @@ void main() {
     }
 #endif
     light.diffuse *= s.diffuse;
-    radiance = vec4(radiance_of(s, light, ambient) * s.alpha, s.alpha);
+    radiance = vec4(radiance_of(s, light) * s.alpha, s.alpha);
 }

@@ -1,14 +1,9 @@
 // One light at every fragment, to be added to the others; in the first pass what needs no light.
 #include <pass_view.glsl>
-#include <textured_surface.glsl>
+#include <fragment_surface.glsl>
 #include <lighting.glsl>
 
-#ifdef FIRST_PASS
-uniform vec3 ambient;
-#ifdef HAS_OCCLUSION
-uniform sampler2D occlusion;
-#endif
-#else
+#ifndef FIRST_PASS
 uniform int light;  // the scene's index
 #endif
 out vec4 radiance;  // scene-linear; alpha is coverage
@@ -16,10 +11,7 @@ out vec4 radiance;  // scene-linear; alpha is coverage
 void main() {
     Surface s = surface_here(PASS_VIEW);
 #ifdef FIRST_PASS
-#ifdef HAS_OCCLUSION
-    s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
-#endif
-    radiance = vec4(radiance_of(s, Reflected(vec3(0.0), vec3(0.0)), ambient), 1.0);
+    radiance = vec4(radiance_of(s, Reflected(vec3(0.0), vec3(0.0))), 1.0);
 #else
     radiance = vec4(min(terms_of(reflected_light(s, light)), LARGEST), 0.0);
 #endif

@@ -2,8 +2,8 @@
 // A point light has a sphere; a spot light a sector of one, whose last ring lies in the light. Points are moved out so
 // far that the flat faces stay outside the round shape.
 #include <lights.glsl>
+#include <math.glsl>
 
-const float PI = 3.14159265358979;
 uniform int light;  // the scene's index
 
 // As far as the light's range; without one, to the farthest corner that the picture shows.
@@ -39,7 +39,7 @@ void main() {
     float angle = last * float(ring) / float(rings);
     float around = 2.0 * PI * float(segment % SEGMENTS) / float(SEGMENTS);
     vec3 axis = spot ? l.direction.xyz : vec3(0.0, 0.0, 1.0);
-    vec3 side = normalize(cross(abs(axis.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0), axis));
+    vec3 side = -any_tangent(axis);
     vec3 place = axis * cos(angle) + (side * cos(around) + cross(axis, side) * sin(around)) * sin(angle);
     float radius = reach(l) * 1.001 * across / cos(0.5 * last / float(rings));
     if (spot && ring == RINGS) radius = 0.0;

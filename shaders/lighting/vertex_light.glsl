@@ -2,6 +2,7 @@
 // for the fragment to multiply with its texture; lights that cast shadows are kept apart, for it to look those up.
 #include <pass_view.glsl>
 #include <lights.glsl>
+#include <math.glsl>
 #include <shading.glsl>
 
 struct VertexLight {
@@ -26,7 +27,7 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     s.roughness = m.surface.y;
     s.emissive = vec3(0.0);
     s.anisotropy = 0.0;
-    s.tangent = normalize(cross(s.normal, abs(s.normal.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
+    s.tangent = any_tangent(s.normal);
     s.bitangent = cross(s.normal, s.tangent);
     derive_reflectance(s, m, m.specular);
     s.diffuse = vec3(1.0);

@@ -3,6 +3,7 @@
 #include "surfaces.glsl"
 #include "neighbours.glsl"
 #include <disc_to_disc.glsl>
+#include <noise.glsl>
 uniform sampler2D surfaces;
 uniform ivec2 screen;
 uniform float radius;  // metres
@@ -13,12 +14,6 @@ const vec2 GOLDEN = vec2(-0.73736888, 0.67549029);  // cosine and sine of the go
 // A large disc hides less than its parts would. All are as large as if there were this many of them, so that how dark
 // it is does not depend on how many samples are taken.
 const float DISCS = 512.0;
-
-// Even over any few neighbours, without a period that shows (J. Jimenez, "Next Generation Post Processing in Call of
-// Duty: Advanced Warfare", 2014).
-float gradient_noise(ivec2 texel) {
-    return fract(52.9829189 * fract(dot(vec2(texel), vec2(0.06711056, 0.00583715))));
-}
 
 // What a disc at `offset` hides; nothing from beyond the radius or below the horizon.
 float hiding(View v, vec3 offset, vec3 normal, float far_off, float area, float facing) {
@@ -31,9 +26,9 @@ float blocked_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     ivec2 size = textureSize(surfaces, 0);
     float w = clip_w(v, here.w);
     vec2 reach = 0.5 * radius / w * vec2(v.projection[0][0], v.projection[1][1]);
-    float turn = 6.28318531 * gradient_noise(texel);
+    float turn = 2.0 * PI * interleaved_gradient_noise(vec2(texel));
     vec2 along = vec2(cos(turn), sin(turn));
-    float stretch = gradient_noise(texel.yx + 7);
+    float stretch = interleaved_gradient_noise(vec2(texel.yx + 7));
     float blocked = 0.0;
     for (int i = 0; i < SAMPLES; ++i) {
         float out_to = (float(i) + stretch) / float(SAMPLES);
@@ -46,7 +41,7 @@ float blocked_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
         vec3 at = view_position(v, place_for(there, size, screen), seen.w);
         // The ring's share of the disc on the screen, at the distance of what is seen there.
         float scale = clip_w(v, seen.w) / w;
-        float ring = 6.28318531 * out_to / DISCS * radius * radius * scale * scale;
+        float ring = 2.0 * PI * out_to / DISCS * radius * radius * scale * scale;
         vec3 sight = v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, -1.0) : at / seen.w;
         vec3 offset = at - position;
         float facing = -dot(seen.xyz, offset) / length(offset);

@@ -55,15 +55,14 @@ float filtered_tests(int layer, vec3 place) {
 
 #else
 #include "poisson_disc.glsl"
+#include <math.glsl>
+#include <noise.glsl>
 
 float filtered_tests(int layer, vec3 place) {
     vec2 size = vec2(textureSize(shadow_map, 0).xy);
     mat2 turn = mat2(0.5 * float(TAPS));
 #if KERNEL == KERNEL_ROTATED
-    // Noise in which neighbouring pixels differ most (J. Jimenez, "Next Generation Post Processing in Call of Duty:
-    // Advanced Warfare", 2014).
-    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
-    float angle = 6.28318531 * noise;
+    float angle = 2.0 * PI * interleaved_gradient_noise(gl_FragCoord.xy);
     turn *= mat2(cos(angle), sin(angle), -sin(angle), cos(angle));
 #endif
     float sum = 0.0;

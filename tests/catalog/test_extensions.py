@@ -18,7 +18,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError
 from rendergraph.resources import folder
 
-HEAD = "from rendergraph.api import Choice, Extension, MeshData, Semantic\n"
+HEAD = "from rendergraph.api import Extension, MeshData, Semantic\n"
 TOON = """// Three steps of light.
 #include "steps.glsl"
 Reflected reflected(Surface s, vec3 to_light) {
@@ -135,11 +135,7 @@ def test_plugins_may_share_a_meaning_but_not_disagree(write: Write) -> None:
         ("EXTENSION = Extension(metrics={'l-1': len})", "metric 'l-1' is not of small letters"),
         ("EXTENSION = Extension(choices={'shading': 'toon.glsl'})", "maps a choice to its include, it is str"),
         ("EXTENSION = Extension(choices={'shading': {'Toon': 'toon.glsl'}})", "a choice is of small letters"),
-        ("EXTENSION = Extension(choices={'shading': {'toon': 3}})", "is 3, not a Choice or the name of an include"),
-        (
-            "EXTENSION = Extension(choices={'shading': {'toon': Choice('toon.glsl', 'a')}})",
-            "'needs' is a tuple of words",
-        ),
+        ("EXTENSION = Extension(choices={'shading': {'toon': 3}})", "is 3, not the name of an include"),
     ],
 )
 def test_mistakes_name_the_plugin_and_its_file(write: Write, wrong: str, said: str) -> None:
@@ -152,9 +148,10 @@ def test_mistakes_name_the_plugin_and_its_file(write: Write, wrong: str, said: s
 
 
 def test_what_a_choice_needs_must_be_on_offer(write: Write) -> None:
-    home = write('EXTENSION = Extension(choices={"shading": {"toon": Choice("toon.glsl", needs=("fong",))}})')
+    toon = "// A model.\n#pragma needs(grain, fong)\n" + TOON
+    home = write('EXTENSION = Extension(choices={"shading": {"toon": "toon.glsl"}})', toon_glsl=toon)
     with pytest.raises(
-        InputError, match=r"RG495 choices\['shading'\]\['toon'\] .* needs 'fong', .*; did you mean 'phong'"
+        InputError, match=r"toon\.glsl:2:1: RG495 'shading' offers no 'fong' to need; did you mean 'phong'"
     ):
         rg.load("forward", plugins=[home], size=(8, 8)).set("light.shading", "toon").check()
 
@@ -169,10 +166,11 @@ def test_a_broken_plugin_is_said_beside_the_unknown_word(write: Write) -> None:
 # --- choices -------------------------------------------------------------------------------------------------------
 
 CHOICES = """EXTENSION = Extension(choices={
-    "shading": {"toon": "toon.glsl", "combed": Choice("combed.glsl", needs=("phong", "grain"))},
+    "shading": {"toon": "toon.glsl", "combed": "combed.glsl"},
     "curve": {"halve": "halve.glsl"},
 })"""
 COMBED = """// Looks at everything there is.
+#pragma needs(phong, grain)
 Reflected reflected(Surface s, vec3 to_light) {
     return Reflected(s.diffuse * max(dot(s.normal, to_light), 0.0), s.f0 * (s.anisotropy + 0.001 * s.exponent));
 }
@@ -224,7 +222,13 @@ def test_a_plugins_curve(gl: rg.Session, sketch: Path) -> None:
 def test_other_choices_of_plugins_leave_the_program_as_it_is(sketch: Path) -> None:
     steps = rg.load("forward", plugins=[sketch], size=(8, 8)).expansion().steps
     assert not any("TOON" in name for step in steps for name, _ in step.defines)
-    assert not any(step.includes for step in steps)
+    assert {file.name for step in steps for _, file in step.includes} == {"pbr.glsl", "neutral.glsl"}
+
+
+def test_a_pragma_that_is_written_otherwise_is_said(write: Write) -> None:
+    home = write(CHOICES, toon_glsl="#pragma needs phong\n" + TOON, combed_glsl=COMBED, halve_glsl=HALVE)
+    with pytest.raises(InputError, match=r"toon\.glsl:1:1: RG405 '#pragma needs phong' is not '#pragma needs\(word\)'"):
+        rg.load("forward", plugins=[home], size=(8, 8)).set("light.shading", "toon").check()
 
 
 def test_a_mistake_in_a_plugins_glsl_has_its_file_and_line(gl: rg.Session, write: Write) -> None:

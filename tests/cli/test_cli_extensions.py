@@ -11,7 +11,7 @@ import pytest
 SMALL = ("--size", "24x16", "-n", "1", "-s", "sun.resolution=64")
 EXTENSION = '''
 import numpy as np
-from rendergraph.api import Choice, Extension, Semantic
+from rendergraph.api import Extension, Semantic
 
 
 def darker(image, reference):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,11 @@ import numpy.typing as npt
 import pytest
 
 from rendergraph.glsl import Includes
+from rendergraph.glsl.source import needs
 from rendergraph.resources import folder
 
 Floats = npt.NDArray[np.float64]
 Evaluate = Callable[..., Floats]
-SHADING = {"UNLIT": 0, "PHONG": 1, "BLINN_PHONG": 2, "ANISOTROPIC": 3, "PBR": 4}
 
 
 @pytest.fixture(scope="session")
@@ -51,8 +52,10 @@ def evaluate(gl: Any) -> Evaluate:
             reads.append(f"{kind} {name} = given[{number * rows} + row].{swizzle};")
         folder_of_includes = folder("rendergraph.shaders") / "include"
         resolver = Includes(folder_of_includes)
-        text = "".join(resolver.expand(folder_of_includes / name).text for name in includes.split())
-        macros = "".join(f"#define {name} {value}\n" for name, value in (defines or {}).items())
+        defines = dict(defines or {})
+        plugged = {name: value for name, value in defines.items() if isinstance(value, Path)}
+        text = "".join(resolver.expand(folder_of_includes / name, plugged=plugged).text for name in includes.split())
+        macros = "".join(f"#define {name} {value}\n" for name, value in defines.items() if name not in plugged)
         source = f"""#version 450 core
 {macros}{text}
 layout(local_size_x = 64) in;
@@ -86,20 +89,11 @@ void main() {{
 
 @pytest.fixture
 def shading_defines() -> Callable[..., dict[str, object]]:
-    """Macros of the lighting node for one shading model."""
+    """Macros of the lighting node for one shading model, and the include that it is."""
 
     def make(shading: str, **more: object) -> dict[str, object]:
-        table: dict[str, object] = {f"SHADING_{name}": number for name, number in SHADING.items()}
-        return (
-            table
-            | {
-                "SHADING": f"SHADING_{shading.upper()}",
-                "SMITH_EXACT": 0,
-                "SMITH_FAST": 1,
-                "SMITH": 0,
-                "MATERIAL_COUNT": 1,
-            }
-            | more
-        )
+        model = folder("rendergraph.shaders") / "include" / "shading" / f"{shading}.glsl"
+        said = {f"NEEDS_{need}".upper(): 1 for need in needs(model)}
+        return {"SHADING": model, **said, "SMITH_EXACT": 0, "SMITH_FAST": 1, "SMITH": 0, "MATERIAL_COUNT": 1} | more
 
     return make

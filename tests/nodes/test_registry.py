@@ -13,6 +13,7 @@ from rendergraph.authoring.examine import examine
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Node, declaration_mistakes
 from rendergraph.glsl import expand
+from rendergraph.glsl.source import needs
 from rendergraph.resources import folder, shipped_pipelines
 
 CATALOG = Catalog.discover()
@@ -70,8 +71,33 @@ def test_shaders_exist_and_their_includes_resolve(name: str) -> None:
         assert expand(file, SHADERS / "include", root=file.parent).lines
 
 
+def open_parameters() -> set[tuple[str, str, str]]:
+    """Node, parameter and the name under which plugins add choices to it."""
+    nodes = [(name, CATALOG.get(name).cls.parameters()) for name in BUILTIN]
+    return {(name, word, kind) for name, found in nodes for word in found if (kind := found[word].open_name)}
+
+
+def test_a_choice_that_plugins_add_to_is_an_include_each() -> None:
+    for name, word, kind in open_parameters():
+        parameter = CATALOG.get(name).cls.parameters()[word]
+        files = {path.stem: path for path in (SHADERS / "include" / kind).iterdir()}
+        assert files.keys() == set(parameter.words), (name, word)
+        for choice, file in files.items():
+            assert set(needs(file)) <= set(parameter.needs), (name, word, choice)
+
+
+def test_a_g_buffer_is_read_as_it_is_drawn() -> None:
+    """Every texture of the one list is a port at both ends, and nothing else is."""
+    drawn, read = CATALOG.get("gbuffer").cls, CATALOG.get("deferred_lighting").cls
+    assert list(read.groups()["gbuffer"]) == list(drawn.outputs())
+    for name, port in drawn.outputs().items():
+        other = read.inputs()[name]
+        assert getattr(port, "semantic", None) is other.semantic, name
+
+
 def test_no_shader_is_an_orphan() -> None:
     used = {resolved(name, shader).resolve() for name in BUILTIN for shader in shader_names(name)}
+    used |= {path.resolve() for _, _, kind in open_parameters() for path in (SHADERS / "include" / kind).iterdir()}
     for shader in list(used):
         used |= {
             origin.file.resolve()

@@ -243,7 +243,7 @@ CASES = {
     "shared include": (
         COLOR,
         {
-            "wrong.frag": "out vec4 color;\n#define vec3 nothing\n#include <tone_curves.glsl>\nvoid main() { color = vec4(1); }"
+            "wrong.frag": "out vec4 color;\n#define vec3 nothing\n#include <luminance.glsl>\nvoid main() { color = vec4(1); }"
         },
         r"luminance\.glsl:\d+:\d+: RG410 node 'a': fragment shader: .* \(included at wrong\.frag:3\)",
     ),

@@ -1,5 +1,6 @@
 // Cook-Torrance with a grain: roughness alpha across it, and mix(alpha, 1, strength^2) along the tangent, as
 // KHR_materials_anisotropy has it. At strength 0 it is the isotropic model with the exact visibility.
+#pragma needs(grain)
 #include <brdf.glsl>
 
 Reflected reflected(Surface s, vec3 to_light) {

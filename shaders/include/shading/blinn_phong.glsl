@@ -1,4 +1,5 @@
 // Blinn 1977: kd N.L + ks (N.H)^(4n), without 1/pi; four times Phong's exponent draws about the same highlight.
+#pragma needs(phong)
 Reflected reflected(Surface s, vec3 to_light) {
     float n_l = dot(s.normal, to_light);
     vec3 half_way = normalize(to_light + s.to_viewer);

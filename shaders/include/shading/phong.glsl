@@ -1,4 +1,5 @@
 // Phong 1975: kd N.L + ks (R.V)^n, without 1/pi; no highlight where the surface faces away from the light.
+#pragma needs(phong)
 Reflected reflected(Surface s, vec3 to_light) {
     float n_l = dot(s.normal, to_light);
     vec3 mirrored = 2.0 * n_l * s.normal - to_light;

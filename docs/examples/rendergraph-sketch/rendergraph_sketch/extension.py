@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Choice, Extension
+from rendergraph.api import Extension
 
 from .stl import read_stl
 
 EXTENSION = Extension(
-    choices={"shading": {"toon": Choice("toon.glsl", needs=("phong",))}},
+    choices={"shading": {"toon": "toon.glsl"}},
     meshes={".stl": read_stl},
 )

@@ -1,4 +1,5 @@
 // Three tones and a hard highlight, as cartoons are painted (Lake et al. 2000); without 1/pi, as the empirical models.
+#pragma needs(phong)
 const float DARK = 0.35, MIDDLE = 0.7;
 
 Reflected reflected(Surface s, vec3 to_light) {

@@ -1,8 +1,13 @@
-// The terms of a surface's radiance put together.
+// Radiance of a surface: its terms put together.
 #include <shading.glsl>
 
-#if defined(UNLIT) || SHADING == SHADING_UNLIT
+#if defined(UNLIT) || defined(NEEDS_NOTHING)
 #define NO_LIGHTS
+#endif
+
+uniform vec3 ambient;
+#ifdef HAS_OCCLUSION
+uniform sampler2D occlusion;
 #endif
 
 const float LARGEST = 65504.0;  // of half floats: what is brighter would be stored as infinity
@@ -28,8 +33,8 @@ vec3 unlit_radiance(Surface s) {
 #endif
 }
 
-// Radiance towards the viewer: the wanted terms.
-vec3 radiance_of(Surface s, Reflected light, vec3 ambient) {
+// Radiance towards the viewer: the wanted terms. Ambient light is what the surface and the picture leave open.
+vec3 radiance_of(Surface s, Reflected light) {
 #ifdef NO_LIGHTS
     return unlit_radiance(s);
 #else
@@ -38,6 +43,9 @@ vec3 radiance_of(Surface s, Reflected light, vec3 ambient) {
     sum += s.emissive;
 #endif
 #if TERMS == TERMS_ALL || TERMS == TERMS_AMBIENT
+#ifdef HAS_OCCLUSION
+    s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
+#endif
     sum += ambient * s.ambient * s.occlusion;
 #endif
     return min(sum + terms_of(light), LARGEST);

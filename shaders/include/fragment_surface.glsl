@@ -1,5 +1,6 @@
 // The surface under a fragment of the scene's geometry: varyings, material factors, textures.
 #include <base_color.glsl>
+#include <math.glsl>
 #include <surface.glsl>
 
 in vec3 v_position;
@@ -55,7 +56,7 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
     float longest = max(dot(tangent, tangent), dot(bitangent, bitangent));
     float shortest = min(dot(tangent, tangent), dot(bitangent, bitangent));
     if (shortest < max(1e-30, 1e-12 * longest)) {  // no texture coordinates, or all on a line: any frame will do
-        tangent = normalize(cross(normal, abs(normal.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0)));
+        tangent = any_tangent(normal);
         bitangent = cross(normal, tangent);
     } else {
         tangent *= inversesqrt(longest);

@@ -1,0 +1,7 @@
+// Reinhard et al. 2002, on luminance, with `white` the least luminance that becomes white.
+#include <luminance.glsl>
+
+vec3 tone_curve(vec3 c) {
+    float l = luminance_of(c);
+    return c * ((1.0 + l / (white * white)) / (1.0 + l));
+}
