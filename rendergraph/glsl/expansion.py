@@ -1,82 +1,97 @@
-"""How far a shader's macros expand, found without GL, and refused beyond a limit.
+"""How far a shader's macros may expand, bounded from above without expanding them, and refused beyond a limit.
 
-A few hundred bytes of macros that double each other fill the machine inside a driver's preprocessor. What shaders of
-others hold is therefore preprocessed here first, by the rules of C with a budget; the result is thrown away. Conditions
-on what only the driver knows (`#ifdef GL_EXT_…`) are tried both ways.
+A few hundred bytes of macros that double each other fill the machine inside a driver's preprocessor. So the most words
+that one use of each macro can make are computed from the words of its body, those it refers to first; a call's
+arguments count as often as they come back in what the call makes. No condition is looked at: all that is written
+counts, and of several definitions of a name the worst. What people write stays far below the limit all the same.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from itertools import product
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from itertools import pairwise
+from math import prod
 from pathlib import Path
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.glsl.source import Origin, SourceText
 
-MOST_TOKENS = 1_000_000
-"""Words and signs that macros may make of one stage, steps on the way included."""
-MOST_UNKNOWN = 6
-"""Names that only the driver knows in conditions of one stage: each doubles the ways to look at."""
+MOST_WORDS = 1_000_000
+"""Words and signs that macros may make of one stage."""
+MOST_NESTED = 256
+"""Macros inside each other, by their definitions and by calls in the arguments of calls."""
 
-_TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|##|&&|\|\||[<>=!]=|<<|>>|[^\s\w]")
-_DIRECTIVE = re.compile(r"\s*#\s*([a-z]+)?\s*(.*)", re.DOTALL)
+_ENOUGH = MOST_WORDS + 1
+_ROUNDS = 16
+_TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|##|[^\s\w]")
+_DIRECTIVE = re.compile(r"\s*#\s*([a-z]*)\s*(.*)", re.DOTALL)
 _DEFINE = re.compile(r"([A-Za-z_]\w*)(\(([^()]*)\))?(.*)", re.DOTALL)
-_UNKNOWN = re.compile(r"\b(?:GL|__)\w*")
-_KNOWN = {"__VERSION__": "450", "GL_core_profile": "1"}
-
-_Token = tuple[str, frozenset[str]]
-"""A word or sign, and the macros that made it, which are not expanded in it again."""
-
-
-class _TooFar(Exception):
-    """The budget is spent."""
-
-
-@dataclass(frozen=True)
-class _Macro:
-    parameters: tuple[str, ...] | None
-    body: tuple[str, ...]
 
 
 def check_expansion(source: SourceText, trusted: Iterable[Path] = ()) -> None:
-    """Refuse a stage whose macros expand too far.
+    """Refuse a stage whose macros may expand too far.
 
     Args:
         source: the text of a stage.
         trusted: folders of shaders that need no looking into; a stage of nothing else is passed over.
 
     Raises:
-        InputError: they make more than `MOST_TOKENS`, or depend on more than `MOST_UNKNOWN` names of the driver.
+        InputError: they may make more than `MOST_WORDS`, or stand more than `MOST_NESTED` deep (RG409).
     """
     folders = tuple(trusted)
     files = {origin.file for origin in source.origins} - {None}
     if all(any(file.is_relative_to(folder) for folder in folders) for file in files if file is not None):
         return
-    lines = list(_joined(source))
-    unknown = sorted({name for text, _ in lines if _conditional(text) for name in _UNKNOWN.findall(text)} - {*_KNOWN})
-    if len(unknown) > MOST_UNKNOWN:
-        where = next(at for text, at in lines if _conditional(text) and unknown[0] in text)
-        listed = ", ".join(unknown)
-        raise _error(source, where, f"conditions ask the driver for {listed}; {MOST_UNKNOWN} such names are the limit")
-    for answers in product((None, "1"), repeat=len(unknown)):
-        known = {name: answer for name, answer in zip(unknown, answers, strict=True) if answer is not None}
-        preprocessor = _Preprocessor({**_KNOWN, **known})
-        try:
-            preprocessor.run(lines)
-        except (_TooFar, RecursionError):
-            line = source.lines[preprocessor.at].strip()
-            text = f"macros make more than {MOST_TOKENS:,} words of this line: '{line[:60]}'"
-            raise _error(source, preprocessor.at, text) from None
+    definitions, runs = _parts(source)
+    macros = _Macros(definitions, [words for words, _ in runs])
+    total = 0
+    for words, lines in runs:
+        if macros.names.isdisjoint(words):
+            continue
+        for at, (growth, factor, around) in zip(lines, macros.walk(words), strict=True):
+            total += growth.words * factor
+            if total > MOST_WORDS:
+                raise _error(source, at, f"macros may make more than {MOST_WORDS:,} words of this line")
+            if around + growth.depth > MOST_NESTED:
+                raise _error(source, at, f"more than {MOST_NESTED} macros stand inside each other in this line")
 
 
 def _error(source: SourceText, at: int, text: str) -> InputError:
+    text = f"{text}: '{source.lines[at].strip()[:60]}'"
     origin = source.origins[at]
     if origin.file is None:
         origin = next((o for o in source.origins[at:] if o.file is not None), Origin())
     return InputError(Problem("RG409", text, origin.place(), source.lines[at] if origin == source.origins[at] else ""))
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Definition:
+    name: str
+    parameters: tuple[str, ...] | None
+    body: tuple[str, ...]
+
+
+def _parts(source: SourceText) -> tuple[list[_Definition], list[tuple[list[str], list[int]]]]:
+    """Every definition; and the words that are expanded (text between directives, conditions) with their lines."""
+    definitions: list[_Definition] = []
+    runs: list[tuple[list[str], list[int]]] = [([], [])]
+    for text, at in _joined(source):
+        directive = _DIRECTIVE.match(text)
+        if directive is not None and directive[1] == "define" and (found := _DEFINE.match(directive[2])):
+            parameters = None if found[2] is None else tuple(p.strip() for p in found[3].split(",") if p.strip())
+            definitions.append(_Definition(found[1], parameters, tuple(_TOKEN.findall(found[4]))))
+        words = _TOKEN.findall(text) if directive is None else []
+        if directive is not None:
+            runs.append(([], []))
+            words = _TOKEN.findall(directive[2]) if directive[1] in ("if", "elif") else []
+        runs[-1][0].extend(words)
+        runs[-1][1].extend([at] * len(words))
+    return definitions, runs
 
 
 def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
@@ -93,217 +108,170 @@ def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
         yield text, start
 
 
-def _conditional(text: str) -> bool:
-    return re.match(r"\s*#\s*(?:if|ifdef|ifndef|elif)\b", text) is not None
+# --- weighing --------------------------------------------------------------------------------------------------------
 
 
-@dataclass
-class _Preprocessor:
-    """One way through a text.
+@dataclass(frozen=True)
+class _Growth:
+    """What one use of a macro makes at most.
 
     Attributes:
-        known: macros that the driver defines.
-        at: the line that is expanded now.
-        spent: tokens looked at so far.
+        words: words, those of its arguments aside.
+        times: how often a word of its arguments comes back.
+        depth: macros inside each other.
     """
 
-    known: Mapping[str, str]
-    at: int = 0
-    spent: int = 0
-    macros: dict[str, _Macro] = field(default_factory=dict)
-    _hidden: dict[tuple[frozenset[str], frozenset[str]], frozenset[str]] = field(default_factory=dict)
-    _branches: list[list[bool]] = field(default_factory=list)  # each: takes lines now, has taken some, outer takes
-
-    def run(self, lines: Iterable[tuple[str, int]]) -> None:
-        self.macros = {name: _Macro(None, (value,)) for name, value in self.known.items()}
-        waiting: list[str] = []
-        for text, at in lines:
-            directive = _DIRECTIVE.match(text)
-            if directive is None:
-                if self._taken:
-                    if not waiting:
-                        self.at = at
-                    waiting += _TOKEN.findall(text)
-                    if not waiting or waiting[-1] in (";", "{", "}"):  # a call's arguments may go over lines
-                        self._expand(waiting)
-                        waiting = []
-                continue
-            self._expand(waiting)
-            waiting = []
-            self.at = at
-            self._directive(directive[1] or "", directive[2])
-        self._expand(waiting)
-
-    @property
-    def _taken(self) -> bool:
-        return not self._branches or self._branches[-1][0]
-
-    def _directive(self, word: str, rest: str) -> None:
-        if word in ("if", "ifdef", "ifndef"):
-            outer = self._taken
-            holds = outer and self._holds(word, rest)
-            self._branches.append([holds, holds, outer])
-        elif word in ("elif", "else") and self._branches:
-            branch = self._branches[-1]
-            branch[0] = branch[2] and not branch[1] and (word == "else" or self._holds("if", rest))
-            branch[1] = branch[1] or branch[0]
-        elif word == "endif" and self._branches:
-            self._branches.pop()
-        elif self._taken and word == "define" and (found := _DEFINE.match(rest)):
-            parameters = None if found[2] is None else tuple(p.strip() for p in found[3].split(",") if p.strip())
-            self.macros[found[1]] = _Macro(parameters, tuple(_TOKEN.findall(found[4])))
-        elif self._taken and word == "undef":
-            self.macros.pop(rest.strip(), None)
-
-    def _holds(self, word: str, rest: str) -> bool:
-        if word != "if":
-            return (rest.strip() in self.macros) == (word == "ifdef")
-        asked = re.sub(
-            r"\bdefined\s*(?:\(\s*(\w+)\s*\)|(\w+))", lambda m: "1" if (m[1] or m[2]) in self.macros else "0", rest
-        )
-        return Condition(self._expand(_TOKEN.findall(asked))).value() != 0
-
-    def _expand(self, words: list[str]) -> list[str]:
-        if self.macros.keys().isdisjoint(words):
-            return words
-        return [word for word, _ in self._expanded([(word, frozenset[str]()) for word in words])]
-
-    def _expanded(self, tokens: list[_Token]) -> list[_Token]:
-        """Tokens with all macros expanded (the algorithm of Dave Prosser, X3J11/86-196)."""
-        done: list[_Token] = []
-        rest = tokens[::-1]
-        while rest:
-            self._spend(1)
-            word, hidden = token = rest.pop()
-            macro = self.macros.get(word)
-            if macro is None or word in hidden:
-                done.append(token)
-            elif macro.parameters is None:
-                inside = self._both(hidden, frozenset((word,)))
-                rest += [(part, inside) for part in reversed(macro.body)]
-            elif not rest or rest[-1][0] != "(":
-                done.append(token)
-            else:
-                before = len(rest)
-                found = _arguments(rest)
-                self.spent += before - len(rest) if found else before  # looking for the end is work too
-                if found is None:
-                    done.append(token)
-                    continue
-                arguments, closing = found
-                made = self._substituted(macro, arguments, self._both(hidden & closing, frozenset((word,))))
-                rest += reversed(made)
-        return done
-
-    def _both(self, hidden: frozenset[str], more: frozenset[str]) -> frozenset[str]:
-        """Two sets as one, made once: macros that lead to each other in a long row hide as many names in each."""
-        key = hidden, more
-        if key not in self._hidden:
-            self._spend(len(hidden) + len(more))
-            self._hidden[key] = hidden | more
-        return self._hidden[key]
-
-    def _spend(self, count: int) -> None:
-        self.spent += count
-        if self.spent > MOST_TOKENS:
-            raise _TooFar
-
-    def _substituted(self, macro: _Macro, arguments: list[list[_Token]], inside: frozenset[str]) -> list[_Token]:
-        given = dict(zip(macro.parameters or (), arguments, strict=False))
-        expanded: dict[str, list[_Token]] = {}
-        made: list[_Token] = []
-        paste = False
-        for number, word in enumerate(macro.body):
-            if word == "##":
-                paste = bool(made)
-                continue
-            pasted = paste or macro.body[number + 1 : number + 2] == ("##",)
-            if word not in given:
-                parts = [(word, inside)]
-            elif pasted:
-                parts = given[word]
-            else:
-                if word not in expanded:
-                    expanded[word] = self._expanded(given[word])
-                parts = expanded[word]
-            self._spend(len(parts))
-            if paste and parts:
-                made[-1] = (made[-1][0] + parts[0][0], made[-1][1] & parts[0][1])
-                self._spend(len(made[-1][0]))  # a word may double as well
-                parts = parts[1:]
-            made += [(part, self._both(hidden, inside)) for part, hidden in parts]
-            paste = False
-        return made
+    words: int = 1
+    times: int = 1
+    depth: int = 0
 
 
-def _arguments(rest: list[_Token]) -> tuple[list[list[_Token]], frozenset[str]] | None:
-    """Takes a call's arguments off the end of reversed tokens; None, with all left, where they do not end."""
-    depth = 0
-    arguments: list[list[_Token]] = [[]]
-    for taken, token in enumerate(reversed(rest)):
-        word = token[0]
-        depth += (word == "(") - (word == ")")
-        if depth == 0:
-            del rest[len(rest) - taken - 1 :]
-            return arguments, token[1]
-        if word == "," and depth == 1:
-            arguments.append([])
-        elif depth > 1 or word != "(":
-            arguments[-1].append(token)
-    return None
+_PLAIN = _Growth()
 
 
-_BINARY: dict[str, tuple[int, Callable[[int, int], int]]] = {
-    "||": (1, lambda a, b: a or b),
-    "&&": (2, lambda a, b: a and b),
-    "|": (3, lambda a, b: a | b),
-    "^": (4, lambda a, b: a ^ b),
-    "&": (5, lambda a, b: a & b),
-    "==": (6, lambda a, b: a == b),
-    "!=": (6, lambda a, b: a != b),
-    "<": (7, lambda a, b: a < b),
-    ">": (7, lambda a, b: a > b),
-    "<=": (7, lambda a, b: a <= b),
-    ">=": (7, lambda a, b: a >= b),
-    "<<": (8, lambda a, b: a << (b & 31)),
-    ">>": (8, lambda a, b: a >> (b & 31)),
-    "+": (9, lambda a, b: a + b),
-    "-": (9, lambda a, b: a - b),
-    "*": (10, lambda a, b: a * b),
-    "/": (10, lambda a, b: int(a / b) if b else 0),
-    "%": (10, lambda a, b: a - b * int(a / b) if b else 0),
-}
+class _Macros:
+    """All macros of a stage, and what a use of each makes.
+
+    Attributes:
+        names: of all.
+        loose: how often a word in brackets comes back where a macro that was handed on, as a name without arguments,
+            may be called with them; 1 where no macro is.
+    """
+
+    def __init__(self, definitions: Sequence[_Definition], runs: Sequence[Sequence[str]]) -> None:
+        self.loose = 1
+        self._growths: dict[str, _Growth] = {}
+        self._called = {one.name for one in definitions if one.parameters is not None}
+        self._definitions: dict[str, list[_Definition]] = {}
+        for one in definitions:
+            self._definitions.setdefault(one.name, []).append(one)
+        pairs = [pair for text in (*runs, *(one.body for one in definitions)) for pair in pairwise((*text, ""))]
+        known = {word for word, _ in pairs}
+        joined = [name for name in self._definitions if _joins(name, known)] if "##" in known else []
+        self._pasted = {
+            name: {made for one in alternatives for made in joined if _pastes(one, made)} - {name}
+            for name, alternatives in self._definitions.items()
+        }
+        handed = {word for word, following in pairs if word in self._called and following != "("}
+        handed |= {name for names in self._pasted.values() for name in names & self._called}
+        self.names = self._definitions.keys()
+        before, core, behind = self._order()
+        for rounds_left in range(_ROUNDS, -1, -1):
+            for name in before:
+                self._growths[name] = self._growth(name)
+            self._weigh_core(core)
+            for name in behind:
+                self._growths[name] = self._growth(name)
+            loose = max((self._growths[name].times for name in handed), default=1)
+            if loose == self.loose or _ROUNDS - rounds_left > len(handed):
+                return  # on one way each is called once, so there are no more rounds than names
+            self.loose = loose if rounds_left else _ENOUGH
+
+    def walk(self, words: Sequence[str], inside: _Definition | None = None) -> Iterator[tuple[_Growth, int, int]]:
+        """For each word what it makes, how often it comes back, and how many calls stand around it.
+
+        Args:
+            words: words that are expanded together.
+            inside: the macro whose body they are.
+        """
+        own = inside.name if inside is not None else ""  # not expanded in itself again
+        brackets = [(1, 0)]
+        for before, word in pairwise(("", *words)):
+            factor, around = brackets[-1]
+            if word == "(":
+                called = before in self._called and before != own
+                plain = inside is None and around == 0 and before not in self._definitions and before != ")"
+                times = max(self._growths[before].times if called else 1, 1 if plain else self.loose)
+                brackets.append((min(_ENOUGH, factor * times), around + called))
+            elif word == ")" and len(brackets) > 1:
+                brackets.pop()
+            yield self._growths.get(word, _PLAIN) if word != own else _PLAIN, factor, around
+
+    def _growth(self, name: str) -> _Growth:
+        return _worst([self._growth_of(one) for one in self._definitions[name]])
+
+    def _growth_of(self, one: _Definition) -> _Growth:
+        back = dict.fromkeys(one.parameters or (), 0)
+        pasted = [self._growths[name] for name in self._pasted[one.name]]
+        words = depth = left_open = 0
+        for word, (growth, factor, around) in zip(one.body, self.walk(one.body, one), strict=True):
+            if pasted:  # any of its words, to be simple
+                growth = _worst([growth, *pasted])
+            if word in back:
+                back[word] += factor
+            words += growth.words * factor
+            depth = max(depth, around + growth.depth)
+            left_open = max(0, left_open + (word == "(") - (word == ")"))
+        if left_open:  # what follows the macro would be among the arguments
+            words = _ENOUGH
+        return _Growth(min(_ENOUGH, 1 + words), min(_ENOUGH, max([1, *back.values()])), depth + 1)
+
+    def _weigh_core(self, names: Sequence[str]) -> None:
+        """Macros that lead to each other: each is expanded once on any way, so that the references multiply at most."""
+        self._growths |= dict.fromkeys(names, _PLAIN)
+        own = [self._growth(name) for name in names]
+        bodies = [one for name in names for one in self._definitions[name]]
+        ways = min(_ENOUGH, prod(max(1, self._references(one, {*names})) for one in bodies))
+        words = min(_ENOUGH, ways * sum(growth.words for growth in own))
+        times = min(_ENOUGH, ways * prod(growth.times for growth in own))
+        self._growths |= dict.fromkeys(names, _Growth(words, times, sum(growth.depth for growth in own)))
+
+    def _references(self, one: _Definition, names: Set[str]) -> int:
+        walked = zip(one.body, self.walk(one.body, one), strict=True)
+        pastes = not names.isdisjoint(self._pasted[one.name])
+        return sum(factor for word, (_, factor, _) in walked if pastes or word in names)
+
+    def _order(self) -> tuple[list[str], list[str], list[str]]:
+        """Names, each behind all that it refers to; those on circles and between them; those behind these."""
+        needs: dict[str, set[str]] = {}
+        for name, alternatives in self._definitions.items():
+            words = {word for one in alternatives for word in one.body}
+            needs[name] = (words & self._definitions.keys() | self._pasted[name]) - {name}
+        before = _sorted(needs)
+        rest = needs.keys() - before
+        reverse: dict[str, set[str]] = {name: set() for name in rest}
+        for name in rest:
+            for other in needs[name] & rest:
+                reverse[other].add(name)
+        behind = _sorted(reverse)[::-1]
+        return before, sorted(rest - {*behind}), behind
 
 
-class Condition:
-    """The whole number that the words after `#if` stand for; what is not understood is 0."""
+def _worst(growths: Sequence[_Growth]) -> _Growth:
+    """What is true of any of them."""
+    words, times, depth = (max(each) for each in zip(*((g.words, g.times, g.depth) for g in growths), strict=True))
+    return _Growth(words, times, depth)
 
-    def __init__(self, words: list[str]) -> None:
-        self._words = words[::-1]
 
-    def value(self) -> int:
-        """The number."""
-        return self._binary(1)
+def _sorted(needs: Mapping[str, Set[str]]) -> list[str]:
+    """Names, each behind all that it needs; those on circles, and those that need these, are left out."""
+    needed_by: dict[str, list[str]] = {name: [] for name in needs}
+    missing = {name: len(others) for name, others in needs.items()}
+    for name, others in needs.items():
+        for other in others:
+            needed_by[other].append(name)
+    found = [name for name, count in missing.items() if count == 0]
+    for name in found:  # it grows meanwhile
+        for other in needed_by[name]:
+            missing[other] -= 1
+            if missing[other] == 0:
+                found.append(other)
+    return found
 
-    def _binary(self, least: int) -> int:
-        left = self._unary()
-        while self._words and (found := _BINARY.get(self._words[-1])) and found[0] >= least:
-            self._words.pop()
-            left = int(found[1](left, self._binary(found[0] + 1))) & 0xFFFFFFFF
-            left -= (left & 0x80000000) << 1
-        return left
 
-    def _unary(self) -> int:
-        word = self._words.pop() if self._words else "0"
-        if word in ("!", "-", "+", "~"):
-            inner = self._unary()
-            return {"!": int(not inner), "-": -inner, "+": inner, "~": ~inner}[word]
-        if word == "(":
-            inner = self._binary(1)
-            if self._words:
-                self._words.pop()
-            return inner
-        if found := re.match(r"0[xX]([0-9a-fA-F]+)", word):
-            return int(found[1], 16)
-        digits = re.match(r"[0-9]{0,20}", word)[0]  # type: ignore[index]  # it matches always
-        return int(digits or "0", 8 if re.fullmatch("0[0-7]+", digits) else 10)
+def _pastes(one: _Definition, name: str) -> bool:
+    """Whether a body may put a name together with `##`: then it holds what is no parameter there."""
+    around = zip(one.body, one.body[1:], one.body[2:], strict=False)
+    return any(
+        sign == "##" and all(part in name or part in (one.parameters or ()) for part in (left, right))
+        for left, sign, right in around
+    )
+
+
+def _joins(name: str, known: Collection[str]) -> bool:
+    """Whether a name is two or more of the known words, one behind the other."""
+    ends = {0}
+    for end in range(1, len(name) + 1):
+        if any(name[start:end] in known and (start, end) != (0, len(name)) for start in ends):
+            ends.add(end)
+    return len(name) in ends

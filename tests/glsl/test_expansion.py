@@ -13,7 +13,7 @@ from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Node, Output
 from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError
-from rendergraph.glsl.expansion import Condition, check_expansion
+from rendergraph.glsl.expansion import check_expansion
 from rendergraph.glsl.source import Origin, SourceText
 from rendergraph.resources import folder
 
@@ -48,6 +48,17 @@ BOMBS = {
     "calls that do not end": "#define D(x) x\n" + "D(" * 100_000,
     "names pasted together": chain(40).replace("#define A40", "#define A4")
     + "\n#define P(a, b) a##b\nfloat y = P(A, 4);",
+    "calls that wait for a second look": "#define NONE\n#define D(x) (x x)\n#define ID(x) x\nfloat y = "
+    + "ID(" * 24
+    + "D NONE " * 24
+    + "(a)"
+    + ")" * 24
+    + ";",
+    "brackets that come from arguments": "#define D(x) x x\n#define K(x) D x\nfloat y = "
+    + "K((" * 24
+    + "a"
+    + "))" * 24,
+    "a call that another macro opens": "#define D(x) x x\n#define O D(\nfloat y = " + "O " * 24 + "a" + ")" * 24,
     "a word that doubles": "#define D(a) a##a\n#define E(a) D(a)\n" + "E(" * 22 + "x" + ")" * 22 + ";",
     "one after the other, each hidden in all that follow": chain(3000, "A{0}") + "\nfloat y = A3000;",
     "the same around words of others": "#define F(x) x\n"
@@ -59,21 +70,37 @@ BOMBS = {
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_refused_in_time(name: str) -> None:
     start = time.perf_counter()
-    with pytest.raises(InputError, match=r"RG409 macros make more than 1,000,000 words of this line"):
+    with pytest.raises(InputError, match=r"RG409 (macros may make more than 1,000,000 words of|more than 256 macros)"):
         check_expansion(text_of(BOMBS[name]))
-    assert time.perf_counter() - start < 30
+    assert time.perf_counter() - start < 10
 
 
 FINE = {
     "a macro that names itself": "#define A A A\n#define f(x) f(x) + f(x)\nA f(f(f(1)))",
     "two that name each other": "#define A B B\n#define B A A\nA",
-    "not taken": f"{chain(40)}\n#ifdef NEVER\nfloat y = A40;\n#elif 0\nA40\n#else\nfloat y;\n#endif",
-    "taken away": f"{chain(40)}\n#undef A40\nfloat y = A40;",
-    "defined again": f"{chain(40)}\n#undef A1\n#define A1 x\n#undef A20\n#define A20 x\nfloat y = A30;",
+    "never used": f"{chain(40)}\nfloat y;",
     "a name that is not called": "#define D(x) x x\nfloat D = D + D;",
     "a call that does not end": "#define D(x) x x\nfloat y = D(D(D(1);",
+    "a list of fields, handed a macro": "#define FIELDS(X) "
+    + " ".join(f"X(vec3, f{i})" for i in range(40))
+    + "\n#define FIELD(t, n) t n; t old_##n;\n#define RESET(t, n) s.n = t(0); s.old_##n = t(0);\n"
+    + "struct S { FIELDS(FIELD) };\nvoid reset(inout S s) { FIELDS(RESET) }",
+    "names for several dialects": "#ifdef OLD\n#define texture texture2D\n#else\n#define texture2D texture\n#endif\n"
+    + "\n".join(f"#define TAP{i}(x) (texture(s, x) + texture(s, -x) + texture2D(s, 2 * x))" for i in range(20))
+    + "\nvec4 y = "
+    + " + ".join(f"TAP{i}(TAP{i}(x))" for i in range(20))
+    + ";",
+    "a name that stands for itself and more": "#define texture(s, x) texture(s, x, BIAS)\n#define BIAS -1.0\n"
+    + "y = texture(s, texture(s, texture(s, x).xy).xy);\n" * 500,
+    "a library of half precision": "\n".join(
+        f"#define AH{i}_(a) half{i}(a)\n#define ALerp{i}(x, y, a) ((x) + (a) * ((y) - (x)))\n"
+        f"#define ASat{i}(x) AMin{i}(AMax{i}(x, AH{i}_(0.0)), AH{i}_(1.0))\n#define AMin{i}(x, y) min(x, y)\n"
+        f"#define AMax{i}(x, y) max(x, y)\n#define ATone{i}(x) ASat{i}(ALerp{i}(x, x * x, ASat{i}(x)))"
+        for i in range(1, 60)
+    )
+    + "".join(f"\ny{i} = ATone{i}(ATone{i}(ALerp{i}(a, b, c)));" for i in range(1, 60)) * 2,
     "many small ones": "#define sq(x) ((x) * (x))\n" + "float y = sq(sq(a)) + sq(b) * sq(c);\n" * 2000,
-    "a long row": f"{chain(300, 'A{0}')}\nfloat y = A300;",
+    "a long row": f"{chain(200, 'A{0}')}\nfloat y = A200;",
     "a number of many digits": f"#if {'1' * 5000}\n#endif",
     "text alone": "float f() { return 1.0; }\n" * 20_000,
 }
@@ -89,34 +116,6 @@ def test_shipped_shaders_are_trusted_and_the_line_is_the_authors() -> None:
     check_expansion(text_of(BOMBS["doubling words"], shipped / "include" / "a.glsl"), (shipped,))
     with pytest.raises(InputError, match=r"/somewhere/a\.frag:42:1: RG409"):
         check_expansion(text_of(BOMBS["doubling words"]), (shipped,))
-
-
-def test_many_names_of_the_driver_are_refused() -> None:
-    asked = "\n".join(f"#ifdef GL_EXT_n{i}\n#endif" for i in range(6))
-    check_expansion(text_of(asked))
-    with pytest.raises(InputError, match=r"a\.frag:1:1: RG409 conditions ask the driver for GL_EXT_n0, .*; 6 such"):
-        check_expansion(text_of(f"{asked}\n#if defined(GL_EXT_n6)\n#endif"))
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("1 + 2 * 3 == 7 && ! 0", 1),
-        ("0x10 - 020", 0),
-        ("( 1 < 2 ) || 5 / 0", 1),
-        ("- 7 % 4", -3),
-        ("7 / - 2", -3),
-        ("1 << 31", -(2**31)),
-        ("~ 0 == - 1", 1),
-        ("unknown", 0),
-        ("2 >= 3 || 3 <= 2", 0),
-        ("", 0),
-        ("6 & 3 | 8 ^ 1", 11),
-        ("\u0663 + 1", 1),
-    ],
-)
-def test_conditions(text: str, expected: int) -> None:
-    assert Condition(text.split()).value() == expected
 
 
 class Bomb(Node):
