@@ -24,7 +24,7 @@ class ForwardLighting(GeometryLighting):
     radiance = Output(
         Radiance,
         format="rgba16f",
-        clear=lambda node: (*node.background_rgb, 0.0),
+        clear=lambda node, facts: (*node.background_rgb, 0.0),
         doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",
     )
     surface_depth = Output(

@@ -18,7 +18,7 @@ class ForwardMultipass(GeometryLighting):
     radiance = Output(
         Radiance,
         format="rgba32f",
-        clear=lambda node: (*node.background_rgb, 0.0),
+        clear=lambda node, facts: (*node.background_rgb, 0.0),
         doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
     )
     surface_depth = Output(

@@ -29,7 +29,6 @@ class ShadowMapNode(Node):
         kind="texture2d_array",
         format="depth32f",
         layers=_layers,
-        lights=_lights,
         view="views",
         clear=1.0,
         size=lambda node, facts: (node.resolution, node.resolution),
@@ -49,7 +48,7 @@ class ShadowMapNode(Node):
     def record(self, steps: Steps) -> None:
         """One pass a layer over what casts; back faces of single-sided materials are left out."""
         offset = (self.slope_bias, 0.0) if self.slope_bias else None
-        for layer in range(_layers(self, steps.facts)):
+        for layer in range(steps.desc(self.shadow_map).layers):
             steps.geometry(
                 "<depth.frag>",
                 vertex="<depth.vert>",

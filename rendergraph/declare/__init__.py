@@ -21,6 +21,7 @@ from rendergraph.declare.ports import (
     Port,
     Ruled,
     SizeRule,
+    Texel,
     Views,
 )
 
@@ -49,6 +50,7 @@ __all__ = [
     "Ruled",
     "SizeRule",
     "Source",
+    "Texel",
     "TextureInfo",
     "Views",
     "declaration_mistakes",

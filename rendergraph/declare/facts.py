@@ -32,8 +32,9 @@ class TextureInfo:
         desc: what it is allocated from (None for a buffer, view or function).
         semantic: what it means, after `any` and `like` are followed.
         view: the id of the view table it was drawn with (`camera`, or `node.port`), None if not drawn.
-        lights: the scene's light index of each layer, empty where layers are not lights.
+        lights: the scene's light index of each layer or view, empty where those are not lights'.
         bytes: size of a buffer, 0 for textures.
+        views: number of views of a table of views, 0 for everything else.
     """
 
     desc: TextureDesc | None
@@ -41,6 +42,7 @@ class TextureInfo:
     view: str | None = None
     lights: tuple[int, ...] = ()
     bytes: int = 0
+    views: int = 0
 
     @property
     def holds_values(self) -> bool:

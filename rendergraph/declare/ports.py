@@ -1,6 +1,7 @@
 """Ports: named connection points and textures of a node.
 
-Sizes, formats and counts may be constants or functions `(node, facts)`; `Facts` is all such a function may ask.
+Sizes, formats, counts, samplers and first contents may be constants or functions `(node, facts)`; the two are all that
+such a function may ask, and a link asks it once.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wra
 T = TypeVar("T")
 Ruled: TypeAlias = "T | Callable[[Any, Facts], T]"
 """A constant, or a function of the node and the facts known before the schedule."""
+
+Texel: TypeAlias = "float | tuple[float, ...]"
+"""One value for every channel, or one a channel, up to four."""
 
 SizeRule: TypeAlias = "float | tuple[int, int] | str | tuple[str, float] | Callable[[Any, Facts], tuple[int, int]]"
 """A factor of the viewport; width and height; an input's name; an input's name with a factor; a function."""
@@ -89,7 +93,7 @@ class Input(Port):
         semantic: what it must mean; `Any` takes everything.
         kind: kind of port; `function` takes a `Signature` as its semantic.
         size: `same` as the pass's target, or `any`.
-        filter, wrap, compare, anisotropy: the sampler, `filter` also as a function of the node's parameters.
+        filter, wrap, compare, anisotropy: the sampler.
         samples: `single`, `multi` (a multisampled texture) or `any`.
         optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
         many: it takes a list.
@@ -101,7 +105,7 @@ class Input(Port):
     semantic: Semantic | Signature
     kind: Kind = "texture2d"
     size: Literal["same", "any"] = "same"
-    filter: Filter | Callable[[Any], Filter] = "nearest"
+    filter: Ruled[Filter] = "nearest"
     wrap: Wrap = "clamp"
     compare: bool = False
     anisotropy: int = 1
@@ -146,7 +150,7 @@ class Made(Port):
     layers: Ruled[int] | None = None
     samples: Ruled[int] = 1
     bytes: Ruled[int] = 0
-    clear: float | tuple[float, ...] | Callable[[Any], float | tuple[float, ...]] | None = None
+    clear: Ruled[Texel | None] = None
     first: float | None = None
     view: str | None = None
     lights: str | Callable[[Any, Facts], tuple[int, ...]] | None = None

@@ -13,7 +13,6 @@ from rendergraph.expand.ending import mark_roles, wanted_resources
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recorder, now
-from rendergraph.expand.rules import cleared_to, filter_of, view_table
 from rendergraph.expand.targets import feedback, misfit, no_image, onto_nothing, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Use, Write
@@ -74,7 +73,8 @@ class Numbering:
         for port in node.node.ports().values():
             end = Endpoint(node.id, port.name)
             if isinstance(port, Views):
-                self.views[str(end)] = view_table(node, port, recorder.facts)
+                info = self.graph.textures[end]
+                self.views[str(end)] = ViewTable(info.views, info.lights)
             if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recorder.links.get(port.name):
@@ -177,7 +177,7 @@ class Numbering:
         port = part.port
         if isinstance(port, Input):
             ends = recorder.links.get(port.name, ())
-            sampler = part.sampler or Sampler(filter_of(recorder.node, port), port.wrap, port.compare, port.anisotropy)
+            sampler = part.sampler or recorder.node.samplers.get(port.name, Sampler())
             return [
                 self._read(f"{name}_{number}" if port.many else name, end, part, sampler, part.use or port.use)
                 for number, end in enumerate(ends)
@@ -222,7 +222,7 @@ class Numbering:
         parts, touched = self.written[resource], parts_written(request, part, desc)
         fresh = not continued and not any(overlap(one, other) for one in parts for other in touched)
         parts |= touched
-        clear = cleared_to(recorder.node, port)
+        clear = recorder.node.clears[port.name]
         if request.kind == "clear":
             load, clear = "clear", value
         elif not fresh:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import InOut, Input, LightFacts, TextureInfo
+from rendergraph.declare import InOut, Input, LightFacts, Made, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.link.check import Checker, kind_of
@@ -121,13 +121,14 @@ class _Linker:
             textures = self._textures(nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
             self._shown(nodes, outputs, infer)
-            self.problems += infer.problems
+        members = {name: _member(bound, infer) for name, bound in nodes.items()}
+        self.problems += infer.problems if not knots else ()
         problems = [*self.spec.problems, *self.problems]
         if problems and not self.sketching:
             raise InputError(_in_order(problems))
         return Graph(
             name=self.spec.name,
-            members={name: _member(bound) for name, bound in nodes.items()},
+            members=members,
             outputs={name: found.source for name, found in outputs.items()},
             size=self.spec.size,
             lights=self.lights,
@@ -370,9 +371,12 @@ def _upstream_first(nodes: Mapping[str, Bound]) -> list[str]:
     return list(done)
 
 
-def _member(bound: Bound) -> GraphNode:
-    links = {key: tuple(found.source for found in ends) for key, ends in bound.links.items() if ends}
-    return GraphNode(bound.spec.id, bound.type, bound.node, links, bound.spec.place, bound.choices)
+def _member(bound: Bound, infer: Infer) -> GraphNode:
+    spec, ports = bound.spec, bound.ports
+    links = {name: tuple(found.source for found in ends) for name, ends in bound.links.items() if ends}
+    samplers = {name: infer.sampler(Endpoint(spec.id, name)) for name in links if isinstance(ports[name], Input)}
+    clears = {name: infer.clear(Endpoint(spec.id, name)) for name, port in ports.items() if isinstance(port, Made)}
+    return GraphNode(spec.id, bound.type, bound.node, links, spec.place, bound.choices, samplers, clears)
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:

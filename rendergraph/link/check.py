@@ -94,7 +94,7 @@ class Checker:
     def _format(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         texel = FORMATS[info.desc.format]
-        smooth = self.infer.filter_of(bound, port)
+        smooth = self.infer.sampler(Endpoint(bound.spec.id, port.name)).filter
         takes = ""
         if port.use == "depth_test" and not texel.is_depth:
             takes = "is attached as depth"

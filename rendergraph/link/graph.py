@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import LightFacts, Node, TextureInfo
+from rendergraph.declare import LightFacts, Node, Texel, TextureInfo
 from rendergraph.errors import Place, Problem
+from rendergraph.textures import Sampler
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -39,7 +40,9 @@ class GraphNode:
         node: the instance, holding parameter values.
         inputs: connected inputs only, in the order of declaration; a `many` input has several endpoints.
         place: where it stands.
-        choices: parameters whose choices are includes, with the file of the one that is chosen.
+        choices: parameters whose value a plugin brings, with the include it comes by.
+        samplers: how each connected input is sampled.
+        clears: what each texture and buffer it makes first holds, None for whatever is there.
     """
 
     id: str
@@ -48,6 +51,8 @@ class GraphNode:
     inputs: Mapping[str, tuple[Endpoint, ...]]
     place: Place | None = None
     choices: Mapping[str, Path] = field(default_factory=dict)
+    samplers: Mapping[str, Sampler] = field(default_factory=dict)
+    clears: Mapping[str, Texel | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

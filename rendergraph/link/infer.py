@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, overload
+from typing import Any, get_args, overload
 
 from rendergraph import textures
 from rendergraph.declare import (
@@ -21,7 +21,9 @@ from rendergraph.declare import (
     Internal,
     LightFacts,
     Made,
+    Node,
     Port,
+    Texel,
     TextureInfo,
     Views,
 )
@@ -36,10 +38,12 @@ from rendergraph.textures import (
     Albedo,
     Depth,
     Emissive,
+    Filter,
     LinearDepth,
     Material,
     Normal,
     Radiance,
+    Sampler,
     Semantic,
     ShadowMap,
     TextureDesc,
@@ -111,6 +115,8 @@ class Infer:
         self.infos: dict[Endpoint, TextureInfo | None] = {}
         self._open: set[Endpoint] = set()
         self._facts: dict[str, Facts] = {}
+        self._answers: dict[tuple[str, int], Any] = {}
+        self._samplers: dict[Endpoint, Sampler] = {}
 
     def info(self, end: Endpoint) -> TextureInfo | None:
         """What a port has turned out to be, None where that cannot be said."""
@@ -135,16 +141,36 @@ class Infer:
             raise _Unknown
         return info
 
-    def filter_of(self, bound: Bound, port: Input) -> str:
-        """How an input is filtered; `nearest` where its rule fails, which is said."""
-        if not callable(port.filter):
-            return port.filter
+    def sampler(self, end: Endpoint) -> Sampler:
+        """How an input is sampled; `nearest` where the rule for its filter fails, which is said."""
+        if end not in self._samplers:
+            port = self.nodes[end.node].inputs[end.port]
+            assert isinstance(port, Input)
+            known = get_args(Filter)
+            smooth = self._checked(
+                end, "filter", port.filter, known.__contains__, f"one of {', '.join(known)}", "nearest"
+            )
+            self._samplers[end] = Sampler(smooth, port.wrap, port.compare, port.anisotropy)
+        return self._samplers[end]
+
+    def clear(self, end: Endpoint) -> Texel | None:
+        """What a texture or buffer first holds; None for whatever is there, and where its rule fails, which is said."""
+        port = self.nodes[end.node].ports[end.port]
+        assert isinstance(port, Made)
+        value: Texel | None = self._checked(end, "clear", port.clear, _is_texel, "a number, up to four, or None", None)
+        return value
+
+    def _checked(
+        self, end: Endpoint, what: str, rule: Any, fits: Callable[[Any], bool], wanted: str, otherwise: Any
+    ) -> Any:
         try:
-            return port.filter(bound.node)
-        except (Exception, SystemExit) as error:  # a stranger's function
-            text = f"the rule for its filter fails: {happened(error, bound.type.cls)}"
-            self._say(Endpoint(bound.spec.id, port.name), "RG209", text)
-            return "nearest"
+            value = self._ruled(end, what, rule)
+        except _Unknown:
+            return otherwise
+        if fits(value):
+            return value
+        self._say(end, "RG209", f"the rule for its {what} gives {value!r}, not {wanted}")
+        return otherwise
 
     def _say(self, end: Endpoint, code: str, text: str) -> None:
         bound = self.nodes[end.node]
@@ -163,7 +189,7 @@ class Infer:
             if not isinstance(count, int) or count < 0:
                 self._say(end, "RG209", f"the rule for its count gives {shown(count, 60)}, not a whole number from 0")
                 return None
-            return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port))
+            return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port), views=count)
         if isinstance(port, InOut) and bound.links.get(port.name):
             return self.info(bound.links[port.name][0].source)
         return self._made(end, bound, port) if isinstance(port, Made) else None
@@ -176,9 +202,15 @@ class Infer:
         return found
 
     def _ruled(self, end: Endpoint, what: str, rule: Any) -> Any:
-        """A constant, or what the author's function gives."""
-        if not isinstance(rule, Callable):  # type: ignore[arg-type]  # collections.abc's Callable is a class at run time
+        """A constant, or what the author's function gives; ports with one function get one answer."""
+        if not callable(rule):
             return rule
+        key = end.node, id(rule)
+        if key not in self._answers:
+            self._answers[key] = self._asked(end, what, rule)
+        return self._answers[key]
+
+    def _asked(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
         bound = self.nodes[end.node]
         try:
             return rule(bound.node, self._facts_of(bound))
@@ -322,6 +354,11 @@ class Infer:
         if source is not None:
             return source.view, source.lights
         return (CAMERA if port.kind == "view" else None), ()
+
+
+def _is_texel(value: object) -> bool:
+    numbers = value if isinstance(value, tuple) else () if value is None else (value,)
+    return len(numbers) <= 4 and all(isinstance(number, int | float) for number in numbers)
 
 
 def made_ports(bound: Bound) -> Iterator[Endpoint]:

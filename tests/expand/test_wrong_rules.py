@@ -25,17 +25,17 @@ RULES = {
     'more = Output(Radiance, mips=lambda node, facts: "all", doc="D.")': "RG208 'a.more' (wrong): a texture of 16×8 has 1 to 5 mips, not all",
     'more = Output(Radiance, samples=lambda node, facts: [4], doc="D.")': "RG208 'a.more' (wrong): a texture cannot have [4] samples a texel",
     'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 2.5, doc="D.")': "RG208 'a.more' (wrong): a buffer has at least 1 byte, not 2.5",
-    'color = Output(Radiance, clear=lambda node: node.dark, doc="D.")  # here': "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
+    'color = Output(Radiance, clear=lambda node, facts: node.dark, doc="D.")  # here': "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
     "attribute 'dark'; there is color",
-    'color = Output(Radiance, clear=lambda node: "black", doc="D.")': "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four, or None",
+    'color = Output(Radiance, clear=lambda node, facts: "black", doc="D.")': "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four, or None",
     'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")': "'a.more' (wrong): the rule for its lights gives 3, not the indices of lights",
     'more = Views(count=lambda node, facts: None, doc="D.")': "'a.more' (wrong): the rule for its count gives None, not a whole number from 0",
     'more = Views(count=lambda node, facts: facts.lamps, doc="D.")  # here': "'a.more' (wrong): the rule for its count fails: wrong.py:{line}: AttributeError: 'Facts' object has no "
     "attribute 'lamps'",
     'more = Views(lights=lambda node, facts: facts.lights[9], doc="D.")  # here': "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",
-    'last = Input(AnyTexel, filter=lambda node: node.smooth, optional=True, doc="D.")  # here': "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
+    'last = Input(AnyTexel, filter=lambda node, facts: node.smooth, optional=True, doc="D.")  # here': "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
     "attribute 'smooth'; there is color, last",
-    'last = Input(AnyTexel, filter=lambda node: "bicubic", optional=True, doc="D.")': "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
+    'last = Input(AnyTexel, filter=lambda node, facts: "bicubic", optional=True, doc="D.")': "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
     'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: ValueError: invalid literal for int() with base "
     "10: 'x'",
     'more = Output(Radiance, size=lambda node, facts: node.refuse(), doc="D.")\n'
