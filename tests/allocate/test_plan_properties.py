@@ -285,6 +285,7 @@ def test_what_is_allocated_is_near_the_least_of_all_orders(base: Expansion) -> N
     assert allocated <= 1.5 * least  # a local search: not always the least, never far
 
 
+@pytest.mark.slow
 @given(expansions(), st.randoms(use_true_random=False))
 @settings(max_examples=100, deadline=None)
 def test_results_do_not_depend_on_the_order_of_nodes_and_keys(base: Expansion, chooser: random.Random) -> None:
@@ -300,6 +301,7 @@ def test_results_do_not_depend_on_the_order_of_nodes_and_keys(base: Expansion, c
     assert allocate(schedule(other)) == allocate(schedule(base))
 
 
+@pytest.mark.slow
 @given(expansions(), st.integers(0, 1000))
 @settings(max_examples=100, deadline=None)
 def test_a_forgotten_reader_is_caught(base: Expansion, seed: int) -> None:
@@ -332,6 +334,7 @@ def test_shipped_pipelines_are_proven_and_valid(name: str) -> None:
         assert_valid(allocate(found, alias=alias))
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_hash_seed() -> None:
     program = """
 import random, sys

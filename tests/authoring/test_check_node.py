@@ -18,6 +18,8 @@ from rendergraph.cli.app import main
 from rendergraph.errors import InputError, RendergraphError
 from rendergraph.resources import folder
 
+pytestmark = pytest.mark.slow  # each check is a process of its own
+
 HEAD = "from rendergraph.api import Any, Frame, Input, Internal, Node, Output, Radiance, Steps, Views, define, param\n"
 GOOD = (
     HEAD
@@ -135,7 +137,6 @@ HOSTILE = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_import_is_one_message(check: Check, name: str) -> None:
     python, message = HOSTILE[name]
@@ -219,7 +220,6 @@ RUNNING = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING)
 def test_a_hostile_pass_is_one_message(check: Check, name: str) -> None:
     python, message = RUNNING[name]
@@ -264,7 +264,6 @@ SHADERS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SHADERS)
 def test_a_wrong_shader_is_one_message(check: Check, name: str) -> None:
     shader, message = SHADERS[name]

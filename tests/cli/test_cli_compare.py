@@ -147,6 +147,7 @@ def test_a_sweep_writes_its_chart_as_a_picture(cli: Any, tmp_path: Path) -> None
     assert (tmp_path / "out" / "quality.svg").read_text().startswith("<svg xmlns")
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any, tmp_path: Path) -> None:
     words = ["sweep", "forward", "-x", f"display.exposure={','.join(map(str, range(18)))}", *SMALL, "-n", "400"]
     process = subprocess.Popen(

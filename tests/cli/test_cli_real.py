@@ -25,7 +25,10 @@ def examples(cli: Any, *verb: str) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in text.splitlines() if line.strip().startswith("rendergraph ")]
 
 
-@pytest.mark.parametrize("verb", ["", *VERBS])
+LONG = ("sweep", "compare", "check-node")  # their examples take seconds
+
+
+@pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=pytest.mark.slow if v in LONG else ()) for v in VERBS)])
 def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> None:
     if verb == "config":
         assert cli("run", "forward", *SMALL).code == 0

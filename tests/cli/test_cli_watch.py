@@ -20,6 +20,8 @@ import pytest
 
 from rendergraph import images
 
+pytestmark = pytest.mark.slow  # each test is a process that draws
+
 DEADLINE = 60.0
 BASE = """
 rendergraph: 1

@@ -6,6 +6,8 @@ import copy
 import random
 from typing import Any
 
+import pytest
+
 import rendergraph as rg
 from rendergraph.compare.divergence import every_output, first_difference, passes, taps
 from rendergraph.compare.values import Difference
@@ -17,6 +19,7 @@ def found(session: rg.Session, a: rg.Pipeline, b: rg.Pipeline, frame: int = 1) -
     return first_difference(seen[0], seen[1], b.plan(), b.graph, diff(a.graph, b.graph))
 
 
+@pytest.mark.slow
 def test_a_mutated_node_is_the_first_that_differs(make: Any, gl: rg.Session) -> None:
     """Fifty mutations of one parameter of one node; a change that changes no texel cannot be found."""
     hits = 0

@@ -37,6 +37,7 @@ def base() -> rg.Pipeline:
     return rg.load("forward", size=(48, 27)).set("sun.resolution", 128)
 
 
+@pytest.mark.slow
 def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:
@@ -163,6 +164,7 @@ class Glow(Node):
 """
 
 
+@pytest.mark.slow
 def test_results_are_kept_only_as_long_as_what_they_were_drawn_from(gl: rg.Session, tmp_path: Path) -> None:
     files = {
         "plugin/glow.py": GLOW,
@@ -237,6 +239,7 @@ def test_a_torn_line_is_left_out_and_the_file_goes_on(tmp_path: Path) -> None:
     assert ledger.path.read_bytes().startswith(whole[:10])
 
 
+@pytest.mark.slow
 def test_batches_that_do_not_fit_are_split(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
     together = sweep(base, AXES[:2], tmp_path / "a", frames=1, session=gl)
     split = sweep(base, AXES[:2], tmp_path / "b", frames=1, most_bytes=1, session=gl)
