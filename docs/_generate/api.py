@@ -13,6 +13,7 @@ from typing import Any
 
 import rendergraph
 import rendergraph.api
+import rendergraph.api.viewing
 import rendergraph.errors
 from rendergraph.textures import Semantic, Signature
 
@@ -39,7 +40,7 @@ FIRST = (
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """One page for users and one for authors of nodes."""
+    """A page for users, and two for authors of nodes."""
     names = [("load", rendergraph), ("Pipeline", rendergraph), ("Session", rendergraph), ("Frame", rendergraph)]
     errors = ("RendergraphError", "InputError", "RenderError", "DeviceError", "UsageError", "Problem", "Place")
     names += [(name, rendergraph.errors) for name in errors]
@@ -65,6 +66,17 @@ def pages() -> Iterator[tuple[str, str]]:
             *(_entry(name, members[name]) for name in documented),
             "## Meanings of ports\n\n" + table(("name", "texels"), meanings),
             "## Constants\n\n" + table(("name", "value"), constants),
+        ),
+    )
+    views = rendergraph.api.viewing
+    functions = {name: value for name, value in vars(views).items() if inspect.isfunction(value) and name[0] != "_"}
+    yield (
+        "views.md",
+        page(
+            "Views",
+            "`from rendergraph.api import viewing`: what `update` makes views with.",
+            _doc(views),
+            *(_entry(name, value) for name, value in functions.items()),
         ),
     )
 

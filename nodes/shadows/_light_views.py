@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
@@ -12,14 +13,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api import SceneError, ViewMatrices
+from rendergraph.api import SceneError, ViewMatrices, viewing
 
 Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
 
 CUBE_FACES = 6
 _WIDEST = math.radians(80)  # half angle of a cone that one perspective view still covers with care
-_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))  # of `box_corners`
 _MARGIN = 8.0  # texels around what is seen, so that filter kernels at its edge read drawn texels
 
 
@@ -73,10 +73,7 @@ def light_views(table: Sequence[int], scene: Any, camera: ViewMatrices, resoluti
             made = [spot_view(light, box, resolution)]
         else:
             made = point_views(light, box, resolution)
-        views += [
-            ViewMatrices(view.view, view.projection, view.size, view.near, view.far, index)
-            for view, _ in zip(made, group, strict=True)
-        ]
+        views += [replace(view, light=index) for view, _ in zip(made, group, strict=True)]
     return views
 
 
@@ -91,10 +88,11 @@ def directional_view(
     Across the light it is as narrow as what the camera sees of the box and as what casts; what lies outside is lit.
     Along the light it holds the whole box, for what stands outside the picture may cast into it.
     """
-    rotation = facing(direction, _grain(direction, camera))
-    along = box_corners(box) @ rotation[2, :3]
+    rotation = viewing.view_along(direction, _grain(direction, camera))
+    corners = viewing.box_corners(box)
+    along = corners @ rotation[2, :3]
     low, high = np.full(2, -np.inf), np.full(2, np.inf)
-    for points in (visible_part(camera, box), casting, box_corners(box)):
+    for points in (viewing.visible_part(camera, box), casting, corners):
         if not len(points):
             continue
         across = points @ rotation[:2, :3].T
@@ -102,41 +100,20 @@ def directional_view(
         if np.any(lower > higher):  # nothing that casts is near what is seen
             break
         low, high = lower, higher
-    size = np.maximum(high - low, 1e-6 * max(1.0, float(np.abs(along).max())))
-    size = size * resolution / max(resolution - 2 * _MARGIN, 0.5 * resolution)
-    slack = 1e-3 * max(float(np.ptp(along)), float(size.max()), 1e-6)
-    near, far = -along.max() - slack, -along.min() + slack
-    view = rotation.copy()
-    view[:2, 3] = -(low + high) / 2
-    view[2, 3] = near  # the box begins at the near plane
-    projection = orthographic(size[0] / 2, size[1] / 2, 0.0, far - near)
-    return ViewMatrices(view, projection, (resolution, resolution), 0.0, far - near)
+    return viewing.orthographic_view(
+        rotation, np.append(low, along.min()), np.append(high, along.max()), resolution, _MARGIN
+    )
 
 
 def spot_view(light: Any, box: Points, resolution: int) -> ViewMatrices:
     """A perspective view that holds a spot light's cone."""
-    half = min(light.outer, _WIDEST)
-    wider = math.atan(math.tan(half) * resolution / max(resolution - 2 * _MARGIN, 0.5 * resolution))
-    near, far = reach(light, box)
-    position = np.asarray(light.position, np.float64)
-    view = facing(light.direction, _any_side(light.direction))
-    view[:3, 3] = -view[:3, :3] @ position
-    return ViewMatrices(view, perspective(wider, near, far), (resolution, resolution), near, far)
+    half_angle = min(light.outer, _WIDEST)
+    return viewing.cone_view(light.position, light.direction, half_angle, *reach(light, box), resolution, _MARGIN)
 
 
-def point_views(light: Any, box: Points, resolution: int) -> list[ViewMatrices]:
+def point_views(light: Any, box: Points, resolution: int) -> Sequence[ViewMatrices]:
     """Six perspective views around a point light, in the order of a cube map's faces; each a little wider than 90°."""
-    near, far = reach(light, box)
-    wider = math.atan(resolution / max(resolution - 2.0, 0.5 * resolution))
-    views = []
-    for axis in (0, 1, 2):
-        for sign in (1.0, -1.0):
-            direction = np.zeros(3)
-            direction[axis] = sign
-            view = facing(direction, _any_side(direction))
-            view[:3, 3] = -view[:3, :3] @ np.asarray(light.position, np.float64)
-            views.append(ViewMatrices(view, perspective(wider, near, far), (resolution, resolution), near, far))
-    return views
+    return viewing.cube_views(light.position, *reach(light, box), resolution, margin=1.0)
 
 
 def reach(light: Any, box: Points) -> tuple[float, float]:
@@ -150,48 +127,12 @@ def reach(light: Any, box: Points) -> tuple[float, float]:
     return min(near, far * 0.5), far
 
 
-# --- matrices --------------------------------------------------------------------------------------------------------
-
-
-def facing(direction: Sequence[float] | Matrix, side: Matrix) -> Matrix:
-    """A rotation to a view space that looks along `direction` with `side` towards +x."""
-    forward = np.asarray(direction, np.float64)
-    forward = forward / np.linalg.norm(forward)
-    x = side - forward * (side @ forward)
-    x /= np.linalg.norm(x)
-    view = np.eye(4)
-    view[:3, :3] = np.stack([x, np.cross(-forward, x), -forward])
-    return view
-
-
-def _any_side(direction: Sequence[float] | Matrix) -> Matrix:
-    side = np.zeros(3)
-    side[int(np.argmin(np.abs(np.asarray(direction))))] = 1.0
-    return side
-
-
 def _grain(direction: Sequence[float] | Matrix, camera: ViewMatrices) -> Matrix:
     """The side of the map along the camera's view, where the seen part is long and thin; steady where both agree."""
     forward = np.asarray(direction, np.float64) / np.linalg.norm(direction)
     looking = -camera.view[2, :3]
     flat = looking - forward * (looking @ forward)
-    return flat if np.linalg.norm(flat) > 0.1 else _any_side(direction)
-
-
-def orthographic(half_width: float, half_height: float, near: float, far: float) -> Matrix:
-    """A centred orthographic projection, z to -1…1."""
-    matrix = np.diag([1 / half_width, 1 / half_height, -2 / (far - near), 1.0])
-    matrix[2, 3] = -(far + near) / (far - near)
-    return matrix
-
-
-def perspective(half_angle: float, near: float, far: float) -> Matrix:
-    """A square perspective projection, z to -1…1."""
-    scale = 1 / math.tan(half_angle)
-    matrix = np.diag([scale, scale, (far + near) / (near - far), 0.0])
-    matrix[2, 3] = 2 * far * near / (near - far)
-    matrix[3, 2] = -1.0
-    return matrix
+    return flat if np.linalg.norm(flat) > 0.1 else viewing.any_side(direction)
 
 
 # --- what casts -------------------------------------------------------------------------------------------------------
@@ -225,7 +166,7 @@ def _caster_corners(scene: Any) -> tuple[Points, npt.NDArray[np.int64]]:
     placed = [entry for entry in scene.objects if entry.casts_shadow and not entry.hidden]
     if not placed:
         return np.empty((0, 8, 3)), np.empty(0, np.int64)
-    boxes = np.array([box_corners(np.asarray(mesh.box, np.float64)) for mesh in scene.meshes])
+    boxes = np.array([viewing.box_corners(mesh.box) for mesh in scene.meshes])
     local = boxes[[entry.mesh for entry in placed]]
     transforms = np.array([entry.transform for entry in placed])
     corners = np.einsum("nij,nkj->nki", transforms[:, :3, :3], local) + transforms[:, None, :3, 3]
@@ -240,80 +181,3 @@ def _spanning(corners: Points) -> list[int]:
     edges = [int(np.argmax(np.linalg.norm(corners - corners[0], axis=1)))]
     away = np.cross(corners - corners[0], corners[edges[0]] - corners[0])
     return [0, edges[0], int(np.argmax(np.linalg.norm(away, axis=1)))]
-
-
-# --- what is seen of a box -------------------------------------------------------------------------------------------
-
-
-def box_corners(box: Points) -> Points:
-    """The eight corners of a box given by its smallest and largest, shape (8, 3)."""
-    return np.array([[box[x, 0], box[y, 1], box[z, 2]] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-
-
-def visible_part(camera: ViewMatrices, box: Points) -> Points:
-    """Points of the part of a box that a camera sees, shape (n, 3); none where it sees nothing of it.
-
-    The box's faces cut by the frustum, and the frustum's edges cut by the box: together every corner of the
-    intersection, also for an infinite far plane.
-    """
-    planes = frustum_planes(camera)
-    corners = box_corners(box)
-    found = [polygon for face in _FACES if len(polygon := clip_polygon(corners[list(face)], planes))]
-    points = [*found, *_frustum_corners_inside(planes, box)]
-    return np.concatenate(points) if points else np.empty((0, 3))
-
-
-def frustum_planes(camera: ViewMatrices) -> Points:
-    """Planes (a, b, c, d) with a x + b y + c z + d >= 0 inside, shape (n, 4); the far one is left out if infinite."""
-    rows = camera.projection @ camera.view
-    planes = [rows[3] + sign * rows[axis] for axis in (0, 1, 2) for sign in (1.0, -1.0)]
-    lengths = [float(np.linalg.norm(plane[:3])) for plane in planes]
-    longest = max(lengths)
-    return np.array([plane / length for plane, length in zip(planes, lengths, strict=True) if length > 1e-9 * longest])
-
-
-def clip_polygon(polygon: Points, planes: Points) -> Points:
-    """The part of a convex polygon inside all planes (Sutherland and Hodgman 1974), shape (n, 3)."""
-    for plane in planes:
-        if not len(polygon):
-            break
-        distance = polygon @ plane[:3] + plane[3]
-        kept: list[Matrix] = []
-        for a, b, da, db in zip(polygon, np.roll(polygon, -1, axis=0), distance, np.roll(distance, -1), strict=True):
-            if da >= 0:
-                kept.append(a)
-            if (da >= 0) != (db >= 0):
-                kept.append(a + (b - a) * (da / (da - db)))
-        polygon = np.array(kept).reshape(-1, 3)
-    return polygon
-
-
-def _frustum_corners_inside(planes: Points, box: Points) -> list[Points]:
-    """Where the frustum's edges lie inside the box: their ends, cut to it."""
-    points: list[Points] = []
-    axes = np.eye(3)
-    sides = [np.append(axis, -axis @ box[0]) for axis in axes] + [np.append(-axis, axis @ box[1]) for axis in axes]
-    middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9
-    for i in range(len(planes)):
-        for j in range(i):
-            along = np.cross(planes[i, :3], planes[j, :3])
-            length = np.linalg.norm(along)
-            if length < 1e-9:
-                continue
-            along /= length
-            system = np.stack([planes[i, :3], planes[j, :3], along])
-            origin = np.linalg.solve(system, [-planes[i, 3], -planes[j, 3], along @ middle])
-            low, high = -span, span
-            others = [plane for k, plane in enumerate(planes) if k not in (i, j)]
-            for plane in (*others, *sides):
-                rate, start = float(plane[:3] @ along), float(plane[:3] @ origin + plane[3])
-                if abs(rate) < 1e-12:
-                    if start < -1e-9:
-                        low, high = 1.0, 0.0
-                elif rate > 0:
-                    low = max(low, -start / rate)
-                else:
-                    high = min(high, -start / rate)
-            if low <= high:
-                points.append(np.stack([origin + along * low, origin + along * high]))
-    return points

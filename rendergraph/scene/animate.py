@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from rendergraph.api.viewing import look_at, unit
 from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.scene import scene_build
-from rendergraph.scene.cameras import look_at
-from rendergraph.scene.geometry import rigid, unit, vec3
+from rendergraph.scene.geometry import rigid, vec3
 from rendergraph.scene.model import Camera, Light, Matrix, Scene, Vec3
 
 FRAMING_DIRECTION = (1.0, 0.6, 1.5)

@@ -8,19 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.api.viewing import unit
 from rendergraph.scene.model import Floats, Matrix, Mesh, Vec3
 
 Doubles = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.uint32]
-
-
-def unit(vectors: npt.ArrayLike) -> Doubles:
-    """Vectors along the last axis made unit length; those of length zero stay zero."""
-    values = np.asarray(vectors, np.float64)
-    peak = np.abs(values).max(axis=-1, keepdims=True, initial=0.0)
-    scaled = values / np.where(peak > 0, peak, 1.0)  # so that neither tiny nor huge vectors lose their square
-    length = np.sqrt((scaled * scaled).sum(axis=-1, keepdims=True))
-    return scaled / np.where(length > 0, length, 1.0)
 
 
 def face_normals(positions: npt.ArrayLike, triangles: npt.NDArray[np.integer]) -> Doubles:

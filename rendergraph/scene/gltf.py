@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rendergraph.api.viewing import unit
 from rendergraph.document import shown
 from rendergraph.scene.files import Names, Reading
-from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, unit, vec3
+from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, vec3
 from rendergraph.scene.gltf_buffers import Buffers, split_glb
 from rendergraph.scene.gltf_json import Part, parse
 from rendergraph.scene.gltf_materials import Materials

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.api.viewing import unit
 from rendergraph.scene.files import Names, Reading
-from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles, unit
+from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
 from rendergraph.scene.gltf_buffers import Accessor, Buffers
 from rendergraph.scene.gltf_json import Part
 from rendergraph.scene.model import Floats, Mesh

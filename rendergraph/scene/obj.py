@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.api.viewing import unit
 from rendergraph.document import shown
 from rendergraph.scene.files import Names, Reading, file_kind, named
-from rendergraph.scene.geometry import Doubles, face_normals, mean_normals, unit
+from rendergraph.scene.geometry import Doubles, face_normals, mean_normals
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
 from rendergraph.scene.mtl import read_mtl
 from rendergraph.scene.obj_block import ABSENT, Ints

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from rendergraph.scene.cameras import look_at
-from rendergraph.scene.geometry import euler_matrix, placement, unit, vec3
+from rendergraph.api.viewing import look_at, unit
+from rendergraph.scene.geometry import euler_matrix, placement, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
 
 _PLAIN = (

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.scene.geometry import translation, unit
+from rendergraph.api.viewing import unit
+from rendergraph.scene.geometry import translation
 from rendergraph.scene.keys import Key, positive, whole
 from rendergraph.scene.model import Matrix, Mesh
 from rendergraph.scene.polygons import clip_ears

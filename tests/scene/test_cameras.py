@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rendergraph.scene import cameras, pack
-from rendergraph.scene.cameras import look_at, projection, view_matrices
+from rendergraph.api import viewing
+from rendergraph.api.viewing import look_at
+from rendergraph.scene import pack
+from rendergraph.scene.cameras import projection, view_matrices
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Camera
 
@@ -30,7 +32,7 @@ def test_projections(vectors: dict[str, object]) -> None:
         camera = Camera("c", EYE, fov_y=case["yfov"], near=near, far=far)
         assert np.allclose(projection(camera, aspect), case["perspective"], rtol=1e-12, atol=1e-12)
         endless = Camera("c", EYE, fov_y=case["yfov"], near=near, far=math.inf)
-        assert case["eps"] == cameras.INFINITE_EPSILON
+        assert case["eps"] == viewing.INFINITE_EPSILON
         assert np.allclose(projection(endless, aspect), case["infinite_eps"], rtol=1e-12, atol=1e-12)
         assert np.allclose(projection(camera, aspect) @ case["point"], case["clip_perspective"], rtol=1e-12)
         if "orthographic" in case:
@@ -101,4 +103,4 @@ def test_eye_of_an_orthographic_view_points_at_the_viewer() -> None:
 
 def test_inverse_rigid_is_the_inverse() -> None:
     transform = translation((1, 2, 3)) @ look_at((3, 1, 2), (0, 1, 0))
-    assert np.allclose(cameras.inverse_rigid(transform) @ transform, np.eye(4), atol=1e-14)
+    assert np.allclose(viewing.inverse_rigid(transform) @ transform, np.eye(4), atol=1e-14)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rendergraph.scene.geometry import face_normals, unit
+from rendergraph.api.viewing import unit
+from rendergraph.scene.geometry import face_normals
 from rendergraph.scene.model import Mesh
 from rendergraph.scene.shapes import SHAPES, build, mesh
 

@@ -1,0 +1,305 @@
+"""Views: projections, frusta, what a view sees of a box, and views fitted around something.
+
+Conventions are the field's: right-handed, +Y up, a view looks down its own -Z; matrices act on column vectors and are
+float64 of shape (4, 4); clip space has z in -w…w. Angles are radians, distances metres, points world space of shape
+(n, 3), and a box is its least and its greatest corner, shape (2, 3).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.steps import ViewMatrices
+
+Matrix = npt.NDArray[np.float64]
+Points = npt.NDArray[np.float64]
+
+INFINITE_EPSILON = 2.4e-7
+"""How far an infinite far plane stays inside the clip volume: two steps of a float32 at 1."""
+
+_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))  # of `box_corners`
+
+
+# --- projections: view space to clip space ---------------------------------------------------------------------------
+
+
+def frustum(left: float, right: float, bottom: float, top: float, near: float, far: float) -> Matrix:
+    """A perspective projection by what it sees of the near plane; `far` may be infinite."""
+    if math.isinf(far):
+        z, w = INFINITE_EPSILON - 1, near * (INFINITE_EPSILON - 2)
+    else:
+        z, w = (far + near) / (near - far), 2 * far * near / (near - far)
+    return np.array(
+        [
+            [2 * near / (right - left), 0, (right + left) / (right - left), 0],
+            [0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0],
+            [0, 0, z, w],
+            [0, 0, -1, 0],
+        ],
+        np.float64,
+    )
+
+
+def perspective(fov_y: float, aspect: float, near: float, far: float) -> Matrix:
+    """A perspective projection by its whole vertical angle and its width over height; `far` may be infinite."""
+    matrix = frustum(-1, 1, -1, 1, near, far)
+    matrix[1, 1] = 1 / math.tan(fov_y / 2)
+    matrix[0, 0] = matrix[1, 1] / aspect
+    return matrix
+
+
+def orthographic(left: float, right: float, bottom: float, top: float, near: float, far: float) -> Matrix:
+    """A parallel projection; `near` may be 0 or behind the view."""
+    return np.array(
+        [
+            [2 / (right - left), 0, 0, -(right + left) / (right - left)],
+            [0, 2 / (top - bottom), 0, -(top + bottom) / (top - bottom)],
+            [0, 0, -2 / (far - near), -(far + near) / (far - near)],
+            [0, 0, 0, 1],
+        ],
+        np.float64,
+    )
+
+
+def widened(projection: Matrix, factor: float) -> Matrix:
+    """The projection of a view that reaches farther to all sides, what it saw in the middle `1 / factor` of it."""
+    return np.diag([1 / factor, 1 / factor, 1.0, 1.0]) @ projection
+
+
+def shifted(projection: Matrix, x: float, y: float) -> Matrix:
+    """The projection of a picture moved by x and y in clip space's units, 2 / size a texel: jitter."""
+    moved = np.eye(4)
+    moved[:2, 3] = x, y
+    return moved @ projection
+
+
+def guard_band(resolution: int, texels: float) -> float:
+    """How much wider a view becomes by a band of texels around it that are part of its own `resolution` a side.
+
+    At most twice as wide, where there are hardly more texels than the band's.
+    """
+    return resolution / max(resolution - 2 * texels, 0.5 * resolution)
+
+
+# --- views: world space to view space --------------------------------------------------------------------------------
+
+
+def unit(vectors: npt.ArrayLike) -> Points:
+    """Vectors along the last axis made unit length; those of length zero stay zero."""
+    values = np.asarray(vectors, np.float64)
+    peak = np.abs(values).max(axis=-1, keepdims=True, initial=0.0)
+    scaled = values / np.where(peak > 0, peak, 1.0)  # so that neither tiny nor huge vectors lose their square
+    length = np.sqrt((scaled * scaled).sum(axis=-1, keepdims=True))
+    return scaled / np.where(length > 0, length, 1.0)
+
+
+def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:
+    """View to world, a camera's transform: at `eye`, looking at `target`. `inverse_rigid` of it is the view matrix.
+
+    Where `up` is along the line of sight another axis takes its place, so a camera may look straight down.
+
+    Raises:
+        ValueError: eye and target coincide.
+    """
+    eye = np.asarray(eye, np.float64)
+    back = unit(eye - np.asarray(target, np.float64))
+    if not back.any():
+        raise ValueError("eye and target coincide")
+    for candidate in (unit(up), np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.0, 0.0])):
+        side = np.cross(candidate, back)
+        if np.linalg.norm(side) > 1e-9:
+            break
+    side = unit(side)
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = side, np.cross(back, side), back, eye
+    return matrix
+
+
+def inverse_rigid(transform: Matrix) -> Matrix:
+    """The inverse of a rotation with a translation, exact where `np.linalg.inv` rounds."""
+    rotation = transform[:3, :3].T
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, -rotation @ transform[:3, 3]
+    return matrix
+
+
+def view_along(
+    direction: npt.ArrayLike, side: npt.ArrayLike | None = None, eye: npt.ArrayLike = (0.0, 0.0, 0.0)
+) -> Matrix:
+    """World to view: from `eye` along a direction, with `side` towards +x, which is any one by default."""
+    forward = np.asarray(direction, np.float64)
+    forward = forward / np.linalg.norm(forward)
+    side = any_side(direction) if side is None else np.asarray(side, np.float64)
+    x = side - forward * (side @ forward)
+    x /= np.linalg.norm(x)
+    view = np.eye(4)
+    view[:3, :3] = np.stack([x, np.cross(-forward, x), -forward])
+    view[:3, 3] = -view[:3, :3] @ np.asarray(eye, np.float64)
+    return view
+
+
+def any_side(direction: npt.ArrayLike) -> Matrix:
+    """The axis of the world that lies most across a direction, shape (3,)."""
+    side = np.zeros(3)
+    side[int(np.argmin(np.abs(np.asarray(direction, np.float64))))] = 1.0
+    return side
+
+
+# --- views fitted around something -----------------------------------------------------------------------------------
+
+
+def orthographic_view(
+    rotation: Matrix, low: npt.ArrayLike, high: npt.ArrayLike, resolution: int, margin: float = 0.0
+) -> ViewMatrices:
+    """A parallel view around a box that is given in the axes of a rotation.
+
+    Args:
+        rotation: world to view without a place, as `view_along` gives it.
+        low, high: least and greatest of what it holds, shape (3,), after the rotation; the view looks from `high` to
+            `low` in z. Nothing of it lies at the near or the far plane.
+        resolution: texels along a side.
+        margin: texels around it.
+    """
+    low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
+    size = np.maximum(high[:2] - low[:2], 1e-6 * max(1.0, float(np.abs([low[2], high[2]]).max())))
+    size = size * guard_band(resolution, margin)
+    slack = 1e-3 * max(float(high[2] - low[2]), float(size.max()), 1e-6)
+    near, far = -high[2] - slack, -low[2] + slack
+    view = rotation.copy()
+    view[:2, 3] = -(low[:2] + high[:2]) / 2
+    view[2, 3] = near  # the box begins at the near plane
+    width, height = size / 2
+    projection = orthographic(-width, width, -height, height, 0.0, far - near)
+    return ViewMatrices(view, projection, (resolution, resolution), 0.0, float(far - near))
+
+
+def cone_view(
+    eye: npt.ArrayLike,
+    direction: npt.ArrayLike,
+    half_angle: float,
+    near: float,
+    far: float,
+    resolution: int,
+    margin: float = 0.0,
+) -> ViewMatrices:
+    """A square perspective view that holds a cone, with `margin` texels around it."""
+    wider = math.atan(math.tan(half_angle) * guard_band(resolution, margin))
+    projection = perspective(2 * wider, 1.0, near, far)
+    return ViewMatrices(view_along(direction, eye=eye), projection, (resolution, resolution), near, far)
+
+
+def cube_views(
+    eye: npt.ArrayLike, near: float, far: float, resolution: int, margin: float = 0.0
+) -> tuple[ViewMatrices, ...]:
+    """The six views around a point, in the order of a cube map's faces (+x, -x, +y, -y, +z, -z).
+
+    Each holds 90° and `margin` texels around that. The axes across a face are those of `view_along`, not a cube map's.
+    """
+    directions = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    return tuple(cone_view(eye, along, math.pi / 4, near, far, resolution, margin) for along in directions)
+
+
+# --- frusta ----------------------------------------------------------------------------------------------------------
+
+
+def frustum_planes(view: ViewMatrices) -> Points:
+    """Planes (a, b, c, d) with a x + b y + c z + d >= 0 inside, shape (n, 4); the far one is left out if infinite."""
+    rows = view.projection @ view.view
+    planes = np.array([rows[3] + sign * rows[axis] for axis in (0, 1, 2) for sign in (1.0, -1.0)])
+    planes = planes[:5] if math.isinf(view.far) else planes
+    return np.array([plane / float(np.linalg.norm(plane[:3])) for plane in planes])
+
+
+def frustum_corners(view: ViewMatrices, near: float | None = None, far: float | None = None) -> Points:
+    """The eight corners of a view's frustum, or of the part between two distances along its axis, shape (8, 3).
+
+    The four at `near` come first, each time left before right and bottom before top, x fastest.
+
+    Raises:
+        ValueError: the far plane is infinite, and `far` is not given.
+    """
+    near, far = view.near if near is None else near, view.far if far is None else far
+    if math.isinf(far):
+        raise ValueError("the view reaches to infinity; say how far the corners are")
+    inverse = np.linalg.inv(view.projection @ view.view)
+    corners = []
+    for distance in (near, far):
+        clip = view.projection @ np.array([0.0, 0.0, -distance, 1.0])
+        for y in (-1.0, 1.0):
+            for x in (-1.0, 1.0):
+                corner = inverse @ np.array([x * clip[3], y * clip[3], clip[2], clip[3]])
+                corners.append(corner[:3] / corner[3])
+    return np.array(corners)
+
+
+def box_corners(box: npt.ArrayLike) -> Points:
+    """The eight corners of a box, shape (8, 3), z fastest."""
+    box = np.asarray(box, np.float64)
+    return np.array([[box[x, 0], box[y, 1], box[z, 2]] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+
+
+def clip_polygon(polygon: Points, planes: Points) -> Points:
+    """The part of a convex polygon inside all planes (Sutherland and Hodgman 1974), shape (n, 3).
+
+    It may be empty; a corner in a plane may stand in it twice.
+    """
+    for plane in planes:
+        if not len(polygon):
+            break
+        distance = polygon @ plane[:3] + plane[3]
+        kept: list[Matrix] = []
+        for a, b, da, db in zip(polygon, np.roll(polygon, -1, axis=0), distance, np.roll(distance, -1), strict=True):
+            if da >= 0:
+                kept.append(a)
+            if (da >= 0) != (db >= 0):
+                kept.append(a + (b - a) * (da / (da - db)))
+        polygon = np.array(kept).reshape(-1, 3)
+    return polygon
+
+
+def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
+    """Points whose hull is the part of a box that a view sees, shape (n, 3); none where it sees nothing of it.
+
+    The box's faces cut by the frustum, and the frustum's edges cut by the box: together every corner of the
+    intersection, also for an infinite far plane.
+    """
+    box = np.asarray(box, np.float64)
+    planes = frustum_planes(view)
+    corners = box_corners(box)
+    found = [polygon for face in _FACES if len(polygon := clip_polygon(corners[list(face)], planes))]
+    points = [*found, *_frustum_edges_inside(planes, box)]
+    return np.concatenate(points) if points else np.empty((0, 3))
+
+
+def _frustum_edges_inside(planes: Points, box: Points) -> list[Points]:
+    """Where the frustum's edges lie inside the box: their ends, cut to it."""
+    points: list[Points] = []
+    axes = np.eye(3)
+    sides = [np.append(axis, -axis @ box[0]) for axis in axes] + [np.append(-axis, axis @ box[1]) for axis in axes]
+    middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9
+    for i in range(len(planes)):
+        for j in range(i):
+            along = np.cross(planes[i, :3], planes[j, :3])
+            length = np.linalg.norm(along)
+            if length < 1e-9:
+                continue
+            along /= length
+            system = np.stack([planes[i, :3], planes[j, :3], along])
+            origin = np.linalg.solve(system, [-planes[i, 3], -planes[j, 3], along @ middle])
+            low, high = -span, span
+            others = [plane for k, plane in enumerate(planes) if k not in (i, j)]
+            for plane in (*others, *sides):
+                rate, start = float(plane[:3] @ along), float(plane[:3] @ origin + plane[3])
+                if abs(rate) < 1e-12:
+                    if start < -1e-9:
+                        low, high = 1.0, 0.0
+                elif rate > 0:
+                    low = max(low, -start / rate)
+                else:
+                    high = min(high, -start / rate)
+            if low <= high:
+                points.append(np.stack([origin + along * low, origin + along * high]))
+    return points
