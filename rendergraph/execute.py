@@ -109,6 +109,8 @@ class FrameContext:
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline
+        if self.executable.plan.resources[name].role == "kept":
+            raise Misuse(f"it writes '{port.name}', which is kept, in each frame; take `kept=True` away", "RG433")
         array = np.ascontiguousarray(values)
         if array.dtype.kind not in "biuf":
             raise Misuse(f"write is given {type(values).__name__} of {array.dtype}, not an array of numbers", "RG433")
@@ -196,22 +198,25 @@ class Runner:
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
             for call in executable.binds[parity]:
                 call()
+        listed = executable.lists[parity]
         if not timed:
-            for step in executable.steps[parity]:
+            for step in listed:
                 for call in step.calls:
                     call()
+            executable.done()
             return None
         taken: list[tuple[str, float, Timer]] = []
         measured = executable.device.can_time
-        for step, timer in zip(executable.steps[parity], executable.timers, strict=True):
+        for step in listed:
             before = perf_counter()
             if measured:
-                timer.start()
+                step.timer.start()
             for call in step.calls:
                 call()
             if measured:
-                timer.stop()
-            taken.append((step.step.node, perf_counter() - before, timer))
+                step.timer.stop()
+            taken.append((step.step.node, perf_counter() - before, step.timer))
+        executable.done()
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
         steps = tuple(
@@ -256,6 +261,7 @@ class Runner:
         """
         error = self.executable.device.raw.error()
         if error:
+            self.executable.renew()
             raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
     def read(self, resource: str) -> npt.NDArray[Any]:

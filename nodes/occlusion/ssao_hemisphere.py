@@ -20,7 +20,7 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
     all of it. A blur that stays on its surface takes the noise away again.
     """
 
-    noise = Internal(format="rgba16_snorm", size=(64, 64))
+    noise = Internal(format="rgba16_snorm", size=(64, 64), kept=True)
     kernel = Internal(kind="buffer", bytes=lambda node, facts: 16 * (node.samples // 4))
     across = Internal(format="r16", size=reduced_size)
     blurred = Internal(format="r16", size=reduced_size)

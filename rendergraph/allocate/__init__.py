@@ -297,6 +297,8 @@ def _reasons(
         word = "texture" if isinstance(resource.desc, TextureDesc) else "buffer"
         if resource.role == "history":
             reasons[id] = f"the next frame reads it: two {word}s take turns and nothing shares them"
+        elif resource.role == "kept":
+            reasons[id] = f"it outlives the frame: its {word} is its own, and written when it is new or out of date"
         elif id in schedule.whole_frame:
             why = f"output '{outputs[id]}' is kept" if id in outputs else "it is filled before the first step"
             reasons[id] = f"{why}: its {word} is its own for the whole frame"

@@ -245,7 +245,7 @@ class Entries:
     def _output(self, name: str, entry: Mapping[str, Value]) -> None:
         back = {new: old for old, new in self._renamed.items()}
         found = self.declared.get(back.get(name, name))
-        options: dict[str, Any] = {key: entry[key].data for key in ("doc", "like", "first") if key in entry}
+        options: dict[str, Any] = {key: entry[key].data for key in ("doc", "like", "first", "kept") if key in entry}
         if found is None and not (_is_depth(entry) and self.file.suffix == ".frag"):
             outs = [other.name for other in self._outs if other.name not in self.header.names]
             example = f"out vec4 {name};" if self.file.suffix == ".frag" else f"uniform writeonly image2D {name};"

@@ -215,6 +215,7 @@ OUTPUT_KEYS: dict[str, Check] = {
     "samples": _count(16),
     "clear": _clear,
     "first": _number,
+    "kept": _flag,
     "bytes": _count(1 << 30),
 }
 PARAM_KEYS: dict[str, Check] = {

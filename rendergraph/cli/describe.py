@@ -107,6 +107,8 @@ def _made(name: str, port: Any) -> dict[str, Any]:
         found["clear"] = _constant(list(port.clear) if isinstance(port.clear, tuple) else port.clear)
     if getattr(port, "needs", ()):
         found["needs"] = list(port.needs)
+    if getattr(port, "kept", False):
+        found["kept"] = True
     return found
 
 
@@ -220,6 +222,7 @@ def output_facts(port: dict[str, Any]) -> list[str]:
     words += ["all mips" if port["mips"] == 0 else f"{port['mips']} mips"] if "mips" in port else []
     words += [f"{port[key]} {key}" for key in ("layers", "samples") if key in port]
     words += [f"cleared to {_number_words(port['clear'])}"] if "clear" in port else []
+    words += ["kept from frame to frame"] if port.get("kept") else []
     words += [f"needs {' and '.join(port['needs'])}"] if port.get("needs") else []
     words += [port["declaration"]] if port.get("declaration") else []
     return words

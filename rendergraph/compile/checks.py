@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, outputs_of
-from rendergraph.program import StageText, declared_at
-from rendergraph.steps import Read, Step, Write
+from rendergraph.program import Texts, declared_at, named_reads, unfit_sampler
+from rendergraph.steps import Read, Resource, Step, Write
 
 _FORMAT = re.compile(r"(?P<count>\d*)(?P<kind>[fiux])(?P<bytes>[1248]?)(?P<step>(?:/[vi])?)\Z")
-
-Texts = Callable[[], Mapping[str, StageText]]
-"""The program's texts, put together again where something has to be said."""
 
 
 def check_uniforms(
@@ -54,6 +51,22 @@ def check_uniforms(
             problems.append(_placed(step.problem("RG430", text), name, texts))
         elif not uniform.opaque and (wrong := misfit(uniform, uniforms[name])) is not None:
             problems.append(_placed(step.problem("RG436", f"{files} {wrong}"), name, texts))
+    if problems:
+        raise InputError(problems)
+
+
+def check_samplers(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> None:
+    """A sampler of another kind than its texture reads black, silently.
+
+    Raises:
+        InputError: there is such a sampler (RG447).
+    """
+    problems = []
+    for name, read in named_reads(step):
+        uniform = program.uniforms.get(name)
+        if read.use == "sample" and uniform is not None:
+            problem = unfit_sampler(step, uniform.glsl, read, resources)
+            problems += [_placed(problem, name, texts)] if problem is not None else []
     if problems:
         raise InputError(problems)
 

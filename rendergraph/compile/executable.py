@@ -6,7 +6,7 @@ written by each draw. A changed parameter assembles the lists anew: no GL object
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
 from rendergraph.program import prefix
+from rendergraph.schedule.dependencies import StepKey, touched_ids
 from rendergraph.steps import Step
 
 if TYPE_CHECKING:
@@ -84,7 +85,6 @@ class CompiledStep:
         draws: in order.
         sorted: draws whose order is the eye's, instead of `draws`.
         after: barriers, poison.
-        calls: all of it, flat; filled by `Executable.assemble`.
     """
 
     step: Step
@@ -92,12 +92,23 @@ class CompiledStep:
     draws: list[Draw] = field(default_factory=list)
     sorted: SortedDraws | None = None
     after: list[Call] = field(default_factory=list)
-    calls: tuple[Call, ...] = ()
 
     @property
     def all_draws(self) -> list[Draw]:
         """All draws, however they are ordered."""
         return self.draws + (self.sorted.parts if self.sorted is not None else [])
+
+
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """A step as a frame runs it: all its calls, flat, and what measures it.
+
+    What is set before a draw depends on the steps before it, so the calls of another list may differ.
+    """
+
+    step: Step
+    calls: tuple[Call, ...]
+    timer: Timer
 
 
 @dataclass(eq=False)
@@ -110,6 +121,8 @@ class Executable:
         views: its view tables on the GPU.
         binds: the calls that bind textures, samplers and blocks, a list a parity.
         steps: compiled steps, a list a parity.
+        lists: what the next frame runs, a list a parity; filled by `assemble`.
+        due: kept steps that the next frame runs.
         statics: uniform writes that hold for the whole frame.
         sorters: called with the view tables when a view has changed: objects front to back.
         timers: one a step.
@@ -124,12 +137,32 @@ class Executable:
     views: ViewBuffers
     binds: list[list[Call]]
     steps: list[list[CompiledStep]]
+    lists: list[list[Listed]] = field(default_factory=list)
+    due: set[StepKey] = field(default_factory=set)
     statics: list[Call] = field(default_factory=list)
     sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
     vertex_arrays: Call = bool
     fresh: bool = True
+    _steady: list[list[Listed]] = field(default_factory=list)
+
+    @cached_property
+    def kept(self) -> dict[StepKey, Step]:
+        """The steps that make what outlives the frame."""
+        resources = self.plan.resources
+        steps = self.plan.schedule.steps
+        return {s.key: s for s in steps if any(resources[write.resource].role == "kept" for write in s.writes)}
+
+    def renew(self) -> None:
+        """Let the next frame make all that is kept: nothing has, or what did failed."""
+        self.due = set(self.kept)
+        self.assemble()
+
+    def done(self) -> None:
+        """The kept steps that were due have run: go on without them."""
+        if self.due:
+            self.due, self.lists = set(), self._steady
 
     @cached_property
     def reads_frame(self) -> bool:
@@ -138,7 +171,7 @@ class Executable:
         return any("frame_block" in draw.program.blocks for draw in draws)
 
     def assemble(self) -> None:
-        """Fill every step's flat list from its draws, leaving out what changes nothing."""
+        """Make the flat lists of calls from the steps' draws, leaving out what changes nothing."""
         shared = _differing(draw for step in self.steps[0] for draw in step.all_draws)
         self.statics = []
         written: set[tuple[int, str]] = set()
@@ -155,9 +188,12 @@ class Executable:
                     (own if key in shared else self.statics).append(write)
             return own
 
-        for steps in self.steps:
+        def listed(steps: Iterable[CompiledStep], due: Container[StepKey]) -> list[Listed]:
             state: Pieces | None = None
-            for compiled in steps:
+            found: list[Listed] = []
+            for compiled, timer in zip(steps, self.timers, strict=True):
+                if compiled.step.key in self.kept and compiled.step.key not in due:
+                    continue
                 calls: list[Call] = list(compiled.before)
                 for draw in compiled.draws:
                     calls += draw.binds
@@ -171,18 +207,44 @@ class Executable:
                     ]
                     calls.append(compiled.sorted)
                     state = None
-                compiled.calls = (*calls, *compiled.after)
+                found.append(Listed(compiled.step, (*calls, *compiled.after), timer))
+            return found
+
+        self.lists = [listed(steps, self.due) for steps in self.steps]
+        self._steady = [listed(steps, ()) for steps in self.steps] if self.due else self.lists
         self.fresh = True
 
     def set_uniforms(self, steps: Iterable[Step]) -> None:
         """Take over changed parameter values; the steps must be the same but for their uniforms."""
-        values: Mapping[tuple[str, int], Step] = {step.key: step for step in steps}
+        values: Mapping[StepKey, Step] = {step.key: step for step in steps}
+        changed = {key for key, step in self.kept.items() if step_uniforms(step) != step_uniforms(values[key])}
+        self.due = self._with_dependents(self.due | changed)
         for compiled in (c for steps_of in self.steps for c in steps_of):
             step = values[compiled.step.key]
             compiled.step = step
+            if step.key in self.kept:
+                self.kept[step.key] = step
             for draw in compiled.all_draws:
                 draw.uniforms.update(step_uniforms(step))
         self.assemble()
+
+    def _with_dependents(self, due: set[StepKey]) -> set[StepKey]:
+        """The steps that have to run again where these do.
+
+        Those are all that make one of their textures, as what each of them found there is gone, all that read one, and
+        whoever makes what they read in a state before the last.
+        """
+        final: dict[str, int] = {}
+        for step in self.kept.values():
+            final |= {write.resource: max(write.version, final.get(write.resource, 0)) for write in step.writes}
+        while True:
+            steps = [self.kept[key] for key in due]
+            again = {write.resource for step in steps for write in step.writes}
+            again |= {read.resource for step in steps for read in step.all_reads if read.version < final[read.resource]}
+            more = {key for key, step in self.kept.items() if not again.isdisjoint(touched_ids(step))}
+            if more <= due:
+                return due
+            due = due | more
 
     def release(self) -> None:
         """Free what it owns; programs and scenes are the session's."""

@@ -42,10 +42,7 @@ class ProgramCache:
         Raises:
             InputError: the driver refused a shader, its macros grow too far, or a file is missing.
         """
-        try:
-            texts = stage_texts(step, types, resources, views, defines=defines)
-        except InputError as error:  # a file that is not there stands nowhere but in the call that names it
-            raise InputError([p if p.place else step.problem(p.code, p.text) for p in error.problems]) from error
+        texts = stage_texts(step, types, resources, views, defines=defines)
         sources = {stage: text.text for stage, text in texts.items()}
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:

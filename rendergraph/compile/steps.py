@@ -12,11 +12,11 @@ import moderngl
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
 from rendergraph.compile.checks import (
-    Texts,
     attribute_formats,
     check_attributes,
     check_blocks,
     check_outputs,
+    check_samplers,
     check_uniforms,
     layout_for,
 )
@@ -36,7 +36,7 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
-from rendergraph.program import prefix, stage_texts
+from rendergraph.program import Texts, check_kept_text, prefix, stage_texts
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -121,7 +121,7 @@ class _Compiler:
         made.buffers = list(self.geometry.buffers)
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
-        made.assemble()
+        made.renew()
         return made
 
     # One step -------------------------------------------------------------------------------------------------------
@@ -276,7 +276,9 @@ class _Compiler:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
         texts = self._texts(step, macros)
+        check_kept_text(step, texts, self.types[step.node].cls, self.plan.resources)
         check_uniforms(step, program, uniforms, {*sampled, *materials}, texts)
+        check_samplers(step, program, self.plan.resources, texts)
         check_blocks(step, program, blocks, texts)
         check_outputs(step, program, outputs)
         check_stored(step, program, named, self.plan.resources, texts)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rendergraph.compile.checks import Texts
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.gl.programs import Program
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.source import SourceText
+from rendergraph.program import Texts
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc
 

@@ -7,7 +7,7 @@ from math import inf
 from typing import Any, get_args
 
 from rendergraph.declare.node import Node
-from rendergraph.declare.ports import Function, History, InOut, Input, Internal, Made, Part, Port, Views
+from rendergraph.declare.ports import Function, History, InOut, Input, Internal, Made, Output, Part, Port, Views
 from rendergraph.errors import Mistake, suggestion
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, Filter, Kind, Semantic, Signature, Wrap
 
@@ -98,6 +98,8 @@ def _made(name: str, port: Made, ports: dict[str, Port]) -> Iterator[str]:
         yield f"port '{name}' has bytes={port.bytes!r}, but is no buffer; say kind='buffer'"
     if isinstance(port, InOut):
         yield from _switches(name, port, "optional")
+    if isinstance(port, Output | Internal):
+        yield from _switches(name, port, "kept")
     if port.first is not None and (isinstance(port.first, bool) or not isinstance(port.first, int | float)):
         yield f"port '{name}' has first={port.first!r}; it is a number, for every channel"
 

@@ -163,9 +163,12 @@ class Output(Made):
 
     Attributes:
         needs: inputs that must be connected for this output to be used.
+        kept: it outlives the frame: the steps that make it run when they are new or a value they take has changed, and
+            then not again. They depend on nothing that moves, and on no texture or buffer that is not kept.
     """
 
     needs: tuple[str, ...] = ()
+    kept: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +184,13 @@ class InOut(Made):
 
 @dataclass(frozen=True, eq=False)
 class Internal(Made):
-    """A scratch texture or buffer of the node's own, aliased like any other."""
+    """A scratch texture or buffer of the node's own, aliased like any other.
+
+    Attributes:
+        kept: it outlives the frame, as an `Output` that is kept does: a table, noise.
+    """
+
+    kept: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ def _keep(numbering: Numbering, name: str, end: Endpoint, resource: str, version
 
 
 def mark_roles(numbering: Numbering, wanted: dict[str, str]) -> None:
-    """Outputs and what the next frame reads are never shared."""
+    """Outputs and what outlives the frame are never shared."""
     resources, graph = numbering.resources, numbering.graph
     previous = {read.resource for step in numbering.steps for read in step.all_reads if read.previous}
     for end in graph.textures:
@@ -58,5 +58,6 @@ def mark_roles(numbering: Numbering, wanted: dict[str, str]) -> None:
             resources[str(end)] = Resource(str(end), info.desc, "history", first, info.view, info.lights)
     for name in set(wanted.values()) | previous:
         resource = resources[name]
-        role: Role = "history" if name in previous or resource.role == "history" else "output"
+        role: Role = "history" if name in previous else "output"
+        role = resource.role if resource.role in ("history", "kept") else role
         resources[name] = replace(resource, role=role, first=numbering.firsts.get(name, resource.first))

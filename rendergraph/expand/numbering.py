@@ -10,9 +10,10 @@ from typing import Any
 from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
 from rendergraph.errors import InputError
 from rendergraph.expand.ending import mark_roles, wanted_resources
+from rendergraph.expand.keeping import check_kept
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import Recorder, now
+from rendergraph.expand.recording import Recorder, is_kept, now
 from rendergraph.expand.targets import feedback, misfit, no_image, onto_nothing, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Use, Write
@@ -51,6 +52,7 @@ class Numbering:
             self._node(recorder)
         wanted = wanted_resources(self)
         mark_roles(self, wanted)
+        check_kept(self.steps, self.resources)
         return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
 
     def _node(self, recorder: Recorder) -> None:
@@ -83,7 +85,9 @@ class Numbering:
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
             role: Role = "transient"
-            if isinstance(port, Internal | History):
+            if is_kept(port):
+                role = "kept"
+            elif isinstance(port, Internal | History):
                 role = "internal" if isinstance(port, Internal) else "history"
             resource = Resource(str(end), desc, role, port.first or 0.0, info.view, info.lights)
             self.resources[resource.id] = resource

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from rendergraph.declare import Facts, Function, InOut, Input, Part, Port
+from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port
 from rendergraph.declare.blame import happened
 from rendergraph.errors import InputError, Misuse, Problem, node_named
 from rendergraph.expand.model import is_empty
@@ -78,12 +78,14 @@ class Recorder:
         return isinstance(port, InOut) and bool(self.links.get(port.name))
 
     def reads_of(self, request: Request) -> Iterator[tuple[str, Port | Part]]:
-        """Names and ports a request reads, with the default inputs filled in."""
+        """Names and ports a request reads, with the default inputs filled in; of what is kept, inputs that are too."""
         if not request.default_inputs:
             yield from request.bindings.items()
             return
+        lasting = any(is_kept(part.port) for _, part in request.out)
         for name, port in self.node.node.inputs().items():
-            if isinstance(port, Input) and self.links.get(name):
+            ends = self.links.get(name, ()) if isinstance(port, Input) else ()
+            if ends and (not lasting or all(is_kept(self.graph[e.node].node.ports()[e.port]) for e in ends)):
                 yield name, port
 
     def demands(self) -> Iterator[Endpoint]:
@@ -105,6 +107,11 @@ class Recorder:
                 names.update(used.read_names)
         for name in names:
             yield from self.links.get(name, ())
+
+
+def is_kept(port: Port) -> bool:
+    """Whether what a port makes outlives the frame."""
+    return isinstance(port, Output | Internal) and port.kept
 
 
 def now(end: Endpoint) -> Endpoint:

@@ -85,7 +85,7 @@ def calls(text: str, function: str) -> bool:
     """Whether a text without comments calls a function it does not declare itself."""
     if re.search(rf"(?<![\w.]){re.escape(function)}\s*\(", text) is None:
         return False
-    return all(_function(head(one).rest) != function for one, _ in statements(tokens(without_directives(text))))
+    return all(function_of(head(one).rest) != function for one, _ in statements(tokens(without_directives(text))))
 
 
 def mentions(text: str, name: str) -> bool:
@@ -201,7 +201,7 @@ def _split_at_commas(words: Sequence[str]) -> list[list[str]]:
     return parts
 
 
-def _function(rest: Sequence[str]) -> str:
+def function_of(rest: Sequence[str]) -> str:
     """The function that a statement declares or defines; empty where it is something else."""
     names = rest[closing(rest, 1) + 1 :] if rest[1:2] == ["["] else rest[1:]
     return names[0] if names[1:2] == ["("] and _WORD.match(names[0]) else ""
@@ -211,7 +211,7 @@ def _declared_by(rest: Sequence[str], body: Sequence[str] | None) -> Iterator[st
     """The names that a statement declares, from its type on."""
     if not rest or rest[0] == "precision":
         return
-    if function := _function(rest):
+    if function := function_of(rest):
         yield function
     elif body is None or "}" not in rest:
         yield from (name for name, _, _ in declarators(rest[1:]))

@@ -51,6 +51,9 @@ class Checker:
             what = "continues a texture of this frame" if isinstance(port, InOut) else f"takes a {given}"
             text = f"'{bound.spec.id}.{port.name}' {what}, which has no last frame's value; leave '@previous' out"
             self.problems.append(link.value.problem("RG127", text))
+        elif link.source.previous and getattr(source, "kept", False):
+            text = f"'{link.source}' means last frame's value, but it is kept: one value in all frames"
+            self.problems.append(link.value.problem("RG127", f"{text}; leave '@previous' out"))
         elif given != taken:
             self._say(bound, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port))
         elif isinstance(port.semantic, Signature):

@@ -87,6 +87,16 @@ def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = Tr
     return None
 
 
+def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] | None:
+    """The first line of an author's file that has one of some names in it, and where."""
+    pattern = re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b")
+    for line, origin in zip(source.lines, source.origins, strict=True):
+        match = None if origin.shared else pattern.search(line)
+        if match is not None and (place := origin.place(match.start() + 1)):
+            return place, line
+    return None
+
+
 def _located(rows: Sequence[str], text: StageText, code: str, what: str) -> list[Problem]:
     """The messages that name a line; warnings only where there is no error."""
     found: list[Problem] = []

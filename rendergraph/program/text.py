@@ -99,7 +99,11 @@ def stage_texts(
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
         if stage in shaders:
-            texts[stage] = _stage(stage, shaders[stage], step, types, resources, views, macros, wanted, include_folder)
+            args = (step, types, resources, views, macros, wanted, include_folder)
+            try:
+                texts[stage] = _stage(stage, shaders[stage], *args)
+            except InputError as error:  # a file that is not there stands nowhere but in the call that names it
+                raise InputError([p if p.place else step.problem(p.code, p.text) for p in error.problems]) from error
     return texts
 
 

@@ -47,8 +47,8 @@ class Schedule:
         lower_bound_bytes: the least peak over all legal orders that was found.
         proven: no legal order has a lower peak.
         reasons: step key to why it stands where it stands.
-        whole_frame: ids of the resources that keep their memory for the whole frame: outputs, history, and buffers that
-            the CPU fills before the first step.
+        whole_frame: ids of the resources that keep their memory for the whole frame: outputs, history, kept values,
+            and buffers that the CPU fills before the first step.
         waits: step key to the steps it waits for, with the resource that is the reason and `reads`, `continues` or
             `overwrites`; empty where the schedule was made by hand.
     """

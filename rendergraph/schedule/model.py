@@ -49,7 +49,8 @@ class Model:
         classes: number of the storage class of each resource; equal ones can share a texture.
         toucher_count: how many steps touch each resource.
         names: id of each resource.
-        constant: bytes alive during the whole frame: outputs, history, buffers filled before the first step.
+        constant: bytes alive during the whole frame: outputs, history, kept values, buffers that `update`
+            fills.
     """
 
     steps: tuple[Step, ...]
@@ -222,12 +223,12 @@ def storage_class(resource: Resource) -> object:
 
 
 def alive_all_frame(resources: Mapping[str, Resource], wanted: Mapping[str, str], versions: Versions) -> set[str]:
-    """Ids of the resources that keep their memory for the whole frame: outputs, history, buffers `update` fills."""
+    """Ids of the resources that keep their memory for the whole frame: outputs, history, kept, what `update` fills."""
     shown = set(wanted.values())
     return {
         id
         for id, resource in resources.items()
-        if id in shown or resource.role in ("output", "history") or is_filled_by_update(id, resource, versions)
+        if id in shown or resource.role in ("output", "history", "kept") or is_filled_by_update(id, resource, versions)
     }
 
 

@@ -308,7 +308,11 @@ class Pipeline:
         Raises:
             InputError: with all mistakes found.
         """
-        self.plan(outputs, taps)
+        from rendergraph.program import check_texts
+
+        plan = self.plan(outputs, taps)
+        types = {node.id: node.type for node in self.graph.nodes}
+        check_texts(plan.schedule.steps, types, plan.resources, self.expansion(outputs, taps).views)
         return self.graph
 
     # Drawing ---------------------------------------------------------------------------------------------------------

@@ -175,7 +175,7 @@ class Step:
         return self.reads + tuple(read for function in self.functions for read in function.reads)
 
 
-Role = Literal["transient", "internal", "output", "history"]
+Role = Literal["transient", "internal", "output", "history", "kept"]
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,8 @@ class Resource:
     Attributes:
         id: `node.port` of whoever made it first; an `InOut` continues the id.
         desc: what it is allocated from.
-        role: `transient` and `internal` may be aliased; `output` and `history` live the whole frame.
+        role: `transient` and `internal` may be aliased; `output`, `history` and `kept` live the whole frame,
+            the last two from frame to frame.
         first: every channel's value before the first frame, for history.
         view: id of the view table it is drawn with.
         lights: the scene's light index of each layer.

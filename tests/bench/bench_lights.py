@@ -76,7 +76,7 @@ def shaded(session: Any, executable: Any) -> list[tuple[Any, int]]:
     """Fragments that each lighting step lets through; call after a frame, whose state it repeats."""
     raw, found = session.device.raw, []
     with session.device.current():
-        for compiled in executable.steps[0]:
+        for compiled in executable.lists[0]:
             query = raw.make("glCreateQueries", _SAMPLES_PASSED)
             raw.glBeginQuery(_SAMPLES_PASSED, query)
             for call in compiled.calls:

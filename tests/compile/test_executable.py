@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import Any, cast
 
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws
@@ -37,7 +38,8 @@ def step(number: int, *draws: Draw, **more: Any) -> CompiledStep:
 
 def executable(*steps: CompiledStep) -> Executable:
     nothing = cast(Any, None)
-    made = Executable(nothing, nothing, nothing, nothing, binds=[[]], steps=[list(steps)])
+    plan = cast(Any, SimpleNamespace(resources={}, schedule=SimpleNamespace(steps=[one.step for one in steps])))
+    made = Executable(nothing, plan, nothing, nothing, binds=[[]], steps=[list(steps)], timers=[nothing] * len(steps))
     made.assemble()
     return made
 
@@ -45,8 +47,8 @@ def executable(*steps: CompiledStep) -> Executable:
 def run(made: Executable) -> list[str]:
     """What one frame calls."""
     LOG.clear()
-    for compiled in made.steps[0]:
-        for call in compiled.calls:
+    for listed in made.lists[0]:
+        for call in listed.calls:
             call()
     return LOG.copy()
 

@@ -292,7 +292,7 @@ def test_ten_objects_and_a_thousand_take_the_same_calls(bench: Any) -> None:
     for count in (10, 1000):
         frame = bench.session.render(bench.pipeline(TEXT, Ids, shaders=SHADERS, scene=_grid(count), size=(64, 64)))
         executable = bench.session.active
-        calls.append([len(step.calls) for step in executable.steps[0]])
+        calls.append([len(step.calls) for step in executable.lists[0]])
         assert len(np.unique(frame["image"])) > 10
     assert calls[0] == calls[1]
 

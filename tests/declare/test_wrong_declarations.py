@@ -37,6 +37,7 @@ DECLARATIONS = {
     'more = Input(Radiance, samples=4, doc="D.")  # here': "port 'more' has samples 4; there is any, multi, single",
     'more = Input(Radiance, use="load", doc="D.")  # here': "port 'more' has use 'load'; there is depth_test, image, sample",
     'more = Input(Radiance, anisotropy=0, doc="D.")  # here': "port 'more' has anisotropy=0; it is a whole number from 1, or a function of node and facts",
+    'more = Output(Radiance, kept=2, doc="D.")  # here': "port 'more' has kept=2; it is True or False",
     'more = Input(Radiance, optional="yes", doc="D.")  # here': "port 'more' has optional='yes'; it is True or False",
     'more = Output(Radiance, format="rgb16f", doc="D.")  # here': "port 'more' has an unknown format 'rgb16f'; did you mean 'rgba16f'?",
     'more = Output(Radiance, format=16, doc="D.")  # here': "port 'more' has format=16; it is the name of one, such as 'rgba16f'",

@@ -129,6 +129,17 @@ class Adds(Node):
         steps.fullscreen("a.frag", out=self.color, state=State(blend=ADD))
 
 
+class Keeps(Node):
+    """Keeps what comes from what it does not keep."""
+
+    scratch = Internal(Radiance)
+    color = Output(Radiance, kept=True, doc="Table.")
+
+    def record(self, steps: Steps) -> None:
+        steps.clear(self.scratch)
+        steps.fullscreen("a.frag", source=self.scratch, out=self.color)
+
+
 class Early(Node):
     """Reads before it writes."""
 
@@ -163,6 +174,7 @@ class Unfilled(Node):
         ("RG426", Stores),
         ("RG429", Adds),
         ("RG433", Viewless),
+        ("RG439", Keeps),
         ("RG601", Early),
         ("RG603", Unfilled),
     ],

@@ -93,7 +93,7 @@ def fragments(session: rg.Session, pipeline: rg.Pipeline) -> list[int]:
     with session.device.ctx:
         runner = session.prepare(pipeline)
         runner.run(1, 0.0, 0.0, pipeline.scene, camera)
-        for step in runner.executable.steps[0]:
+        for step in runner.executable.lists[0]:
             query = raw.make("glCreateQueries", _SAMPLES_PASSED)
             raw.glBeginQuery(_SAMPLES_PASSED, query)
             for call in step.calls:

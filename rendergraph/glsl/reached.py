@@ -1,0 +1,77 @@
+"""The names that a shader's `main` comes to, through the functions, macros and values it uses. No GL."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from rendergraph.glsl.names import declarators, function_of, head, statements, tokens
+
+_DIRECTIVE = re.compile(r"\s*#\s*([a-z]+)\s*(.*)")
+_DEFINE = re.compile(r"([A-Za-z_]\w*)(?:\(([^()]*)\))?(.*)")
+_DEFINED = re.compile(r"(!?)\s*defined\s*\(?\s*(\w+)\s*\)?\s*\Z")
+
+
+def reached(text: str) -> set[str]:
+    """The names that stand in `main` of a text without comments and in what it uses; members after a dot do not count.
+
+    Branches of `#ifdef` are followed as the text's own macros say; of other conditions every branch counts.
+    """
+    uses: dict[str, set[str]] = {}
+    lines = list(_taken(text, uses))
+    for statement, body in statements(tokens("\n".join(lines))):
+        begin = head(statement)
+        name = function_of(begin.rest)
+        if name and body is not None:
+            uses.setdefault(name, set()).update(_names([*statement, *body]))
+        elif body is None and begin.rest:
+            for one, _, value in declarators(begin.rest[1:]):
+                uses.setdefault(str(one), set()).update(_names(value))
+    found: set[str] = set()
+    waiting = ["main"]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += uses.get(name, ())
+    return found
+
+
+def _taken(text: str, uses: dict[str, set[str]]) -> Iterator[str]:
+    """The lines that are compiled, directives left out; what macros use goes to `uses`."""
+    macros: set[str] = set()
+    branches: list[tuple[bool, bool | None, bool]] = []  # around is taken; so is this one, None: perhaps; one was
+    for line in text.replace("\\\n", " ").split("\n"):
+        directive = _DIRECTIVE.match(line)
+        taken = not branches or (branches[-1][0] and branches[-1][1] is not False)
+        if directive is None:
+            if taken:
+                yield line
+            continue
+        word, rest = directive[1], directive[2].strip()
+        if word in ("if", "ifdef", "ifndef"):
+            holds = _condition(word, rest, macros)
+            branches.append((taken, holds, holds is True))
+        elif word in ("elif", "else") and branches:
+            around, holds, done = branches[-1]
+            branches[-1] = around, False if done else None if holds is None or word == "elif" else True, done
+        elif word == "endif" and branches:
+            branches.pop()
+        elif taken and word == "define" and (found := _DEFINE.match(rest)):
+            macros.add(found[1])
+            uses.setdefault(found[1], set()).update(_names(tokens(found[3])))
+        elif taken and word == "undef":
+            macros.discard(rest)
+
+
+def _condition(word: str, rest: str, macros: set[str]) -> bool | None:
+    if rest.startswith(("GL_", "__")):
+        return None  # the driver's
+    if word != "if":
+        return (rest in macros) == (word == "ifdef")
+    asked = _DEFINED.match(rest)
+    return None if asked is None else (asked[2] in macros) != bool(asked[1])
+
+
+def _names(words: Sequence[str]) -> set[str]:
+    return {word for before, word in zip(["", *words], words, strict=False) if before != "." and word[0].isidentifier()}

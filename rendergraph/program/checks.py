@@ -1,0 +1,177 @@
+"""A step's program text held against what the step gives it, as far as that shows without GL."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from rendergraph.catalog import NodeType
+from rendergraph.declare import Node
+from rendergraph.errors import InputError, Problem
+from rendergraph.expand import ViewTable
+from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
+from rendergraph.glsl.reached import reached
+from rendergraph.program.messages import declared_at, mentioned_at
+from rendergraph.program.text import StageText, prefix, stage_texts
+from rendergraph.steps import Read, Resource, Step
+from rendergraph.textures import FORMATS, TextureDesc
+
+Texts = Callable[[], Mapping[str, StageText]]
+"""A program's texts, put together where they are looked at."""
+
+_MOVING = {
+    "camera_block": "the camera",
+    "frame_block": "the frame's time and number",
+    "light_block": "the scene's lights, which may move",
+    "pass_view_block": "the view it is drawn with",
+}
+_SAMPLER = re.compile(r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);")
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_SAMPLERS = {"texture2d": "sampler2D", "texture2d_array": "sampler2DArray", "texture_cube": "samplerCube"}
+
+
+def check_texts(
+    steps: Iterable[Step],
+    types: Mapping[str, NodeType],
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
+) -> None:
+    """Put the program texts of steps together and look at them.
+
+    Raises:
+        InputError: files are missing or cannot be put together (RG400 to RG408), a sampler does not fit what is bound
+            to it (RG447), or a kept value comes from what moves (RG439).
+    """
+    problems: list[Problem] = []
+    seen: set[object] = set()
+    for step in steps:
+        kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
+        key = step.type, step.shaders, step.defines, step.functions, kinds, _kept(step, resources)
+        if not step.shaders or key in seen:
+            continue  # its text is that of another step
+        seen.add(key)
+        try:
+            texts = stage_texts(step, types, resources, views)
+            check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
+            _check_samplers(step, texts, resources)
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+
+
+# --- samplers --------------------------------------------------------------------------------------------------------
+
+
+def sampler_of(read: Read, resource: Resource) -> str:
+    """The GLSL type that a sampler of what is read has: `usampler2D`, `sampler2DArrayShadow`, `sampler2DMS`."""
+    assert isinstance(resource.desc, TextureDesc)
+    whole = {"uint": "u", "int": "i"}.get(FORMATS[resource.desc.format].family, "")
+    name = _SAMPLERS[read.kind]
+    if resource.desc.samples > 1:
+        name = name.replace("2D", "2DMS")
+    return whole + name + ("Shadow" if read.sampler.compare else "")
+
+
+def named_reads(step: Step) -> Iterator[tuple[str, Read]]:
+    """What a step and the functions it calls read, by the names in its program."""
+    yield from ((read.name, read) for read in step.reads)
+    for function in step.functions:
+        yield from ((prefix(function.node) + read.name, read) for read in function.reads)
+
+
+def _sampled(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, Read]]:
+    """The named reads that are sampled."""
+    for name, read in named_reads(step):
+        if read.use == "sample" and isinstance(resources[read.resource].desc, TextureDesc):
+            yield name, read
+
+
+def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str, Resource]) -> Problem | None:
+    """What is wrong with a sampler of this type for what is read; None where it fits."""
+    right = sampler_of(read, resources[read.resource])
+    if declared == right:
+        return None
+    desc = resources[read.resource].desc
+    assert isinstance(desc, TextureDesc)
+    what = f"a {read.kind} of {desc.format}" + (f" with {desc.samples} samples" if desc.samples > 1 else "")
+    how = ", read with `compare`," if read.sampler.compare else ""
+    text = f"'{read.name}' is declared as {declared}, but '{read.resource}'{how} is {what}; declare it as {right}"
+    return step.problem("RG447", text)
+
+
+def _check_samplers(step: Step, texts: Mapping[str, StageText], resources: Mapping[str, Resource]) -> None:
+    reads = dict(_sampled(step, resources))
+    problems = []
+    for text in texts.values():
+        for name, kinds in _samplers(text.text).items():
+            found = [unfit_sampler(step, kind, reads[name], resources) for kind in kinds] if name in reads else [None]
+            if found[0] is not None and None not in found:  # a branch of an `#if` may declare the right one
+                problems.append(_placed(found[0], text, [name]))
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+
+
+def _samplers(text: str) -> dict[str, list[str]]:
+    """The types that a text declares each of its samplers with."""
+    found: dict[str, list[str]] = {}
+    for kind, names in _SAMPLER.findall(text):
+        for name in _NAME.findall(names):
+            found.setdefault(name, []).append(kind)
+    return found
+
+
+# --- what is kept ----------------------------------------------------------------------------------------------------
+
+
+def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mapping[str, Resource]) -> None:
+    """Refuse a step that makes a kept value from the camera, time, lights, views or an input that is not kept.
+
+    Args:
+        step: any step.
+        texts: its texts.
+        cls: its node's class.
+        resources: what it touches.
+
+    Raises:
+        InputError: it does (RG439).
+    """
+    kept = _kept(step, resources)
+    if kept is None:
+        return
+    problems: list[Problem] = []
+    for text in texts().values():
+        names = reached(text.text)
+        given = {read.name for read in step.reads}
+        for name in sorted((names & _samplers(text.text).keys() & cls.inputs().keys()) - given):
+            problem = step.problem("RG439", f"it makes '{kept}', which is kept, but samples '{name}', which is not")
+            problems.append(_placed(problem, text, [name]))
+        for block, members in _blocks(text.text):
+            used = sorted(names & members)
+            if used and (block in _MOVING or block.endswith("_view_block")):
+                what = _MOVING.get(block, "a view, which `update` sets in each frame")
+                problem = step.problem("RG439", f"it makes '{kept}', which is kept, but looks at {what} ('{used[0]}')")
+                problems.append(_placed(problem, text, used))
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+
+
+def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
+    """The kept resource that a step makes."""
+    return next((write.resource for write in step.writes if resources[write.resource].role == "kept"), None)
+
+
+def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
+    """Each uniform or storage block with the names of its members."""
+    for statement, body in statements(tokens(without_directives(text))):
+        begin = head(statement)
+        if begin.storage in ("uniform", "buffer") and body is not None and begin.rest:
+            yield begin.rest[0], {name for one, _ in statements(body) for name, _, _ in declarators(head(one).rest[1:])}
+
+
+def _placed(problem: Problem, text: StageText, names: Sequence[str]) -> Problem:
+    """The problem at the author's line that has one of the names, if there is one."""
+    found = declared_at(text.source, names) or mentioned_at(text.source, names)
+    return replace(problem, place=found[0], line_text=found[1]) if found is not None else problem
