@@ -234,12 +234,12 @@ def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Sch
         own = {"type": "string", "enum": list(dict.fromkeys(words))}
     limits = {"minimum": parameter.minimum, "maximum": parameter.maximum}
     limits = {key: limit for key, limit in limits.items() if limit is not None}
-    about = {"description": _about_param(parameter, doc), "default": written.get("default")}
+    common = {"description": _about_param(parameter, doc), "default": written.get("default")}
     kind = own.get("type")
     if kind in _WORDS:  # said without alternatives: editors then name the limit that is broken
         message = f"This is {_WORDS[kind]}, or $name for a parameter of the pipeline."
         return {
-            **about,
+            **common,
             **own,
             **limits,
             "type": [kind, "string", "null"],
@@ -248,7 +248,7 @@ def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Sch
         }
     alternatives = own.get("anyOf", [own])  # limits beside alternatives hold for those that are numbers
     alternatives = [{**p, **limits} if p.get("type") in ("number", "integer") else p for p in alternatives]
-    return {**about, "anyOf": [*alternatives, {"type": "null"}, _REFERENCE]}
+    return {**common, "anyOf": [*alternatives, {"type": "null"}, _REFERENCE]}
 
 
 def _about_param(parameter: Parameter, doc: str) -> str:
