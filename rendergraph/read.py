@@ -7,37 +7,88 @@ again what kind of value they hold.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
 
-from rendergraph.document import BROKEN, Document, Limits, Value, load, parse, shown
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.document import Document, Limits, Value, load, parse
+from rendergraph.errors import InputError
+from rendergraph.keys import Codes, Key, Later, Names, Naming, Table, Walk
+from rendergraph.keys.forms import ANYTHING, FLAG, NUMBER, TEXT, either, listed, row, shipped, version, whole
+from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.textures import MOST_SIDE
 
-VERSION = 1
-"""The number after `rendergraph:`; it grows when an old file would change its meaning."""
-
-NODE_KEYS = ("type", "inputs", "params")
-PARAMETER_KEYS = ("default", "min", "max", "doc")
-INPUT_KEYS = ("semantic", "optional", "doc")
-TOP_KEYS = (
-    "rendergraph",
-    "description",
-    "extends",
-    "size",
-    "scene",
-    "plugins",
-    "parameters",
-    "inputs",
-    "nodes",
-    "outputs",
-)
+CODES = Codes(unknown="RG105", wrong="RG106", name="RG107", file="RG013")
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")
 """Node ids, output names, parameter names; long ones make messages and the search for the nearest name long."""
 
-MOST_PROBLEMS = 100
-"""Mistakes after which nobody reads on; finding the nearest name for each of a million takes hours."""
+_NAMING = Naming(NAME, "letters, digits, '_' and '-' make one, no digit first")
+_LINK = either(TEXT, listed(TEXT, "links"), wanted="a link as in 'node.port', a list of links, or null")
+_SIDES = row(whole(1, MOST_SIDE), whole(1, MOST_SIDE))
+SIZE = Key(
+    "size",
+    replace(_SIDES, shown="[2 numbers]", wanted=f"width and height in pixels, 1 to {MOST_SIDE}"),
+    "Width and height in pixels.",
+    example="size: [1280, 720]",
+    code="RG207",
+)
+
+PARAMETER = Table(
+    "'{}'",
+    (
+        Key("default", ANYTHING, "Its value where nothing sets it."),
+        Key("min", NUMBER, "Least legal value."),
+        Key("max", NUMBER, "Greatest legal value."),
+        Key("doc", TEXT, "What it does, in a line."),
+    ),
+)
+INPUT = Table(
+    "'{}'",
+    (
+        Key("semantic", TEXT, "What its texels mean, such as `radiance`."),
+        Key("optional", FLAG, "Whether it may stay unconnected."),
+        Key("doc", TEXT, "What it is for, in a line."),
+    ),
+)
+NODE = Table(
+    "'{}'",
+    (
+        # A resolved file carries its sub-pipelines where it would name their files.
+        Key("type", Later(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
+        Key("inputs", Names(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
+        Key("params", Names(ANYTHING, _NAMING), "Parameter to value; null is its default."),
+    ),
+)
+_NOT_A_NODE = {"inputs": "a node cannot be called 'inputs'; rename it"}
+PIPELINE: Table = Table(
+    "a pipeline",
+    (
+        Key("rendergraph", version(1), "Version of the format.", code="RG016"),
+        Key("description", TEXT, "What the pipeline shows, in a line."),
+        Key("extends", shipped(shipped_pipelines), "A shipped pipeline or a file; the rest is a merge patch on it."),
+        SIZE,
+        Key("scene", shipped(shipped_scenes), "A shipped scene, a scene file, .obj, .gltf or .glb."),
+        Key(
+            "plugins",
+            listed(TEXT, "folders and packages"),
+            "Folders of shader nodes, and installed packages that the pipeline needs.",
+            example="plugins: [./effects, some-package]",
+        ),
+        Key("parameters", Names(PARAMETER, _NAMING), "Knobs of the whole pipeline, used as $name."),
+        Key("inputs", Names(INPUT, _NAMING), "What the file takes as the type of a node."),
+        Key("nodes", Names(NODE, _NAMING, "node id", _NOT_A_NODE), "Nodes by id."),
+        Key("outputs", Names(TEXT, _NAMING, "output name"), "Output name to `node.port`."),
+    ),
+    code="RG101",
+)
+"""What a pipeline file holds; the one source for checking, `explain`, the schema and the reference."""
+
+_PATCH = replace(
+    PIPELINE,
+    keys=tuple(key for key in PIPELINE.keys if key.name != "extends"),
+    refused={"extends": "a patch cannot extend a pipeline; leave 'extends' out"},
+)
+_HOLDS = "`nodes` and `outputs`"
 
 
 def read(
@@ -77,192 +128,18 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
     Raises:
         InputError: something was left out and `keep_going` is off, or the whole is not a mapping.
     """
-    grammar = _Grammar(patch, bool(document.problems))
-    root = grammar.top(document.root)
-    problems = (*document.problems, *grammar.problems)
-    if problems and (not keep_going or root is None):
-        raise InputError(problems)
-    assert root is not None
-    return Document(root, document.source, problems, document.dropped | grammar.dropped)
-
-
-Shape: TypeAlias = "Callable[[Value, str], Value | None]"
-
-
-class _Grammar:
-    """One walk over a file; every method gives the value back without what does not belong there."""
-
-    def __init__(self, patch: bool, suspect: bool) -> None:
-        self.patch = patch
-        self.suspect = suspect
-        self.problems: list[Problem] = []
-        self.dropped: set[tuple[str, ...]] = set()
-        self._path: list[str] = []
-
-    def say(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
-        self.problems.append(value.problem(code, text, key=key))
-        if len(self.problems) >= MOST_PROBLEMS:
-            raise InputError(self.problems)
-
-    def enter(self, key: str, child: Value, shape: Shape, kept: dict[str, Value]) -> None:
-        """Keep a child as far as it is right; remember where something was left out."""
-        self._path.append(key)
-        if child.data is None:
-            kept[key] = child
-        elif child.data is not BROKEN and (good := shape(child, key)) is not None:
-            kept[key] = good
-        else:
-            self.dropped.add(tuple(self._path))
-        self._path.pop()
-
-    def top(self, root: Value) -> Value | None:
-        if root.data is BROKEN:
-            return None
-        if root.data is None and not self.patch:
-            self.say(root, "RG013", "the file is empty; a pipeline has at least `nodes` and `outputs`")
-            return None
-        if not isinstance(root.data, dict):
-            self.say(root, "RG013", f"a pipeline is a mapping with `nodes` and `outputs`, this is {root.kind}")
-            return None
-        shapes: dict[str, Shape] = {
-            "rendergraph": self.version,
-            "description": self.text,
-            "extends": self.extends,
-            "size": self.size,
-            "scene": self.text,
-            "plugins": self.texts,
-            "parameters": self.named(self.keyed(PARAMETER_KEYS, self.parameter_part)),
-            "inputs": self.named(self.keyed(INPUT_KEYS, self.input_part)),
-            "nodes": self.named(self.keyed(NODE_KEYS, self.node_part), "node id"),
-            "outputs": self.named(self.text, "output name"),
-        }
-        return self.keyed(TOP_KEYS, lambda value, key: shapes[key](value, key))(root, "a pipeline")
-
-    def keyed(self, known: tuple[str, ...], shape: Shape) -> Shape:
-        """A mapping of known keys."""
-
-        def check(value: Value, what: str) -> Value | None:
-            if not self.is_mapping(value, what):
-                return None
-            kept: dict[str, Value] = {}
-            if known is TOP_KEYS and (sweep := dict(value.items()).get("sweep")) is not None:
-                text = "this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
-                self.say(sweep, "RG101", text, key=True)
-                return None
-            for key, child in value.items():
-                if key not in known:
-                    where = "a pipeline" if known is TOP_KEYS else f"'{what}'"
-                    text = f"{where} has no key '{shown(key)}'{suggestion(str(key), known)}"
-                    self.say(child, "RG101" if known is TOP_KEYS else "RG105", text, key=True)
-                else:
-                    self.enter(key, child, shape, kept)
-            return value.with_data(kept)
-
-        return check
-
-    def named(self, shape: Shape, what: str = "name") -> Shape:
-        """A mapping of free names."""
-
-        def check(value: Value, where: str) -> Value | None:
-            if not self.is_mapping(value, where):
-                return None
-            kept: dict[str, Value] = {}
-            for key, child in value.items():
-                if not isinstance(key, str) or not NAME.match(key):
-                    text = f"'{shown(key)}' is no {what}; letters, digits, '_' and '-' make one, no digit first"
-                    text += "; a blank stands between the ':' and the value" if ":" in str(key) else ""
-                    self.say(child, "RG107", text, key=True)
-                    self.dropped.add((*self._path, str(key)))
-                elif where == "nodes" and key == "inputs":
-                    self.say(child, "RG107", "a node cannot be called 'inputs'; rename it", key=True)
-                    self.dropped.add((*self._path, key))
-                else:
-                    self.enter(key, child, shape, kept)
-            return value.with_data(kept)
-
-        return check
-
-    def is_mapping(self, value: Value, what: str) -> bool:
-        if isinstance(value.data, dict):
-            return True
-        self.say(value, "RG106", f"'{what}' takes a mapping, this is {value.kind}")
-        return False
-
-    def text(self, value: Value, key: str) -> Value | None:
-        if isinstance(value.data, str) and value.data.strip():
-            return value
-        what = "empty" if value.data == "" else value.kind
-        self.say(value, "RG106", f"'{key}' takes text, this is {what}")
-        return None
-
-    def texts(self, value: Value, key: str) -> Value | None:
-        if isinstance(value.data, list):
-            return value.with_data([part for part in value.data if self.text(part, key) is not None])
-        self.say(value, "RG106", f"'{key}' takes a list as in [./effects, some-package], this is {value.kind}")
-        return None
-
-    def version(self, value: Value, key: str) -> Value | None:
-        if value.data == VERSION and not isinstance(value.data, bool):
-            return value
-        self.say(value, "RG016", f"this program reads version {VERSION} of the format, as in 'rendergraph: {VERSION}'")
-        return None
-
-    def extends(self, value: Value, key: str) -> Value | None:
-        if self.patch:
-            self.say(value, "RG101", "a patch cannot extend a pipeline; leave 'extends' out", key=True)
-            return None
-        return self.text(value, key)
-
-    def size(self, value: Value, key: str) -> Value | None:
-        data = value.data
-        if isinstance(data, list) and len(data) == 2 and all(type(side.data) is int for side in data):
-            return value
-        if _has_broken(value):
-            return None
-        self.say(value, "RG106", f"'{key}' takes width and height in pixels, as in [1280, 720]")
-        return None
-
-    def node_part(self, value: Value, key: str) -> Value | None:
-        if key == "type":
-            # A resolved file carries its sub-pipelines where it would name their files.
-            return self.top(value) if isinstance(value.data, dict) else self.text(value, key)
-        return self.named(self.link if key == "inputs" else self.anything)(value, key)
-
-    def link(self, value: Value, key: str) -> Value | None:
-        parts = value.data if isinstance(value.data, list) else [value]
-        if all(isinstance(part.data, str) and part.data for part in parts):
-            return value
-        if any(part.data is BROKEN for part in parts):
-            return None
-        self.say(value, "RG106", f"'{key}' takes a link as in 'node.port', a list of links, or null")
-        return None
-
-    def anything(self, value: Value, key: str) -> Value | None:
-        return None if self.suspect and _has_broken(value) else value
-
-    def parameter_part(self, value: Value, key: str) -> Value | None:
-        if key == "doc":
-            return self.text(value, key)
-        if key == "default":
-            return self.anything(value, key)
-        if isinstance(value.data, int | float) and not isinstance(value.data, bool):
-            return value
-        self.say(value, "RG106", f"'{key}' takes a number, this is {value.kind}")
-        return None
-
-    def input_part(self, value: Value, key: str) -> Value | None:
-        if key != "optional":
-            return self.text(value, key)
-        if isinstance(value.data, bool):
-            return value
-        self.say(value, "RG106", f"'{key}' takes true or false, this is {value.kind}")
-        return None
-
-
-def _has_broken(value: Value) -> bool:
-    data = value.data
-    parts = data if isinstance(data, list) else data.values() if isinstance(data, dict) else ()
-    return data is BROKEN or any(map(_has_broken, parts))
+    walk, value = Walk(CODES, document.problems), document.root
+    if value.data is None and not patch:
+        walk.say(value, CODES.file, f"the file is empty; a pipeline has at least {_HOLDS}")
+        raise InputError(walk.problems)
+    if (sweep := value.get("sweep")) is not None:
+        text = "this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
+        walk.say(sweep, "RG101", text, key=True)
+        raise InputError(walk.problems)
+    root = walk.root(value, _PATCH if patch else PIPELINE, _HOLDS)
+    if root is None or (walk.problems and not keep_going):
+        raise InputError(walk.problems)
+    return Document(root, document.source, tuple(walk.problems), document.dropped | walk.dropped)
 
 
 def entries(value: Value | None, *path: str) -> dict[str, Value]:

@@ -16,17 +16,14 @@ from rendergraph.declare import Extensions, Function, InOut, Input, Node, Parame
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.glsl.source import about
-from rendergraph.read import INPUT_KEYS, NAME, NODE_KEYS, PARAMETER_KEYS, TOP_KEYS, VERSION
-from rendergraph.resolve import MOST_SIDE
-from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.keys import Schema, as_markdown, file_schema
+from rendergraph.keys import schema as schema_of
+from rendergraph.read import NODE, PIPELINE
+from rendergraph.resources import shipped_pipelines
 from rendergraph.settings import Roots
 from rendergraph.textures import Signature
 
-Schema = dict[str, Any]
-
-_NAMES = {"pattern": "^" + NAME.pattern.replace("\\Z", "$")}
 _LINK: Schema = {"type": ["string", "null"], "description": "`node.port`, a node's id, or null for nothing."}
-_SIDE: Schema = {"type": "integer", "minimum": 1, "maximum": MOST_SIDE}
 _ROLES = {
     "param": "Changing it rebuilds nothing.",
     "define": "Changing it recompiles a program.",
@@ -36,129 +33,59 @@ _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A par
 _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
 
-def schema(catalog: Catalog) -> Schema:
+def schema(catalog: Catalog, inherited: Mapping[str, str] = {}) -> Schema:
     """A draft-07 schema, which is what editors read.
 
     A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
+
+    Args:
+        catalog: the types there are.
+        inherited: of a file that extends another: that one's nodes, by id, with their types.
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
     types |= {found.name: found.cls for found in catalog.usable()[0]}
-    properties: Schema = {
-        "rendergraph": {"const": VERSION, "description": "Version of the format."},
-        "description": {"type": "string", "description": "What the pipeline shows, in a line."},
-        "extends": _one_of(shipped_pipelines(), "A shipped pipeline or a file; the rest is a merge patch on it."),
-        "size": {
-            "type": "array",
-            "items": [_SIDE, _SIDE],
-            "minItems": 2,
-            "maxItems": 2,
-            "description": "Width and height in pixels.",
-        },
-        "scene": _one_of(shipped_scenes(), "A shipped scene, a scene file, .obj, .gltf or .glb."),
-        "plugins": {
-            "type": "array",
-            "items": {"type": "string"},
-            "description": "Folders of shader nodes, and installed packages that the pipeline needs.",
-        },
-        "parameters": _mapping({"$ref": "#/definitions/parameter"}, "Knobs of the whole pipeline, used as $name."),
-        "inputs": _mapping({"$ref": "#/definitions/input"}, "What the file takes as the type of a node."),
-        "nodes": _mapping({"$ref": "#/definitions/node"}, "Nodes by id."),
-        "outputs": _mapping(_LINK, "Output name to `node.port`."),
-    }
-    found = {
-        "$schema": "http://json-schema.org/draft-07/schema#",
-        **_object(TOP_KEYS, properties),
-        "definitions": {
-            "parameter": _object(
-                PARAMETER_KEYS,
-                {
-                    "default": {"description": "Its value where nothing sets it."},
-                    "min": {"type": "number", "description": "Least legal value."},
-                    "max": {"type": "number", "description": "Greatest legal value."},
-                    "doc": {"type": "string", "description": "What it does, in a line."},
-                },
-            ),
-            "input": _object(
-                INPUT_KEYS,
-                {
-                    "semantic": {"type": "string", "description": "What its texels mean, such as `radiance`."},
-                    "optional": {"type": "boolean", "description": "Whether it may stay unconnected."},
-                    "doc": {"type": "string", "description": "What it is for, in a line."},
-                },
-            ),
-            "node": _node(types, catalog.extensions),
-        },
-    }
-    marked: Schema = _as_markdown(found)
+    rules = {name: _rules_of(name, cls, catalog.extensions) for name, cls in types.items() if cls is not None}
+    found = file_schema(PIPELINE)
+    nodes = found["properties"]["nodes"]
+    nodes["additionalProperties"] = {"$ref": "#/definitions/node"}
+    if inherited:
+        nodes["properties"] = {id: _inherited(word, rules.get(word, {})) for id, word in inherited.items()}
+    found["definitions"] = {"node": _node(types, rules)}
+    marked: Schema = as_markdown(found)
     return marked
 
 
-def _as_markdown(value: Any) -> Any:
-    """The same, where editors that show Markdown are told what is written in it; the others take it as it stands."""
-    if isinstance(value, list):
-        return [_as_markdown(part) for part in value]
-    if not isinstance(value, dict):
-        return value
-    text = value.get("description")
-    is_markdown = isinstance(text, str) and ("`" in text or "\n" in text)
-    more = {"markdownDescription": text} if is_markdown else {}
-    return {key: _as_markdown(part) for key, part in value.items()} | more
-
-
-def _one_of(shipped: Iterable[str], doc: str) -> Schema:
-    """A shipped name, which is offered, or the path of a file, which is not."""
-    path = {"type": "string", "pattern": "[./]", "description": doc}
-    return {"anyOf": [{"enum": list(shipped)}, path, {"type": "null"}], "description": doc}
-
-
-def _object(keys: Iterable[str], properties: Mapping[str, Schema]) -> Schema:
-    """A mapping of known keys."""
-    table = {key: _nullable(properties[key]) for key in keys}
-    return {"type": ["object", "null"], "additionalProperties": False, "properties": table}
-
-
-def _mapping(values: Schema, doc: str) -> Schema:
-    """A mapping of free names."""
-    return {"type": "object", "propertyNames": _NAMES, "additionalProperties": _nullable(values), "description": doc}
-
-
-def _nullable(values: Schema) -> Schema:
-    """The same or null, which removes something in a file that extends another; definitions allow it themselves."""
-    if isinstance(values.get("type"), str):
-        return {**values, "type": [values["type"], "null"]}
-    return values
-
-
-def _node(types: Mapping[str, type[Node] | None], extensions: Extensions) -> Schema:
+def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -> Schema:
     known: list[Schema] = [{"const": name, "description": _about(cls) if cls else ""} for name, cls in types.items()]
     file = f"[./]|^({'|'.join(shipped_pipelines())})$"
     elsewhere: list[Schema] = [
         {"type": "string", "pattern": file, "description": "A pipeline file whose outputs are the node's; a shader."},
         {"$ref": "#"},
     ]
-    found = _object(
-        NODE_KEYS,
-        {
-            "type": {
-                "anyOf": [*known, *elsewhere, {"type": "null"}],
-                "description": "A node type, or a pipeline file.",
-            },
-            "inputs": {
-                "type": "object",
-                "description": "Input to `node.port`, to a node's id, or to null for nothing.",
-            },
-            "params": {"type": "object", "description": "Parameter to value; null is its default."},
-        },
-    )
+    found = schema_of(NODE)
+    properties = found["properties"]
+    properties["type"]["anyOf"] = [*known, *elsewhere, {"type": "null"}]
+    for part in ("inputs", "params"):  # what they are the type says
+        properties[part] = {"type": ["object", "null"], "description": properties[part]["description"]}
     found["allOf"] = [
-        {
-            "if": {"properties": {"type": {"const": name}}, "required": ["type"]},
-            "then": {"properties": {"inputs": _inputs(name, cls), "params": _params(name, cls, extensions)}},
-        }
-        for name, cls in types.items()
-        if cls is not None
+        {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": then}
+        for name, then in rules.items()
     ]
     return found
+
+
+def _inherited(type_name: str, then: Schema) -> Schema:
+    """A node of the file that is extended: of that type as long as nothing else is said."""
+    same = {"if": {"not": {"required": ["type"]}}, "then": then}
+    return {
+        "description": f"`{type_name}`, unless `type` says otherwise.",
+        "allOf": [{"$ref": "#/definitions/node"}, same],
+    }
+
+
+def _rules_of(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
+    """What the inputs and parameters of a type are."""
+    return {"properties": {"inputs": _inputs(type_name, cls), "params": _params(type_name, cls, extensions)}}
 
 
 def _about(cls: type[Node]) -> str:

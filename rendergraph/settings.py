@@ -12,15 +12,32 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
-from rendergraph.document import read_bytes, shown
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.document import Source, from_plain, read_bytes, shown
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.keys import Codes, Form, Key, Table, Walk, plain
+from rendergraph.keys.forms import TEXT, listed
 from rendergraph.stamps import look
 
 FILE_NAME = "rendergraph.toml"
-_EXAMPLES = {"asset_roots": "../assets", "plugins": "my_effects"}
-_KEYS = tuple(_EXAMPLES)
+_PATH = Form(
+    "path",
+    "a path",
+    lambda value: TEXT.fits(value) and "\0" not in str(value.data),
+    TEXT.schema,
+)
+_PATHS = listed(_PATH, "paths")
+SETTINGS = Table(
+    "a settings file",
+    (
+        Key(
+            "asset_roots", _PATHS, "Further folders that files may be read from.", example='asset_roots = ["../assets"]'
+        ),
+        Key("plugins", _PATHS, "Files and folders with nodes: code.", example='plugins = ["my_effects"]'),
+    ),
+)
+"""What `rendergraph.toml` holds; its paths are relative to it."""
+_CODES = Codes(unknown="RG017", wrong="RG017", name="RG017", file="RG017")
 _MOST_BYTES = 100_000
 
 
@@ -67,23 +84,16 @@ def load(file: Path) -> Settings:
     """
     import tomllib  # most projects have no such file
 
-    place = Place(str(file))
+    source = Source(str(file), file)
     try:
-        table: dict[str, Any] = tomllib.loads(read_bytes(file, _MOST_BYTES).decode("utf-8"))
+        table = tomllib.loads(read_bytes(file, _MOST_BYTES).decode("utf-8"))
     except (ValueError, RecursionError) as error:
-        raise InputError(Problem("RG017", f"not a valid settings file: {shown(error, 120)}", place)) from None
-    problems = []
-    paths: dict[str, tuple[Path, ...]] = {}
-    for key, value in table.items():
-        if key not in _KEYS:
-            problems.append(Problem("RG017", f"no setting '{shown(key)}'{suggestion(key, _KEYS)}", place))
-        elif not isinstance(value, list) or not all(isinstance(item, str) and "\0" not in item for item in value):
-            text = f"'{key}' is a list of paths, as in {key} = [\"{_EXAMPLES[key]}\"]"
-            problems.append(Problem("RG017", text, place))
-        else:
-            paths[key] = tuple(file.parent / at_home(item) for item in value)
-    if problems:
-        raise InputError(problems)
+        raise InputError(source.problem("RG017", f"not a valid settings file: {shown(error, 120)}")) from None
+    walk = Walk(_CODES)
+    root = walk.root(from_plain(table, source), SETTINGS, "lists of paths")
+    if walk.problems or root is None:
+        raise InputError(walk.problems)
+    paths = {key: tuple(file.parent / at_home(path) for path in found) for key, found in plain(root, SETTINGS).items()}
     return Settings(file, **paths)
 
 

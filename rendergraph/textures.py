@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "function"]
+MOST_SIDE = 16_384
+"""Largest width or height of a picture or texture."""
 TEXTURE_KINDS: frozenset[str] = frozenset({"texture2d", "texture2d_array", "texture_cube"})
 
 Family = Literal["float", "unorm", "snorm", "uint", "int", "depth", "depth_stencil"]

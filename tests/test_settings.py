@@ -30,10 +30,13 @@ def test_the_nearest_above(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("asset_roots = [", "RG017 not a valid settings file"),
-        ("asset_root = []", r"RG017 no setting 'asset_root'; did you mean 'asset_roots'\?"),
-        ('plugins = "nodes"', r"RG017 'plugins' is a list of paths, as in plugins = \[\"my_effects\"\]"),
-        ("plugins = [1]", "RG017 'plugins' is a list of paths"),
-        ('plugins = ["a\\u0000b"]', "RG017 'plugins' is a list of paths"),
+        ("asset_root = []", r"RG017 a settings file has no key 'asset_root'; did you mean 'asset_roots'\?"),
+        (
+            'plugins = "nodes"',
+            r"RG017 'plugins' takes a list of paths, as in plugins = \[\"my_effects\"\], this is 'nodes'",
+        ),
+        ("plugins = [1]", "RG017 'plugins' takes a list of paths"),
+        ('plugins = ["a\\u0000b"]', "RG017 'plugins' takes a list of paths"),
     ],
 )
 def test_wrong_settings(tmp_path: Path, text: str, message: str) -> None:

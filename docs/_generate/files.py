@@ -13,9 +13,10 @@ from rendergraph.catalog import entries, find
 from rendergraph.cli.explain import file_keys
 from rendergraph.compare.axes import MOST_RUNS
 from rendergraph.glsl import expansion, source
-from rendergraph.resolve import MOST_SIDE, flatten
+from rendergraph.resolve import flatten
 from rendergraph.scene import files, image_header
 from rendergraph.schedule import MOST_STEPS
+from rendergraph.textures import MOST_SIDE
 
 from .markdown import code, prose, table
 

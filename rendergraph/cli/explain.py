@@ -6,7 +6,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
 from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts
@@ -14,7 +14,11 @@ from rendergraph.cli.output import emit, emit_json, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
 
-_FILES = ("pipeline", "scene")
+if TYPE_CHECKING:
+    from rendergraph.keys import Table
+
+FILES = ("pipeline", "scene", "sweep", "settings", "header")
+"""Kinds of file whose keys can be explained."""
 
 
 @click.command("explain", no_args_is_help=True)
@@ -24,7 +28,8 @@ _FILES = ("pipeline", "scene")
 def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
     """Explain a node type, an error code or a file.
 
-    `pipeline` and `scene` list every key of such a file; the path of a shader file explains the node that it is.
+    `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of such a file; the path of a shader file
+    explains the node that it is.
 
     \b
     Examples:
@@ -36,7 +41,7 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
         page = error_page(topic.upper())
         emit_json(page) if as_json else emit(_error_text(page))
         return
-    if topic in _FILES:
+    if topic in FILES:
         keys = file_keys(topic)
         emit_json({"file": topic, "keys": keys}) if as_json else emit(_keys_text(topic, keys))
         return
@@ -47,7 +52,7 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
     if topic.endswith(SHADERS):
         catalog = catalog.with_file(topic, Path(topic))
     if topic not in catalog:
-        known = [*catalog.names(), *_FILES]
+        known = [*catalog.names(), *FILES]
         beside = next((f"{topic}{end}" for end in SHADERS if Path(f"{topic}{end}").is_file()), None)
         if beside is not None:
             raise InputError(Problem("RG511", f"nothing is called '{topic}'; did you mean './{beside}'?"))
@@ -97,83 +102,51 @@ def _indented(text: object) -> str:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
+def table_of(kind: str) -> Table:
+    """The keys of a kind of file."""
+    if kind == "pipeline":
+        from rendergraph.read import PIPELINE as found
+    elif kind == "scene":
+        from rendergraph.scene.scene_keys import SCENE as found
+    elif kind == "sweep":
+        from rendergraph.compare.axes import SWEEP as found
+    elif kind == "settings":
+        from rendergraph.settings import SETTINGS as found
+    else:
+        from rendergraph.catalog.header import HEADER as found
+    return found
+
+
 def file_keys(kind: str) -> list[dict[str, Any]]:
-    """Every key of a pipeline or scene file, section by section."""
-    return _scene_keys() if kind == "scene" else _pipeline_keys()
-
-
-def _scene_keys() -> list[dict[str, Any]]:
-    from rendergraph.scene.scene_keys import keys
+    """Every key of a kind of file, section by section."""
+    from rendergraph.keys import shown
 
     return [
         {
             "section": section,
             "key": key.name,
-            "value": _value_words(key),
+            "value": shown(key.takes),
             "default": list(key.default) if isinstance(key.default, tuple) else key.default,
             "unit": key.unit,
             "required": key.required,
             "doc": key.doc,
         }
-        for section, members in keys().items()
-        for key in members
+        for section, keys in table_of(kind).sections()
+        for key in keys
     ]
-
-
-def _value_words(key: Any) -> str:
-    if key.kind == "choice":
-        return " | ".join(key.choices)
-    if key.kind == "vector":
-        return f"[{key.size} numbers]"
-    return _KINDS.get(key.kind, str(key.kind))
 
 
 _KINDS = {
-    "flag": "true | false",
-    "map": "mapping",
-    "link": "name",
-    "integer": "whole number",
-    "color": "[r, g, b]",
-    "scale": "number | [x, y, z]",
-    "file": "path",
+    "pipeline": "a pipeline file",
+    "scene": "a scene file",
+    "sweep": "a sweep's file",
+    "settings": "`rendergraph.toml`",
+    "header": "a shader file's header",
 }
 
 
-def _pipeline_keys() -> list[dict[str, Any]]:
-    from rendergraph.catalog import Catalog
-    from rendergraph.schema import schema
-
-    found = schema(Catalog({}))
-    parts = found["definitions"]
-    sections = {"": found, "nodes": parts["node"], "parameters": parts["parameter"], "inputs": parts["input"]}
-    return [
-        {
-            "section": section,
-            "key": name,
-            "value": _schema_words(entry),
-            "default": None,
-            "unit": "",
-            "required": False,
-            "doc": entry["description"],
-        }
-        for section, part in sections.items()
-        for name, entry in part["properties"].items()
-    ]
-
-
-def _schema_words(entry: dict[str, Any]) -> str:
-    if "const" in entry:
-        return str(entry["const"])
-    types = entry.get("type", "string" if "anyOf" in entry else "any value")
-    word = next(word for word in ([types] if isinstance(types, str) else types) if word != "null")
-    if word == "array":
-        return f"[{len(entry['items'])} numbers]" if isinstance(entry["items"], list) else "[text, …]"
-    names = {"string": "text", "object": "mapping", "integer": "whole number", "boolean": "true | false"}
-    return names.get(word, word)
-
-
 def _keys_text(kind: str, keys: list[dict[str, Any]]) -> str:
-    parts = [f"Every key of a {kind} file. All are optional unless it is said."]
+    parts = [f"Every key of {_KINDS[kind]}. All are optional unless it is said."]
     for section in dict.fromkeys(row["section"] for row in keys):
         rows = [
             (row["key"], row["value"], row["unit"], _default(row), row["doc"])

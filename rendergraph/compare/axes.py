@@ -8,26 +8,47 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rendergraph.document import Value, load
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.keys import Codes, Key, Names, Table, Walk, plain
+from rendergraph.keys.forms import ANYTHING, listed, shipped, version, whole
+from rendergraph.read import SIZE, entries
+from rendergraph.resources import shipped_pipelines, shipped_scenes
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
 
 MOST_RUNS = 10_000
 _PAIRS = {"[": "]", "{": "}", "(": ")"}
-_KEYS = {
-    "sweep": "version of the format: 1",
-    "pipeline": "a shipped name, or a file beside this one",
-    "axes": "paths to lists of values",
-    "reference": "a picture or a pipeline",
-    "scene": "what is drawn",
-    "size": "width and height",
-    "set": "paths to values that hold for all runs",
-    "frames": "how many frames are measured",
-}
+_CODES = Codes(unknown="RG030", wrong="RG030", name="RG030", file="RG030")
+SWEEP = Table(
+    "a sweep",
+    (
+        Key("sweep", version(1), "Version of the format.", required=True, example="sweep: 1"),
+        Key(
+            "pipeline",
+            shipped(shipped_pipelines),
+            "A shipped name, or a file.",
+            required=True,
+            example="pipeline: NAME",
+        ),
+        Key(
+            "axes",
+            Names(listed(ANYTHING, "values", least=1), what="path", null=False, least=1),
+            "Paths, as `-s` takes them, each with a list of values.",
+            required=True,
+            example="axes: {NODE.PARAM: [VALUE, VALUE]}",
+        ),
+        Key("reference", shipped(shipped_pipelines), "A picture or a pipeline that all runs are compared with."),
+        Key("scene", shipped(shipped_scenes), "What is drawn, in place of the pipeline's own."),
+        SIZE,
+        Key("set", Names(ANYTHING, what="path"), "Paths to values that hold for all runs."),
+        Key("frames", whole(1), "How many frames are measured."),
+    ),
+)
+"""What a sweep's file holds."""
 
 
 @dataclass(frozen=True)
@@ -190,43 +211,22 @@ def read_sweep(path: Path) -> SweepFile:
     Raises:
         InputError: it is missing, no YAML, or says something a sweep cannot have; with all mistakes.
     """
-    root = load(path).root
-    problems: list[Problem] = []
-    data: dict[Any, Value] = root.data if isinstance(root.data, dict) else {}
-    for key, value in data.items():
-        if key not in _KEYS:
-            problems.append(
-                value.problem("RG030", f"a sweep has no key '{key}'{suggestion(str(key), _KEYS)}", key=True)
-            )
-    if (version := data.get("sweep")) is None or version.data != 1:
-        problems.append((version or root).problem("RG030", "a sweep begins with 'sweep: 1'"))
-    pipeline = _text(data, "pipeline", problems)
-    if pipeline is None and "pipeline" not in data:
-        problems.append(root.problem("RG030", "the sweep names no pipeline; add pipeline: NAME"))
-    axes = _axes(data.get("axes"), root, problems)
-    sets = data.get("set")
-    given: dict[Any, Value] = {}
-    if sets is not None and not isinstance(sets.data, dict):
-        problems.append(sets.problem("RG030", f"'set' takes a mapping of paths to values, this is {sets.kind}"))
-    elif sets is not None and isinstance(sets.data, dict):
-        given = sets.data
-    size = _size(data.get("size"), problems)
-    frames = data.get("frames")
-    if frames is not None and not (
-        isinstance(frames.data, int) and not isinstance(frames.data, bool) and frames.data > 0
-    ):
-        problems.append(frames.problem("RG030", f"'frames' takes a whole number from 1 up, this is {frames.kind}"))
-    reference, scene = _text(data, "reference", problems), _text(data, "scene", problems)
-    if problems:
-        raise InputError(problems)
+    walk = Walk(_CODES)
+    root = walk.root(load(path).root, SWEEP, "`sweep: 1`, `pipeline` and `axes`")
+    axes = [_axis(str(name), listed, walk) for name, listed in entries(root, "axes").items()] if root else []
+    if walk.problems or root is None:
+        raise InputError(walk.problems)
+    said = plain(root, SWEEP)
+    said |= {key: _beside(path, said[key]) for key in ("pipeline", "reference", "scene") if key in said}
+    given = root.get("set")
     return SweepFile(
-        pipeline=_beside(path, pipeline or ""),
-        axes=tuple(axes),
-        reference=None if reference is None else _beside(path, reference),
-        scene=None if scene is None else _beside(path, scene),
-        size=size,
-        sets=tuple(f"{key}={value_text(value)}" for key, value in given.items()),
-        frames=None if frames is None else int(frames.data),  # type: ignore[arg-type]  # it was looked at above
+        said["pipeline"],
+        tuple(axes),
+        said.get("reference"),
+        said.get("scene"),
+        said.get("size"),
+        tuple(f"{name}={value_text(value)}" for name, value in (given.items() if given else ())),
+        said.get("frames"),
     )
 
 
@@ -236,45 +236,11 @@ def value_text(value: Value) -> str:
     return plain if isinstance(plain, str) else json.dumps(plain)
 
 
-def _axes(value: Value | None, root: Value, problems: list[Problem]) -> list[Axis]:
-    if value is None or not isinstance(value.data, dict) or not value.data:
-        text = "the sweep has no axes; add axes: {NODE.PARAM: [VALUE, VALUE]}"
-        problems.append((value or root).problem("RG030", text))
-        return []
-    found = []
-    for path, listed in value.data.items():
-        if not isinstance(listed.data, list) or not listed.data:
-            text = (
-                f"axis '{path}' takes a list of values, this is {'an empty list' if listed.data == [] else listed.kind}"
-            )
-            problems.append(listed.problem("RG030", text))
-            continue
-        values = [value_text(part) for part in listed.data]
-        twice = [part for number, part in enumerate(values) if part in values[:number]]
-        if twice:
-            problems.append(listed.problem("RG030", f"axis '{path}' has the value {twice[0]} twice"))
-        found.append(Axis(str(path), tuple(values)))
-    return found
-
-
-def _text(data: Mapping[Any, Value], key: str, problems: list[Problem]) -> str | None:
-    value = data.get(key)
-    if value is None:
-        return None
-    if not isinstance(value.data, str):
-        problems.append(value.problem("RG030", f"'{key}' takes text, this is {value.kind}"))
-        return None
-    return value.data
-
-
-def _size(value: Value | None, problems: list[Problem]) -> tuple[int, int] | None:
-    if value is None:
-        return None
-    sides = [part.data for part in value.data] if isinstance(value.data, list) else []
-    if len(sides) == 2 and all(isinstance(side, int) and not isinstance(side, bool) and side > 0 for side in sides):
-        return int(sides[0]), int(sides[1])  # type: ignore[arg-type]  # whole numbers, as just seen
-    problems.append(value.problem("RG030", f"'size' takes [WIDTH, HEIGHT], this is {value.kind}"))
-    return None
+def _axis(path: str, listed: Value, walk: Walk) -> Axis:
+    values = [value_text(value) for value in listed.data] if isinstance(listed.data, list) else []
+    for value in dict.fromkeys(value for number, value in enumerate(values) if value in values[:number]):
+        walk.say(listed, _CODES.wrong, f"axis '{path}' has the value {value} twice")
+    return Axis(path, tuple(values))
 
 
 def _beside(file: Path, name: str) -> str:

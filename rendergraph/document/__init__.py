@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rendergraph.document.events import Limits, build, over_limit
 from rendergraph.document.scalars import scalar
-from rendergraph.document.values import BROKEN, Document, Source, Value, kind_of, shown
+from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import look
 
@@ -90,10 +90,12 @@ __all__ = [
     "Limits",
     "Source",
     "Value",
+    "from_plain",
     "kind_of",
     "load",
     "parse",
     "read_bytes",
+    "said",
     "scalar",
     "shown",
 ]

@@ -10,10 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from rendergraph.errors import Place, Problem
+from rendergraph.errors import InputError, Place, Problem
 
 Scalar: TypeAlias = "str | int | float | bool | None"
-Key: TypeAlias = "str | int | float"
+Index: TypeAlias = "str | int | float"
 Data: TypeAlias = "Scalar | list[Value] | dict[Any, Value] | Broken"
 
 _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # what YAML takes for the end of a line
@@ -123,7 +123,7 @@ class Value:
         """Keys and values of a mapping, nothing for anything else."""
         return iter(self.data.items() if isinstance(self.data, dict) else ())
 
-    def get(self, *path: Key) -> Value | None:
+    def get(self, *path: Index) -> Value | None:
         """The value that lies at a path of keys and positions, or None."""
         found: Value = self
         for step in path:
@@ -186,7 +186,7 @@ class Document:
         """Everything as plain Python data; not to be changed, for aliases share it."""
         return self.root.plain()
 
-    def place(self, path: Sequence[Key] = (), *, key: bool = False) -> Place:
+    def place(self, path: Sequence[Index] = (), *, key: bool = False) -> Place:
         """Where the value at a path of keys and positions starts, or its key.
 
         The nearest place that exists stands in for a path that does not.
@@ -194,12 +194,12 @@ class Document:
         found, rest = self._nearest(path)
         return found.key_place if key and not rest else found.place
 
-    def problem(self, code: str, text: str, path: Sequence[Key] = (), *, key: bool = False) -> Problem:
+    def problem(self, code: str, text: str, path: Sequence[Index] = (), *, key: bool = False) -> Problem:
         """A mistake at the value of a path, or at its key, with the line it stands in."""
         found, rest = self._nearest(path)
         return found.problem(code, text, key=key and not rest)
 
-    def _nearest(self, path: Sequence[Key]) -> tuple[Value, bool]:
+    def _nearest(self, path: Sequence[Index]) -> tuple[Value, bool]:
         found = self.root
         for position, step in enumerate(path):
             child = found.get(step)
@@ -207,6 +207,27 @@ class Document:
                 return found, position < len(path)
             found = child
         return found, False
+
+
+def from_plain(data: Any, source: Source) -> Value:
+    """Python's own values as values of a source; tuples are lists, NumPy scalars and arrays what they hold.
+
+    Raises:
+        InputError: something else is among them.
+    """
+    if hasattr(data, "tolist"):
+        data = data.tolist()
+    if isinstance(data, Mapping):
+        return Value({str(key): from_plain(child, source) for key, child in data.items()}, source)
+    if isinstance(data, list | tuple):
+        return Value([from_plain(child, source) for child in data], source)
+    if data is None or isinstance(data, str | float) or (isinstance(data, int) and abs(data) < 2**63):
+        return Value(data, source)
+    raise InputError(
+        source.problem(
+            "RG106", f"{shown(repr(data))} cannot stand in a file; it takes text, numbers, lists and mappings"
+        )
+    )
 
 
 def kind_of(data: object) -> str:
@@ -220,6 +241,17 @@ def kind_of(data: object) -> str:
     if isinstance(data, int | float):
         return "a number"
     return "a mapping" if isinstance(data, Mapping) else "a list"
+
+
+def said(value: Value) -> str:
+    """What a value is, itself where it is short, for messages."""
+    data = value.data
+    if isinstance(data, str):
+        return f"'{shown(data, 40)}'"
+    if isinstance(data, list) and len(data) <= 8 and not any(isinstance(part.data, list | dict) for part in data):
+        return shown([part.data for part in data])
+    is_plain = isinstance(data, int | float) and not isinstance(data, bool)
+    return shown(data) if is_plain else value.kind
 
 
 def shown(text: object, most: int = 60) -> str:

@@ -9,6 +9,7 @@ from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import InOut, Input, LightFacts, Made, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
+from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
@@ -16,7 +17,6 @@ from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.link.unknown import stand_in, unknown_type
-from rendergraph.read import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature
 

@@ -32,9 +32,9 @@ from rendergraph.document import shown
 from rendergraph.errors import Mistake, Problem, SceneError, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Bound
-from rendergraph.resolve import MOST_SIDE
 from rendergraph.textures import (
     FORMATS,
+    MOST_SIDE,
     Albedo,
     Depth,
     Emissive,

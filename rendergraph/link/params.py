@@ -15,7 +15,7 @@ from rendergraph.declare.mistakes import complaint
 from rendergraph.document import Value, kind_of, shown
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.glsl.source import needs, needs_place
-from rendergraph.read import MOST_PROBLEMS
+from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec
 
 

@@ -8,20 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Document, Limits, Source, Value
+from rendergraph.document import Document, Limits, Source, Value, from_plain
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.read import checked, entries, read, word
+from rendergraph.keys import Walk, plain
+from rendergraph.read import CODES, SIZE, checked, entries, read, word
 from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
 from rendergraph.resolve.merge import diff, merge_patch
-from rendergraph.resolve.sets import from_plain, patch_of, settings
+from rendergraph.resolve.sets import patch_of, settings
 from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, Parameter, PipelineSpec, Scope
 from rendergraph.resolve.words import is_bare
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.settings import Roots
-
-MOST_SIDE = 16_384
-"""Largest width or height of a picture or texture."""
 
 
 def resolve(
@@ -151,14 +149,12 @@ def _complete(tree: Value, files: Files) -> None:
 
 def _size(tree: Value, files: Files) -> tuple[int, int]:
     value = tree.get("size")
-    if value is None or not isinstance(value.data, list):
+    if value is None or value.data is None:
         return DEFAULT_SIZE
-    width, height = (int(side.data) for side in value.data)  # type: ignore[arg-type]  # read() saw two whole numbers
-    if min(width, height) < 1 or max(width, height) > MOST_SIDE:
-        text = f"the size is {width}×{height}, width and height go from 1 to {MOST_SIDE}"
-        files.say(value.problem("RG207", text))
-        return DEFAULT_SIZE
-    return width, height
+    walk = Walk(CODES)  # what a file says has been read; this is for what was typed
+    good = walk.take(value, SIZE)
+    files.problems += walk.problems
+    return plain(good, SIZE.takes) if good is not None else DEFAULT_SIZE
 
 
 def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | None, Roots]:
@@ -203,7 +199,6 @@ def _with_plugins(tree: Value, files: Files) -> Value:
 
 __all__ = [
     "DEFAULT_SIZE",
-    "MOST_SIDE",
     "NodeSpec",
     "Parameter",
     "PipelineSpec",

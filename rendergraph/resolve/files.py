@@ -9,7 +9,8 @@ from pathlib import Path
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Limits, Source, Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.read import MOST_PROBLEMS, checked, entries, read, word
+from rendergraph.keys import MOST_PROBLEMS
+from rendergraph.read import checked, entries, read, word
 from rendergraph.resolve.merge import TypeNames, merge_pipeline
 from rendergraph.resolve.plugins import Plugins, is_shader
 from rendergraph.resolve.words import is_bare

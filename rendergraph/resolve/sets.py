@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from rendergraph.document import Source, Value, parse, shown
+from rendergraph.document import Source, Value, from_plain, parse, shown
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
 from rendergraph.read import entries
 from rendergraph.resolve.merge import NamesOf, TypeNames
@@ -89,23 +88,6 @@ def _moved(value: Value, source: Source) -> Value:
     elif isinstance(data, list):
         data = [_moved(child, source) for child in data]
     return Value(data, source)
-
-
-def from_plain(data: Any, source: Source) -> Value:
-    """Python's own values as values of a source; tuples are lists, NumPy scalars and arrays what they hold."""
-    if hasattr(data, "tolist"):
-        data = data.tolist()
-    if isinstance(data, Mapping):
-        return Value({str(key): from_plain(child, source) for key, child in data.items()}, source)
-    if isinstance(data, list | tuple):
-        return Value([from_plain(child, source) for child in data], source)
-    if data is None or isinstance(data, str | float) or (isinstance(data, int) and abs(data) < 2**63):
-        return Value(data, source)
-    raise InputError(
-        source.problem(
-            "RG106", f"{shown(repr(data))} cannot stand in a pipeline; it takes text, numbers, lists and mappings"
-        )
-    )
 
 
 def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple[Value | None, list[Problem]]:

@@ -2,44 +2,37 @@
 
 from __future__ import annotations
 
-from rendergraph.scene.keys import Key, positive
-from rendergraph.scene.shapes import SHAPES
+from dataclasses import replace
+
+from rendergraph.keys import Codes, Form, Key, Names, Schema, Table, schema
+from rendergraph.keys.forms import FILE, FLAG, TEXT, choice, color, number, scale, vector, version
+from rendergraph.scene.shapes import LENGTH, SHAPES
 
 _DIRECTION = "unit length is not needed"
 
-TOP = (
-    Key("scene", "choice", "Version of the format.", required=True, choices=("1",)),
-    Key("description", "text", "What the scene shows."),
-    Key("objects", "map", "Shapes and files, by name."),
-    Key("materials", "map", "Surfaces, by name."),
-    Key(
-        "lights",
-        "map",
-        "Lights, by name; without any a directional key of 3 lux comes over the viewer's left shoulder.",
-    ),
-    Key("cameras", "map", "Cameras, by name, the first is the default; without any the scene is framed."),
-    Key("environment", "map", "An equirectangular image around the scene."),
-    Key("keyframes", "map", "Dotted path (`cameras.main.eye`) to seconds and values, linear between, held outside."),
-    Key("orbit", "map", "A camera that turns about its target."),
-)
+NAME = replace(TEXT, shown="name")
 
-OBJECT = (
-    Key("shape", "choice", "A generated shape; its own keys are under `shape: …`.", choices=tuple(SHAPES)),
-    Key("file", "file", "A mesh file (.obj, .gltf, .glb) instead of a shape; its lights and cameras come with it."),
-    Key("at", "vector", "Where its origin stands.", (0.0, 0.0, 0.0), "m"),
-    Key("rotate_degrees", "vector", "Turns about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
-    Key("scale", "scale", "One factor, or one for each axis; applied before turning.", (1.0, 1.0, 1.0)),
-    Key(
-        "material",
-        "link",
-        "A name under `materials`; a file keeps its own materials without it.",
-        choices=("materials",),
-    ),
-    Key("casts_shadow", "flag", "Whether shadow techniques draw it.", True),
-    Key("hidden", "flag", "Not drawn at all.", False),
+_OVERRIDABLE = (
+    Key("material", NAME, "A name under `materials`; a file keeps its own materials without it."),
+    Key("casts_shadow", FLAG, "Whether shadow techniques draw it.", True),
+    Key("hidden", FLAG, "Not drawn at all.", False),
 )
-OVERRIDES = Key("overrides", "map", "For a file: node name to material, hidden, casts_shadow.")
-OVERRIDE = tuple(key for key in OBJECT if key.name in ("material", "hidden", "casts_shadow"))
+OVERRIDE = Table("override '{}'", _OVERRIDABLE)
+OBJECT = Table(
+    "object '{}'",
+    (
+        Key("shape", choice(*SHAPES), "A generated shape; its own keys are under `shape: …`."),
+        Key("file", FILE, "A mesh file (.obj, .gltf, .glb) instead of a shape; its lights and cameras come with it."),
+        Key("at", vector(), "Where its origin stands.", (0.0, 0.0, 0.0), "m"),
+        Key("rotate_degrees", vector(), "Turns about X, then Y, then Z.", (0.0, 0.0, 0.0), "°"),
+        Key("scale", scale(), "One factor, or one for each axis; applied before turning.", (1.0, 1.0, 1.0)),
+        *_OVERRIDABLE,
+    ),
+    {
+        "shape": {name: shape.keys for name, shape in SHAPES.items()},
+        "file": (Key("overrides", Names(OVERRIDE), "For a file: node name to material, hidden, casts_shadow."),),
+    },
+)
 
 TEXTURES = (
     ("base_color_texture", "Base colour (sRGB) with alpha."),
@@ -54,100 +47,130 @@ TEXTURES = (
 
 
 def _unit(name: str, doc: str, default: float) -> Key:
-    return Key(name, "number", doc, default, low=0, high=1)
+    return Key(name, number(0, 1), doc, default)
 
 
-MATERIAL = (
-    Key(
-        "base_color",
-        "color",
-        "Linear base colour, three numbers or four with alpha.",
-        (1.0, 1.0, 1.0, 1.0),
-        low=0,
-        high=1,
-        size=4,
+MATERIAL = Table(
+    "material '{}'",
+    (
+        Key(
+            "base_color",
+            color(1, alpha=True),
+            "Linear base colour, three numbers or four with alpha.",
+            (1.0, 1.0, 1.0, 1.0),
+        ),
+        _unit("metallic", "0 dielectric, 1 metal.", 0.0),
+        _unit("roughness", "Perceptual roughness; α is its square.", 1.0),
+        Key("emissive", color(), "Emitted radiance.", (0.0, 0.0, 0.0)),
+        Key("emissive_strength", number(0), "Factor on `emissive`.", 1.0),
+        _unit("occlusion_strength", "How much of the occlusion texture counts.", 1.0),
+        Key("normal_scale", number(), "Factor on the normal texture's slope.", 1.0),
+        Key("alpha_mode", choice("opaque", "mask", "blend"), "How alpha is used.", "opaque"),
+        _unit("alpha_cutoff", "With `mask`: less alpha than this is not drawn.", 0.5),
+        Key("double_sided", FLAG, "Back faces are drawn too.", False),
+        Key("unlit", FLAG, "Base colour without lighting.", False),
+        Key("ior", number(1, 10), "Index of refraction, which gives the dielectric f0.", 1.5),
+        _unit("specular", "Factor on the dielectric's reflection.", 1.0),
+        Key("specular_color", color(), "Colour of the dielectric's f0.", (1.0, 1.0, 1.0)),
+        _unit("anisotropy_strength", "0 isotropic.", 0.0),
+        Key("anisotropy_rotation", number(), "Counter-clockwise from the tangent.", 0.0, "rad"),
+        Key("ambient", color(1), "ka of the empirical models; the base colour by default."),
+        Key("diffuse", color(1), "kd of the empirical models; base (1 − metallic) by default."),
+        Key("specular_phong", color(1), "ks of the empirical models; f0 by default."),
+        Key("shininess", number(0, 1e6), "Exponent n of `phong`; from the roughness by default."),
+        *(Key(name, FILE, doc) for name, doc in TEXTURES),
     ),
-    _unit("metallic", "0 dielectric, 1 metal.", 0.0),
-    _unit("roughness", "Perceptual roughness; α is its square.", 1.0),
-    Key("emissive", "color", "Emitted radiance.", (0.0, 0.0, 0.0), low=0),
-    Key("emissive_strength", "number", "Factor on `emissive`.", 1.0, low=0),
-    _unit("occlusion_strength", "How much of the occlusion texture counts.", 1.0),
-    Key("normal_scale", "number", "Factor on the normal texture's slope.", 1.0),
-    Key("alpha_mode", "choice", "How alpha is used.", "opaque", choices=("opaque", "mask", "blend")),
-    _unit("alpha_cutoff", "With `mask`: less alpha than this is not drawn.", 0.5),
-    Key("double_sided", "flag", "Back faces are drawn too.", False),
-    Key("unlit", "flag", "Base colour without lighting.", False),
-    Key("ior", "number", "Index of refraction, which gives the dielectric f0.", 1.5, low=1, high=10),
-    _unit("specular", "Factor on the dielectric's reflection.", 1.0),
-    Key("specular_color", "color", "Colour of the dielectric's f0.", (1.0, 1.0, 1.0), low=0),
-    _unit("anisotropy_strength", "0 isotropic.", 0.0),
-    Key("anisotropy_rotation", "number", "Counter-clockwise from the tangent.", 0.0, "rad"),
-    Key("ambient", "color", "ka of the empirical models; the base colour by default.", low=0, high=1),
-    Key("diffuse", "color", "kd of the empirical models; base (1 − metallic) by default.", low=0, high=1),
-    Key("specular_phong", "color", "ks of the empirical models; f0 by default.", low=0, high=1),
-    Key("shininess", "number", "Exponent n of `phong`; from the roughness by default.", low=0, high=1e6),
-    *(Key(name, "file", doc) for name, doc in TEXTURES),
 )
 
-LIGHT = (
-    Key("type", "choice", "Kind of light.", required=True, choices=("directional", "point", "spot")),
-    Key("at", "vector", "Where it is (point, spot).", (0.0, 0.0, 0.0), "m"),
-    Key("direction", "vector", f"Where its light goes (directional, spot); {_DIRECTION}.", (0.0, -1.0, 0.0)),
-    Key("color", "color", "Linear colour.", (1.0, 1.0, 1.0), low=0),
-    Key("intensity", "number", "Lux for directional, candela for point and spot.", 1.0, "lx, cd", low=0),
-    Key(
-        "range", "number", "Where its light is faded out (point, spot); none by default.", None, "m", low=0, above=True
+LIGHT = Table(
+    "light '{}'",
+    (
+        Key("type", choice("directional", "point", "spot"), "Kind of light.", required=True),
+        Key("at", vector(), "Where it is (point, spot).", (0.0, 0.0, 0.0), "m"),
+        Key("direction", vector(), f"Where its light goes (directional, spot); {_DIRECTION}.", (0.0, -1.0, 0.0)),
+        Key("color", color(), "Linear colour.", (1.0, 1.0, 1.0)),
+        Key("intensity", number(0), "Lux for directional, candela for point and spot.", 1.0, "lx, cd"),
+        Key("range", LENGTH, "Where its light is faded out (point, spot); none by default.", None, "m"),
+        Key("inner_degrees", number(0, 90), "Half angle of the spot's full brightness.", 0.0, "°"),
+        Key("outer_degrees", number(0, 90, above=True), "Half angle where the spot ends.", 45.0, "°"),
+        Key("casts_shadow", FLAG, "Whether `shadow_map.light: auto` may choose it.", True),
     ),
-    Key("inner_degrees", "number", "Half angle of the spot's full brightness.", 0.0, "°", low=0, high=90),
-    Key("outer_degrees", "number", "Half angle where the spot ends.", 45.0, "°", low=0, high=90, above=True),
-    Key("casts_shadow", "flag", "Whether `shadow_map.light: auto` may choose it.", True),
 )
 
-CAMERA = (
-    Key("eye", "vector", "Where it is.", (0.0, 0.0, 5.0), "m"),
-    Key("target", "vector", "What it looks at.", (0.0, 0.0, 0.0), "m"),
-    Key("up", "vector", f"What is up in the picture; {_DIRECTION}.", (0.0, 1.0, 0.0)),
-    Key("fov_y_degrees", "number", "Vertical angle of a perspective camera.", 45.0, "°", low=0.01, high=179.0),
-    Key(
-        "height",
-        "number",
-        "Height of what an orthographic camera sees; makes it orthographic.",
-        None,
-        "m",
-        low=0,
-        above=True,
+CAMERA = Table(
+    "camera '{}'",
+    (
+        Key("eye", vector(), "Where it is.", (0.0, 0.0, 5.0), "m"),
+        Key("target", vector(), "What it looks at.", (0.0, 0.0, 0.0), "m"),
+        Key("up", vector(), f"What is up in the picture; {_DIRECTION}.", (0.0, 1.0, 0.0)),
+        Key("fov_y_degrees", number(0.01, 179.0), "Vertical angle of a perspective camera.", 45.0, "°"),
+        Key("height", LENGTH, "Height of what an orthographic camera sees; makes it orthographic.", None, "m"),
+        Key("frustum", vector(4), "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m"),
+        Key("near", LENGTH, "Near plane.", 0.05, "m"),
+        Key("far", number(0, above=True, infinite=True), "Far plane; `.inf` for none.", 100.0, "m"),
     ),
-    Key("frustum", "vector", "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m", size=4),
-    positive("near", "Near plane.", 0.05),
-    Key("far", "number", "Far plane; `.inf` for none.", 100.0, "m", low=0, above=True, infinite=True),
 )
 
-ENVIRONMENT = (
-    Key("file", "file", "Equirectangular image (.hdr, .exr).", required=True),
-    Key("intensity", "number", "Factor on its radiance.", 1.0, low=0),
-    Key("rotate_degrees", "number", "Turns it about +Y.", 0.0, "°"),
+ENVIRONMENT = Table(
+    "environment",
+    (
+        Key("file", FILE, "Equirectangular image (.hdr, .exr).", required=True),
+        Key("intensity", number(0), "Factor on its radiance.", 1.0),
+        Key("rotate_degrees", number(), "Turns it about +Y.", 0.0, "°"),
+    ),
 )
 
-ORBIT = (
-    Key("camera", "link", "Which camera; the default one where it is not given.", choices=("cameras",)),
-    Key("degrees_per_second", "number", "Speed, counter-clockwise seen from above.", 30.0, "°/s"),
+ORBIT = Table(
+    "orbit",
+    (
+        Key("camera", NAME, "Which camera; the default one where it is not given."),
+        Key("degrees_per_second", number(), "Speed, counter-clockwise seen from above.", 30.0, "°/s"),
+    ),
 )
-
-
-def keys() -> dict[str, tuple[Key, ...]]:
-    """Every section of a scene file with its keys, for `explain scene` and the docs."""
-    return {
-        "": TOP,
-        "objects": (*OBJECT, OVERRIDES),
-        **{f"objects (shape: {name})": shape.keys for name, shape in SHAPES.items()},
-        "objects (overrides)": OVERRIDE,
-        "materials": MATERIAL,
-        "lights": LIGHT,
-        "cameras": CAMERA,
-        "environment": ENVIRONMENT,
-        "orbit": ORBIT,
-    }
 
 
 ANIMATED = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras": CAMERA, "environment": ENVIRONMENT}
 """Sections whose numbers, vectors and colours keyframes may change."""
+
+
+def moving(section: str) -> dict[str, Key]:
+    """The keys of a section that keyframes may change."""
+    return {key.name: key for key in ANIMATED[section].keys if isinstance(key.takes, Form) and key.takes.moves}
+
+
+def _keyframes() -> Schema:
+    """Paths with what their keys take."""
+    found = {}
+    for section in ANIMATED:
+        name = "" if section == "environment" else r"\..+"
+        for key in moving(section).values():
+            frames = {"type": "object", "minProperties": 1, "additionalProperties": schema(key.takes)}
+            found[rf"^{section}{name}\.{key.name}$"] = {**frames, "description": key.doc}
+    return {"type": "object", "patternProperties": found, "additionalProperties": False}
+
+
+_KEYFRAMES = Form("mapping", "a mapping of paths", lambda value: isinstance(value.data, dict), _keyframes)
+SCENE = Table(
+    "a scene file",
+    (
+        Key("scene", version(1), "Version of the format.", required=True, example="scene: 1"),
+        Key("description", TEXT, "What the scene shows."),
+        Key("objects", Names(OBJECT), "Shapes and files, by name."),
+        Key("materials", Names(MATERIAL), "Surfaces, by name."),
+        Key(
+            "lights",
+            Names(LIGHT),
+            "Lights, by name; without any a directional key of 3 lux comes over the viewer's left shoulder.",
+        ),
+        Key("cameras", Names(CAMERA), "Cameras, by name, the first is the default; without any the scene is framed."),
+        Key("environment", ENVIRONMENT, "An equirectangular image around the scene."),
+        Key(
+            "keyframes",
+            _KEYFRAMES,
+            "Dotted path (`cameras.main.eye`) to seconds and values, linear between, held outside.",
+        ),
+        Key("orbit", ORBIT, "A camera that turns about its target."),
+    ),
+)
+"""What a scene file holds."""
+CODES = Codes(unknown="RG320", wrong="RG321", name="RG321", file="RG321")

@@ -6,16 +6,17 @@ All mistakes of a file are found before it stops, each with line, column and the
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.keys import Key, Walk, plain
 from rendergraph.scene import scene_build, scene_keys
 from rendergraph.scene.files import Reading
 from rendergraph.scene.geometry import rigid
-from rendergraph.scene.keys import Key
 from rendergraph.scene.meshes import MESHES, read_mesh
 from rendergraph.scene.model import (
     Camera,
@@ -29,7 +30,6 @@ from rendergraph.scene.model import (
     Scene,
     Texture,
 )
-from rendergraph.scene.scene_check import Checker
 from rendergraph.scene.shapes import SHAPES, Part, build
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
@@ -43,10 +43,10 @@ def read_scene(path: Path, reading: Reading) -> Scene:
         InputError: with every mistake of the file, or the first of a mesh file it names.
     """
     document = load(path, keep_going=True)
-    reader = _Reader(path, reading, list(document.problems))
+    reader = _Reader(path, reading, Walk(scene_keys.CODES, document.problems))
     scene = reader.read(document.root)
-    if reader.check.problems:
-        raise InputError(sorted(reader.check.problems, key=lambda problem: (problem.place is None, problem.place)))
+    if reader.walk.problems:
+        raise InputError(sorted(reader.walk.problems, key=lambda problem: (problem.place is None, problem.place)))
     return scene
 
 
@@ -78,39 +78,28 @@ class _Made:
 class _Reader:
     """Reads the sections in the order they refer to each other."""
 
-    def __init__(self, path: Path, reading: Reading, problems: list[Problem]) -> None:
-        self.path, self.reading = path, reading
-        self.check = Checker()
-        self.check.problems = problems
+    def __init__(self, path: Path, reading: Reading, walk: Walk) -> None:
+        self.path, self.reading, self.walk = path, reading, walk
         self.recipe: dict[tuple[str, str], dict[str, Any]] = {}
         self.made = _Made()
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used where no problem was found."""
-        if not isinstance(root.data, dict):
-            self.check.say(root, "RG321", f"a scene file is a mapping that starts with 'scene: 1', not {root.kind}")
+        names = {section: tuple(_entries(root, section)) for section in ("objects", "materials", "lights", "cameras")}
+        top = self.walk.root(root, scene_keys.SCENE, "`scene: 1` and `objects`")
+        if top is None:
             return Scene(self.path.stem)
-        top = self.check.values(root, scene_keys.TOP, "the scene", {})
-        sections = {
-            name: self.check.mapping(top[name], name) if name in top else {}
-            for name in ("objects", "materials", "lights", "cameras")
-        }
-        names = {name: tuple(entries) for name, entries in sections.items()}
-        for name, entry in sections["materials"].items():
+        for name, entry in _entries(top, "materials").items():
             self._material(name, entry)
-        for name, entry in sections["lights"].items():
+        for name, entry in _entries(top, "lights").items():
             self._light(name, entry)
-        for name, entry in sections["cameras"].items():
+        for name, entry in _entries(top, "cameras").items():
             self._camera(name, entry)
-        for name, entry in sections["objects"].items():
-            self._object(name, entry, names)
-        environment = self._environment(top["environment"]) if "environment" in top else None
-        keyframes = self._keyframes(top["keyframes"], names) if "keyframes" in top else {}
-        orbit = None
-        if "orbit" in top:
-            cameras = {"cameras": tuple(self.made.cameras)}
-            found = self.check.values(top["orbit"], scene_keys.ORBIT, "orbit", cameras)
-            orbit = Orbit(found.get("camera", ""), found.get("degrees_per_second", 30.0))
+        for name, entry in _entries(top, "objects").items():
+            self._object(name, entry, names["materials"])
+        environment = self._environment(top.get("environment"))
+        keyframes = self._keyframes(top, names)
+        orbit = self._orbit(top.get("orbit"))
         made = self.made
         return Scene(
             self.path.stem,
@@ -128,10 +117,17 @@ class _Reader:
             made.placements,
         )
 
+    def _is_named(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
+        """Whether what a key names is there."""
+        value = entry.get(key)
+        if value is not None and value.data is not None and str(value.data) not in known:
+            hint = suggestion(str(value.data), known) or f"; there are no {section}"
+            self.walk.say(value, "RG322", f"there is no {key} '{shown(value.data)}'{hint}")
+
     # Surfaces, lights, cameras ----------------------------------------------------------------------------------------
 
     def _material(self, name: str, entry: Value) -> None:
-        values = self.check.values(entry, scene_keys.MATERIAL, f"material '{shown(name)}'", {})
+        values = plain(entry, scene_keys.MATERIAL)
         textures = {}
         for key, _ in scene_keys.TEXTURES:
             if key in values:
@@ -157,29 +153,36 @@ class _Reader:
         for found in problem.problems:
             if found.place is None or found.place.file == str(self.path):
                 found = place.problem(found.code, found.text)
-            self.check.problems.append(found)
+            self.walk.problems.append(found)
 
     def _light(self, name: str, entry: Value) -> None:
-        values = self.check.values(entry, scene_keys.LIGHT, f"light '{shown(name)}'", {})
+        values = plain(entry, scene_keys.LIGHT)
         self.recipe["lights", name] = values
         if "type" in values:
             try:
                 self.made.lights.append(scene_build.light(name, values))
             except ValueError as problem:
-                self.check.say(entry, "RG321", f"light '{shown(name)}': {problem}", key=True)
+                self.walk.say(entry, "RG321", f"light '{shown(name)}': {problem}", key=True)
 
     def _camera(self, name: str, entry: Value) -> None:
-        values = self.check.values(entry, scene_keys.CAMERA, f"camera '{shown(name)}'", {})
+        values = plain(entry, scene_keys.CAMERA)
         self.recipe["cameras", name] = values
         try:
             self.made.cameras[name] = scene_build.camera(name, values)
         except ValueError as problem:
-            self.check.say(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
+            self.walk.say(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
             self.made.cameras[name] = scene_build.camera(name, {})
 
-    def _environment(self, entry: Value) -> Environment | None:
-        values = self.check.values(entry, scene_keys.ENVIRONMENT, "environment", {})
-        if "file" not in values:
+    def _orbit(self, entry: Value | None) -> Orbit | None:
+        if entry is None or entry.data is None:
+            return None
+        self._is_named(entry, "camera", self.made.cameras, "cameras")
+        values = plain(entry, scene_keys.ORBIT)
+        return Orbit(values.get("camera", ""), values.get("degrees_per_second", 30.0))
+
+    def _environment(self, entry: Value | None) -> Environment | None:
+        values = plain(entry, scene_keys.ENVIRONMENT) if entry is not None else {}
+        if entry is None or "file" not in values:
             return None
         image = self._image(entry, "file", values["file"])
         self.recipe["environment", ""] = values
@@ -189,26 +192,17 @@ class _Reader:
 
     # Objects ----------------------------------------------------------------------------------------------------------
 
-    def _object(self, name: str, entry: Value, names: dict[str, tuple[str, ...]]) -> None:
-        what = f"object '{shown(name)}'"
-        shape, file = entry.get("shape"), entry.get("file")
-        given = [value for value in (shape, file) if value is not None and value.data is not None]
-        if (entry.data is None or isinstance(entry.data, dict)) and len(given) != 1:
-            self.check.say(entry, "RG321", f"{what} needs either 'shape' or 'file'", key=True)
-        own: tuple[Key, ...] = ()
-        if shape is not None and shape.data in SHAPES:
-            own = SHAPES[str(shape.data)].keys
-        elif file is not None:
-            own = (scene_keys.OVERRIDES,)
-        elif shape is not None:  # the shape's own keys are not known: say no more than that
-            own = tuple({key.name: key for kind in SHAPES.values() for key in kind.keys}.values())
-        values = self.check.values(entry, (*scene_keys.OBJECT, *own), what, names)
-        self.recipe["objects", name] = {key.name: values[key.name] for key in scene_keys.OBJECT if key.name in values}
-        if len(given) == 1 and "shape" in values:
-            numbers = {key.name: values.get(key.name, key.default) for key in own}
+    def _object(self, name: str, entry: Value, materials: Sequence[str]) -> None:
+        self._is_named(entry, "material", materials, "materials")
+        values = plain(entry, scene_keys.OBJECT)
+        self.recipe["objects", name] = {
+            key.name: values[key.name] for key in scene_keys.OBJECT.keys if key.name in values
+        }
+        if "shape" in values:
+            numbers = {key.name: values.get(key.name, key.default) for key in SHAPES[values["shape"]].keys}
             self._shape(name, entry, numbers, values)
-        elif len(given) == 1 and "file" in values:
-            self._file(name, entry, values, names)
+        elif "file" in values:
+            self._file(name, entry, values, materials)
 
     def _material_index(self, name: str | None) -> int:
         made = self.made
@@ -251,7 +245,7 @@ class _Reader:
         made.placements[name] = Placement(tuple(placed))
         self._count_objects(entry)
 
-    def _file(self, name: str, entry: Value, values: dict[str, Any], names: dict[str, tuple[str, ...]]) -> None:
+    def _file(self, name: str, entry: Value, values: dict[str, Any], materials: Sequence[str]) -> None:
         place = entry.get("file")
         assert place is not None  # its value was just read
         try:
@@ -260,7 +254,7 @@ class _Reader:
             self._take(problem, place)
             return
         made, scene, world = self.made, found.scene, scene_build.placed(values)
-        overrides = self._overrides(values.get("overrides"), name, scene, names)
+        overrides = self._overrides(_entries(entry, "overrides"), name, scene, materials)
         objects, lights, cameras = [], [], []
         for part in scene.objects:
             changes = overrides.get(part.name, overrides.get(part.node, {}))
@@ -305,18 +299,17 @@ class _Reader:
         return made.files[path]
 
     def _overrides(
-        self, value: Value | None, name: str, scene: Scene, names: dict[str, tuple[str, ...]]
+        self, given: Mapping[str, Value], name: str, scene: Scene, materials: Sequence[str]
     ) -> dict[str, dict[str, Any]]:
         """Node or part name to what is changed."""
-        if value is None:
-            return {}
         known = dict.fromkeys(word for part in scene.objects for word in (part.node, part.name))
         result = {}
-        for node, entry in self.check.mapping(value, f"overrides of '{shown(name)}'").items():
+        for node, entry in given.items():
             if node not in known:
                 text = f"object '{shown(name)}': its file has no node '{shown(node)}'{suggestion(node, known)}"
-                self.check.say(entry, "RG322", text, key=True)
-            result[node] = self.check.values(entry, scene_keys.OVERRIDE, f"override '{shown(node)}'", names)
+                self.walk.say(entry, "RG322", text, key=True)
+            self._is_named(entry, "material", materials, "materials")
+            result[node] = plain(entry, scene_keys.OVERRIDE)
         return result
 
     def _count_objects(self, entry: Value) -> None:
@@ -328,29 +321,29 @@ class _Reader:
 
     # Keyframes --------------------------------------------------------------------------------------------------------
 
-    def _keyframes(self, section: Value, names: dict[str, tuple[str, ...]]) -> dict[str, tuple[tuple[float, Any], ...]]:
+    def _keyframes(self, top: Value, names: dict[str, tuple[str, ...]]) -> dict[str, tuple[tuple[float, Any], ...]]:
         result = {}
-        for path, entry in self.check.mapping(section, "keyframes").items():
-            key = self._named_key(path, entry, names)
+        for path, entry in _entries(top, "keyframes").items():
+            key = self._named_key(str(path), entry, names)
             if key is None:
                 continue
             if not isinstance(entry.data, dict) or not entry.data:
                 what = "empty" if entry.data == {} else entry.kind
-                self.check.say(
+                self.walk.say(
                     entry, "RG321", f"keyframes of '{shown(path)}' are {what}, not a mapping of seconds to values"
                 )
                 continue
             frames = []
             for time, value in entry.items():
                 if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-                    self.check.say(
+                    self.walk.say(
                         value, "RG321", f"keyframes of '{shown(path)}': '{shown(time)}' is no time in seconds", key=True
                     )
                     continue
-                found = self.check.value(value, key, f"keyframe {time:g} s", names)
-                if found is None and value.data is None:
-                    self.check.say(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")
-                frames.append((float(time), found))
+                if value.data is None:
+                    self.walk.say(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")
+                elif (good := self.walk.take(value, key)) is not None:
+                    frames.append((float(time), plain(good, key.takes)))
             result[path] = tuple(sorted(frames, key=lambda frame: frame[0]))
         return result
 
@@ -359,19 +352,23 @@ class _Reader:
         section, _, rest = path.partition(".")
         if section not in scene_keys.ANIMATED:
             hint = suggestion(section, scene_keys.ANIMATED)
-            self.check.say(entry, "RG322", f"keyframes name no section '{shown(section)}'{hint}", key=True)
+            self.walk.say(entry, "RG322", f"keyframes name no section '{shown(section)}'{hint}", key=True)
             return None
         name, word = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
         known = names.get(section, ())
         if section != "environment" and name not in known:
             hint = suggestion(name, known) or f"; there are no {section}"
-            self.check.say(entry, "RG322", f"keyframes: there is no '{shown(name)}' under {section}{hint}", key=True)
+            self.walk.say(entry, "RG322", f"keyframes: there is no '{shown(name)}' under {section}{hint}", key=True)
             return None
-        moving = {
-            key.name: key for key in scene_keys.ANIMATED[section] if key.kind in ("number", "vector", "color", "scale")
-        }
+        moving = scene_keys.moving(section)
         if word not in moving:
             text = f"keyframes: {section} have no moving key '{shown(word)}'{suggestion(word, moving)}"
-            self.check.say(entry, "RG322", text, key=True)
+            self.walk.say(entry, "RG322", text, key=True)
             return None
         return moving[word]
+
+
+def _entries(value: Value, section: str) -> dict[str, Value]:
+    """The entries of a section; none where it is not there."""
+    found = value.get(section)
+    return dict(found.items()) if found is not None else {}

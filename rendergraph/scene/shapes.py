@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.api.viewing import unit
+from rendergraph.keys import Key
+from rendergraph.keys.forms import number, vector, whole
 from rendergraph.scene.geometry import translation
-from rendergraph.scene.keys import Key, positive, whole
 from rendergraph.scene.model import Matrix, Mesh
 from rendergraph.scene.polygons import clip_ears
 
@@ -327,29 +328,30 @@ def sphere_grid(
 
 
 def _range(name: str, doc: str, default: tuple[float, float]) -> Key:
-    return Key(name, "vector", doc, default, low=0, high=1, size=2)
+    return Key(name, vector(2, 0, 1), doc, default)
 
 
-_SEGMENTS = whole("segments", "Sides around the axis.", 48, 3, 2048)
+LENGTH = number(0, above=True)
+_SEGMENTS = Key("segments", whole(3, 2048), "Sides around the axis.", 48)
 SHAPES: dict[str, Shape] = {
     "plane": Shape(
         "A horizontal rectangle facing +Y.",
         (
-            Key("size", "vector", "Extent along X and Z.", (1.0, 1.0), "m", low=0, above=True, size=2),
-            whole("segments", "Squares along each side.", 1, 1, 1024),
+            Key("size", vector(2, 0, above=True), "Extent along X and Z.", (1.0, 1.0), "m"),
+            Key("segments", whole(1, 1024), "Squares along each side.", 1),
         ),
         plane,
         lambda v: (v["segments"] + 1) ** 2,
     ),
     "box": Shape(
-        "A box.", (Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),), box
+        "A box.", (Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m"),), box
     ),
     "sphere": Shape(
         "A sphere of latitude and longitude.",
         (
-            positive("radius", "Radius.", 0.5),
+            Key("radius", LENGTH, "Radius.", 0.5, "m"),
             _SEGMENTS,
-            whole("rings", "Rows from pole to pole.", 24, 2, 1024),
+            Key("rings", whole(2, 1024), "Rows from pole to pole.", 24),
         ),
         sphere,
         lambda v: (v["segments"] + 1) * (v["rings"] + 1),
@@ -357,8 +359,8 @@ SHAPES: dict[str, Shape] = {
     "cylinder": Shape(
         "An upright cylinder with caps.",
         (
-            positive("radius", "Radius.", 0.5),
-            positive("height", "Extent along Y.", 1.0),
+            Key("radius", LENGTH, "Radius.", 0.5, "m"),
+            Key("height", LENGTH, "Extent along Y.", 1.0, "m"),
             _SEGMENTS,
         ),
         cylinder,
@@ -367,8 +369,8 @@ SHAPES: dict[str, Shape] = {
     "cone": Shape(
         "An upright cone with a base.",
         (
-            positive("radius", "Radius of the base.", 0.5),
-            positive("height", "Extent along Y.", 1.0),
+            Key("radius", LENGTH, "Radius of the base.", 0.5, "m"),
+            Key("height", LENGTH, "Extent along Y.", 1.0, "m"),
             _SEGMENTS,
         ),
         cone,
@@ -377,10 +379,10 @@ SHAPES: dict[str, Shape] = {
     "torus": Shape(
         "A ring around Y.",
         (
-            positive("radius", "From the centre to the middle of the tube.", 0.5),
-            positive("tube", "Radius of the tube.", 0.2),
+            Key("radius", LENGTH, "From the centre to the middle of the tube.", 0.5, "m"),
+            Key("tube", LENGTH, "Radius of the tube.", 0.2, "m"),
             _SEGMENTS,
-            whole("sides", "Sides around the tube.", 24, 3, 1024),
+            Key("sides", whole(3, 1024), "Sides around the tube.", 24),
         ),
         torus,
         lambda v: (v["segments"] + 1) * (v["sides"] + 1),
@@ -388,12 +390,12 @@ SHAPES: dict[str, Shape] = {
     "torus_knot": Shape(
         "A tube along a torus knot around Y.",
         (
-            positive("radius", "Radius of the torus the knot lies on.", 0.5),
-            positive("tube", "Radius of the tube.", 0.1),
-            whole("p", "Turns about the axis.", 2, 1, 32),
-            whole("q", "Turns through the hole.", 3, 1, 32),
-            whole("segments", "Segments along the knot.", 192, 3, 8192),
-            whole("sides", "Sides around the tube.", 24, 3, 1024),
+            Key("radius", LENGTH, "Radius of the torus the knot lies on.", 0.5, "m"),
+            Key("tube", LENGTH, "Radius of the tube.", 0.1, "m"),
+            Key("p", whole(1, 32), "Turns about the axis.", 2),
+            Key("q", whole(1, 32), "Turns through the hole.", 3),
+            Key("segments", whole(3, 8192), "Segments along the knot.", 192),
+            Key("sides", whole(3, 1024), "Sides around the tube.", 24),
         ),
         torus_knot,
         lambda v: (v["segments"] + 1) * (v["sides"] + 1),
@@ -401,8 +403,8 @@ SHAPES: dict[str, Shape] = {
     "stairs": Shape(
         "A solid flight of stairs that climbs towards -Z.",
         (
-            Key("size", "vector", "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m", low=0, above=True),
-            whole("steps", "Number of steps.", 5, 1, 200),
+            Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m"),
+            Key("steps", whole(1, 200), "Number of steps.", 5),
         ),
         stairs,
         lambda v: 12 * v["steps"],
@@ -410,14 +412,14 @@ SHAPES: dict[str, Shape] = {
     "sphere_grid": Shape(
         "Spheres in the XY plane, objects `name/column_row`: roughness to the right, metallic up.",
         (
-            positive("radius", "Radius of one sphere.", 0.4),
-            whole("columns", "Values of roughness.", 5, 1, 64),
-            whole("rows", "Values of metallic.", 5, 1, 64),
-            positive("spacing", "Between centres.", 1.0),
+            Key("radius", LENGTH, "Radius of one sphere.", 0.4, "m"),
+            Key("columns", whole(1, 64), "Values of roughness.", 5),
+            Key("rows", whole(1, 64), "Values of metallic.", 5),
+            Key("spacing", LENGTH, "Between centres.", 1.0, "m"),
             _range("roughness", "At the left and at the right.", (0.1, 1.0)),
             _range("metallic", "At the bottom and at the top.", (0.0, 1.0)),
             _SEGMENTS,
-            whole("rings", "Rows from pole to pole.", 24, 2, 1024),
+            Key("rings", whole(2, 1024), "Rows from pole to pole.", 24),
         ),
         sphere_grid,
         lambda v: (v["segments"] + 1) * (v["rings"] + 1),

@@ -351,9 +351,15 @@ def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.M
         ("[../fx]", "2:11: RG012 '../fx' lies outside"),
         ("[./none]", "2:11: RG011 there is no folder './none'"),
         ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file, a folder is needed"),
-        ("./fx", "2:10: RG106 'plugins' takes a list as in [./effects, some-package], this is text"),
+        (
+            "./fx",
+            "2:10: RG106 'plugins' takes a list of folders and packages, as in plugins: [./effects, some-package], this is './fx'",
+        ),
         ("[-rlist]", "2:11: RG131 '-rlist' is neither a folder of plugins nor a package's name"),
-        ("[3]", "2:11: RG106 'plugins' takes text, this is a number"),
+        (
+            "[3]",
+            "2:10: RG106 'plugins' takes a list of folders and packages, as in plugins: [./effects, some-package], this is [3]",
+        ),
         ("[/]", "2:11: RG012 '/' lies outside"),
     ],
 )

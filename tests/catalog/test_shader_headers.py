@@ -168,8 +168,14 @@ def headed(text: str) -> str:
         ("docs: x", ["2:1: RG440 a header has no key 'docs'; did you mean 'doc'?"]),
         ("- 1", ["2:1: RG440 a header is a mapping with doc, inputs, outputs, params, this is a list"]),
         ("doc: 3", ["2:6: RG440 'doc' takes text, this is 3"]),
-        ("inputs: [color]", ["2:9: RG440 'inputs' takes a mapping of names, this is a list"]),
-        ("inputs: {color: radiance}", ["2:17: RG440 'color' takes a mapping as in {doc: …}, this is text"]),
+        (
+            "inputs: [color]",
+            ["2:9: RG440 'inputs' takes a mapping, as in inputs: {color: {doc: …}}, this is ['color']"],
+        ),
+        (
+            "inputs: {color: radiance}",
+            ["2:17: RG440 'color' takes a mapping, as in inputs: {color: {doc: …}}, this is 'radiance'"],
+        ),
         (
             "inputs: {color: {filter: smooth}}",
             ["2:26: RG440 'filter' takes one of nearest, linear, trilinear, this is 'smooth'"],
@@ -269,7 +275,7 @@ def headed(text: str) -> str:
             "doc: 1\ninputs: 2\nparams: {strength: {min: x, uint: EV}}",
             [
                 "2:6: RG440 'doc' takes text, this is 1",
-                "3:9: RG440 'inputs' takes a mapping of names, this is a number",
+                "3:9: RG440 'inputs' takes a mapping, as in inputs: {color: {doc: …}}, this is 2",
                 "4:26: RG440 'min' takes a number, this is 'x'",
                 "4:29: RG440 a parameter has no key 'uint'; did you mean 'unit'?",
             ],
@@ -344,7 +350,7 @@ def test_wrong_compute_shaders(tmp_path: Path, text: str, message: str) -> None:
 def test_the_reference_lists_every_key() -> None:
     page = (Path(__file__).parents[2] / "docs" / "reference" / "shader-nodes.md").read_text(encoding="utf-8")
     parts = re.split(r"^### ", page.partition("## Where they are found")[0], flags=re.MULTILINE)
-    tables = [header.TOP_KEYS, header.INPUT_KEYS, header.OUTPUT_KEYS, header.PARAM_KEYS]
+    tables = [[key.name for key in keys] for _, keys in header.HEADER.sections()]
     for part, keys in zip(parts, tables, strict=True):
         text = part.partition("## The header")[2] or part
         firsts = re.findall(r"^\| (`[^|]*`) \|", text, re.MULTILINE)

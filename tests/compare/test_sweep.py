@@ -338,14 +338,14 @@ def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
         read_sweep(path)
     told = [f"{p.place.line if p.place else 0} {p.text}" for p in caught.value.problems]
     assert told == [
+        "1 'sweep' takes 1, the version of the format that this program reads, as in sweep: 1, this is 2",
         "2 a sweep has no key 'axis'; did you mean 'axes'?",
-        "1 a sweep begins with 'sweep: 1'",
-        "1 the sweep names no pipeline; add pipeline: NAME",
-        "4 axis 'a.b' takes a list of values, this is an empty list",
-        "4 axis 'c.d' takes a list of values, this is a number",
+        "3 'size' takes width and height in pixels, 1 to 16384, as in size: [1280, 720], this is [48]",
+        "4 'a.b' takes a list of values, as in axes: {NODE.PARAM: [VALUE, VALUE]}, this is []",
+        "4 'c.d' takes a list of values, as in axes: {NODE.PARAM: [VALUE, VALUE]}, this is 3",
+        "5 'frames' takes a whole number from 1 up, this is 0",
+        "1 a sweep needs 'pipeline'; add pipeline: NAME",
         "4 axis 'e.f' has the value 1 twice",
-        "3 'size' takes [WIDTH, HEIGHT], this is a list",
-        "5 'frames' takes a whole number from 1 up, this is a number",
     ]
 
 

@@ -11,11 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Source, Value, parse
+from rendergraph.document import Source, Value, from_plain, parse
 from rendergraph.errors import InputError, UsageError
 from rendergraph.read import read
 from rendergraph.resolve import PipelineSpec, diff, merge_patch, resolve
-from rendergraph.resolve.sets import from_plain
 
 FORWARD = """\
 rendergraph: 1

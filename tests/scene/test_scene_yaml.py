@@ -11,7 +11,6 @@ import pytest
 
 from rendergraph.errors import InputError
 from rendergraph.resources import shipped_scenes
-from rendergraph.scene import scene_keys
 from rendergraph.scene.files import Limits
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
@@ -134,27 +133,27 @@ def test_null_is_the_default(tmp_path: Path) -> None:
 
 
 WRONG = {
-    "objcts: {}": "2:1: RG320 the scene has no key 'objcts'; did you mean 'objects'?",
-    "objects: [1]": "2:10: RG321 the scene: 'objects' is [1], not a mapping",
-    "objects: {a: {shape: bx}}": "2:22: RG321 object 'a': there is no shape 'bx'; did you mean 'box'?",
+    "objcts: {}": "2:1: RG320 a scene file has no key 'objcts'; did you mean 'objects'?",
+    "objects: [1]": "2:10: RG321 'objects' takes a mapping, this is [1]",
+    "objects: {a: {shape: bx}}": "2:22: RG321 'shape' takes one of plane, box,",
     "objects: {a: {shape: box, radius: 1}}": "2:27: RG320 object 'a' has no key 'radius'",
     "objects: {a: {}}": "2:11: RG321 object 'a' needs either 'shape' or 'file'",
     "objects: {a: }": "2:11: RG321 object 'a' needs either 'shape' or 'file'",
     "objects: {a: {shape: box, file: a.glb}}": "2:11: RG321 object 'a' needs either",
     "objects: {a: {file: a.glb}}": "2:21: RG301 file 'a.glb' does not exist",
     "objects: {a: {file: a.yaml}}": "2:21: RG303 'a.yaml' is no mesh file",
-    "objects: {a: {shape: plane, size: [10, -1]}}": "2:35: RG321 object 'a': 'size' is [10, -1], not 2 numbers above 0",
-    "objects: {a: {shape: box, hidden: yes}}": "2:35: RG321 object 'a': 'hidden' is 'yes', not true or false",
-    "objects: {a: {shape: box, at: [0, .nan, 0]}}": "RG321 object 'a': 'at' is [0, nan, 0], not 3 numbers",
-    "objects: {a: {shape: box, at: [0, 1e300, 0]}}": "RG321 object 'a': 'at'",
-    "objects: {a: {shape: sphere, segments: 1.5}}": "is 1.5, not a whole number of at least 3 and at most 2048",
+    "objects: {a: {shape: plane, size: [10, -1]}}": "2:35: RG321 'size' takes 2 numbers above 0, this is [10, -1]",
+    "objects: {a: {shape: box, hidden: yes}}": "2:35: RG321 'hidden' takes true or false, this is 'yes'",
+    "objects: {a: {shape: box, at: [0, .nan, 0]}}": "RG321 'at' takes 3 numbers, this is [0, nan, 0]",
+    "objects: {a: {shape: box, at: [0, 1e300, 0]}}": "RG321 'at' takes 3 numbers, this is [0, 1e+300, 0]",
+    "objects: {a: {shape: sphere, segments: 1.5}}": "takes a whole number from 3 to 2048, this is 1.5",
     "objects: {a: {shape: box, material: red}}": "no material 'red'; there are no materials",
-    "materials: {m: {base_color: [1, 2, 0]}}": "not 3 or 4 numbers of at least 0 and at most 1",
-    "materials: {m: {alpha_mode: Mask}}": "2:29: RG321 material 'm': 'alpha_mode' is 'Mask', not one of opaque",
+    "materials: {m: {base_color: [1, 2, 0]}}": "takes 3 or 4 numbers from 0 to 1, this is [1, 2, 0]",
+    "materials: {m: {alpha_mode: Mask}}": "2:29: RG321 'alpha_mode' takes one of opaque, mask, blend, this is 'Mask'; did you mean 'mask'?",
     "materials: {m: {normal_texture: a.png}}": "2:33: RG350 image 'a.png' does not exist",
     "lights: {l: {intensity: 1}}": "2:10: RG321 light 'l' needs 'type'",
     "lights: {l: {type: spot, inner_degrees: 50}}": "'inner_degrees' (50) must be below 'outer_degrees' (45)",
-    "lights: {l: {type: point, range: 0}}": "'range' is 0, not a number above 0",
+    "lights: {l: {type: point, range: 0}}": "'range' takes a number above 0, this is 0",
     "lights: {l: {type: directional, direction: [0, 0, 0]}}": "light 'l': 'direction' has no length",
     "cameras: {c: {eye: [1, 1, 1], target: [1, 1, 1]}}": "2:11: RG321 camera 'c': eye and target coincide",
     "cameras: {c: {near: 5, far: 1}}": "'near' (5) must be below 'far' (1)",
@@ -163,11 +162,11 @@ WRONG = {
     "cameras: {c: {frustum: [1, 0, 0, 1]}}": "must be left < right",
     "environment: {}": "RG321 environment needs 'file'",
     "environment: {file: ../../sky.hdr}": "RG302",
-    "orbit: {camera: man}": "2:17: RG322 orbit: there is no camera 'man'; there are no cameras",
+    "orbit: {camera: man}": "2:17: RG322 there is no camera 'man'; there are no cameras",
     "keyframes: {cameras.m.eye: {0: [0, 0, 0]}}": "2:13: RG322 keyframes: there is no 'm' under cameras",
     "keyframes: {camera.m.eye: {0: 1}}": "keyframes name no section 'camera'; did you mean 'cameras'?",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eyes: {0: 1}}": "3:13: RG322 keyframes: cameras have no moving key 'eyes'",
-    "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {0: 1}}": "3:32: RG321 keyframe 0 s: 'eye' is 1, not 3 numbers",
+    "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {0: 1}}": "3:32: RG321 'eye' takes 3 numbers, this is 1",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {a: [1, 2, 3]}}": "'a' is no time in seconds",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {}}": "are empty, not a mapping of seconds to values",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {1: null}}": "keyframe 1 s of 'cameras.m.eye' has no value",
@@ -189,8 +188,8 @@ def test_mistake_has_its_place_and_a_way_out(tmp_path: Path, text: str) -> None:
     [
         ("", "a scene file is a mapping"),
         ("- 1", "a scene file is a mapping"),
-        ("objects: {}", "the scene needs 'scene'"),
-        ("scene: 2", "'scene' is 2, not one of 1"),
+        ("objects: {}", "a scene file needs 'scene'; add scene: 1"),
+        ("scene: 2", "'scene' takes 1, the version of the format that this program reads, this is 2"),
         ("scene: 1\na: [", "RG0"),
     ],
 )
@@ -227,12 +226,6 @@ def test_check_path_is_asked_for_every_file(folder: Path) -> None:
 
     read(folder, EXAMPLE.replace("Mesh:", "node_1:"), check_path=check)
     assert set(asked) == {"helmet.glb", "brick.png", "sky.hdr"}
-
-
-@pytest.mark.parametrize("section", sorted(scene_keys.keys()))
-def test_every_key_is_documented(section: str) -> None:
-    for key in scene_keys.keys()[section]:
-        assert key.doc.endswith((".", ")")), key.name
 
 
 @pytest.mark.parametrize("name", sorted(shipped_scenes()))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rendergraph.api.viewing import unit
+from rendergraph.document import Source, from_plain
+from rendergraph.keys import Form
 from rendergraph.scene.geometry import face_normals
 from rendergraph.scene.model import Mesh
 from rendergraph.scene.shapes import SHAPES, build, mesh
@@ -107,5 +109,6 @@ def test_estimate_of_vertices_is_no_less_than_half(shape: str) -> None:
 def test_every_key_has_a_doc_and_a_legal_default(shape: str) -> None:
     for key in SHAPES[shape].keys:
         assert key.doc.endswith(".")
-        values = key.default if isinstance(key.default, tuple) else (key.default,)
-        assert all(key.low <= value <= key.high for value in values)
+        default = list(key.default) if isinstance(key.default, tuple) else key.default
+        assert isinstance(key.takes, Form)
+        assert key.takes.fits(from_plain(default, Source("here")))
