@@ -189,7 +189,7 @@ def test_mistake_has_its_place_and_a_way_out(tmp_path: Path, text: str) -> None:
         ("", "a scene file is a mapping"),
         ("- 1", "a scene file is a mapping"),
         ("objects: {}", "a scene file needs 'scene'; add scene: 1"),
-        ("scene: 2", "'scene' takes 1, the version of the format that this program reads, this is 2"),
+        ("scene: 2", "'scene' takes 1, the version of the format that this program reads, as in scene: 1, this is 2"),
         ("scene: 1\na: [", "RG0"),
     ],
 )
