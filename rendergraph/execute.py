@@ -92,11 +92,11 @@ class FrameContext:
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
-        return bool(self.node.inputs.get(own_port(self.node.node, port, "connected's argument").name))
+        return bool(self.node.inputs.get(own_port(self.node.node.ports(), port, "connected's argument").name))
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
-        if not isinstance(own_port(self.node.node, port, "set_views"), Views):
+        if not isinstance(own_port(self.node.node.ports(), port, "set_views"), Views):
             raise Misuse(f"set_views is given '{port.name}', which is no Views port", "RG433")
         for view in views:
             if not isinstance(view, ViewMatrices):
@@ -105,7 +105,7 @@ class FrameContext:
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload into a declared buffer."""
-        buffer_of(own_port(self.node.node, port, "write"), "write")
+        buffer_of(own_port(self.node.node.ports(), port, "write"), "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline

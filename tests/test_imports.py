@@ -16,7 +16,6 @@ FILES = {
     if "templates" not in file.parts
 }
 TODAY = (  # where circles still are
-    ("rendergraph.declare", "rendergraph.steps"),
     ("rendergraph.expand.ending", "rendergraph.expand.numbering"),
     ("rendergraph.gl.device", "rendergraph.gl.surroundings"),
     ("rendergraph.session.pipeline", "rendergraph.session.session"),

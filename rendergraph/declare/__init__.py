@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from rendergraph.declare.extension import READ_IMAGES, Extension, MeshData, extension_mistakes
 from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source
-from rendergraph.declare.facts import Facts, LightFacts, TextureInfo
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter, define, param, structural
-from rendergraph.declare.ports import (
+from rendergraph.facts import Facts, LightFacts, TextureInfo
+from rendergraph.ports import (
     PORT_TYPES,
     Function,
     History,

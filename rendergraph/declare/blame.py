@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 from rendergraph.declare.node import Node
-from rendergraph.errors import Mistake, Misuse, Place, nearest, shown_file, suggestion
+from rendergraph.errors import Mistake, Misuse, Place, is_framework, nearest, shown_file, suggestion
 
 
 def raised_at(error: BaseException, *own: Path | str) -> Place | None:
@@ -135,8 +135,3 @@ def causes(error: BaseException) -> Iterator[BaseException]:
     while found is not None:
         yield found
         found = found.__cause__
-
-
-def is_framework(module: str) -> bool:
-    """Whether a module is the framework's; the standard nodes are authors like anybody."""
-    return module == "rendergraph" or (module.startswith("rendergraph.") and not module.startswith("rendergraph.nodes"))

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
-from rendergraph.declare.ports import History, Internal
 from rendergraph.errors import Mistake
+from rendergraph.ports import History, Internal
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 
 from rendergraph.declare.parameters import Parameter
-from rendergraph.declare.ports import PORT_TYPES, Function, InOut, Input, Output, Port, Views
-
-if TYPE_CHECKING:
-    from rendergraph.steps import Frame, Steps
+from rendergraph.ports import PORT_TYPES, Function, InOut, Input, Output, Port, Views
+from rendergraph.steps import Frame, Steps
 
 
 @cache

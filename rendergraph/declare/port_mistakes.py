@@ -7,8 +7,8 @@ from math import inf
 from typing import Any, get_args
 
 from rendergraph.declare.node import Node
-from rendergraph.declare.ports import Function, History, InOut, Input, Internal, Made, Output, Part, Port, Views
 from rendergraph.errors import Mistake, suggestion
+from rendergraph.ports import Function, History, InOut, Input, Internal, Made, Output, Part, Port, Views
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, Filter, Kind, Semantic, Signature, Wrap
 
 

@@ -167,6 +167,11 @@ def shown_file(file: str | Path) -> str:
         return str(file)
 
 
+def is_framework(module: str) -> bool:
+    """Whether a module is the framework's; the standard nodes are authors like anybody."""
+    return module == "rendergraph" or (module.startswith("rendergraph.") and not module.startswith("rendergraph.nodes"))
+
+
 def nearest(word: str, words: Iterable[str]) -> str | None:
     """The word a user most likely meant, or None.
 

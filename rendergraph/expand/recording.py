@@ -178,7 +178,7 @@ def _recorded(
             _pass_on(node, used, demanded)
             continue
         recorder = Recorder(graph, node, used)
-        steps = Steps(node.node, name, node.type.name, recorder)
+        steps = Steps(node.node.ports(), name, node.type.name, recorder)
         try:
             _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # a stranger's may
         except InputError:

@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from rendergraph.declare import Made, Node, Part, Port
 from rendergraph.errors import Misuse, nearest, suggestion
+from rendergraph.ports import Made, Part, Port
 from rendergraph.steps.model import UniformValue
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -25,13 +25,17 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def own_port(node: Node, value: object, what: str) -> Port:
+def own_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
     """A port that the node itself declares.
+
+    Args:
+        ports: those that it declares, by name.
+        value: what its author gives.
+        what: what that is given as, for messages.
 
     Raises:
         Misuse: it is something else, or the port of another class.
     """
-    ports = node.ports()
     if isinstance(value, Part):
         value = value.port
     if not isinstance(value, Port):
@@ -48,9 +52,9 @@ def own_port(node: Node, value: object, what: str) -> Port:
     return value
 
 
-def part_of(node: Node, value: object, what: str) -> Part:
+def part_of(ports: Mapping[str, Port], value: object, what: str) -> Part:
     """A port of the node, or a part of one."""
-    port = own_port(node, value, what)
+    port = own_port(ports, value, what)
     part = value if isinstance(value, Part) else Part(port)
     for name, number in (("mip", part.mip), ("layer", part.layer)):
         if number is not None and (isinstance(number, bool) or not isinstance(number, int) or number < 0):
@@ -70,10 +74,10 @@ def within(part: Part, desc: TextureDesc | BufferDesc) -> None:
             raise Misuse(f"'{part.port.name}' has no {name} {number}; it has {last}")
 
 
-def targets(node: Node, out: object) -> dict[str, Part]:
+def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
     """What `out` names: the shader's name to what is written."""
     if isinstance(out, Port | Part):
-        part = part_of(node, out, "out")
+        part = part_of(ports, out, "out")
         found = {part.port.name: part}
     elif isinstance(out, Mapping):
         if not out:
@@ -81,9 +85,9 @@ def targets(node: Node, out: object) -> dict[str, Part]:
         for name in out:
             if not isinstance(name, str) or not name.isidentifier():
                 raise Misuse(f"out has the key {shown(name)}; the keys are the shader's names")
-        found = {name: part_of(node, value, f"out[{name!r}]") for name, value in out.items()}
+        found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in out.items()}
     else:
-        part_of(node, out, "out")  # says what it is instead
+        part_of(ports, out, "out")  # says what it is instead
         raise AssertionError
     for name, part in found.items():
         if not isinstance(part.port, Made):
@@ -189,7 +193,7 @@ def objects(value: object) -> str | tuple[str, ...]:
     return tuple(value)
 
 
-def attributes(node: Node, value: object) -> dict[str, Port]:
+def attributes(ports: Mapping[str, Port], value: object) -> dict[str, Port]:
     """Layouts of a draw step's buffers: `3f 2f in_position in_uv` to the buffer's port."""
     if value is None:
         return {}
@@ -207,7 +211,7 @@ def attributes(node: Node, value: object) -> dict[str, Port]:
             raise Misuse(f"attributes has the layout {shown(layout)}; {example}")
         if wanted != len(names):
             raise Misuse(f"attributes has the layout {shown(layout)}: {wanted} formats, {len(names)} names; {example}")
-        found[layout] = buffer(own_port(node, port, f"attributes[{layout!r}]"), f"attributes[{layout!r}]")
+        found[layout] = buffer(own_port(ports, port, f"attributes[{layout!r}]"), f"attributes[{layout!r}]")
     return found
 
 

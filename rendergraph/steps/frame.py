@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rendergraph.declare import Port, Views
+from rendergraph.ports import Port, Views
 
 if TYPE_CHECKING:
     import numpy as np

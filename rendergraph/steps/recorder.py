@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, TypeAlias
 
-from rendergraph.declare import Facts, InOut, Input, LightFacts, Node, Output, Part, Port, Views
-from rendergraph.declare.blame import is_framework
-from rendergraph.errors import Misuse
+from rendergraph.errors import Misuse, is_framework
+from rendergraph.facts import Facts, LightFacts
+from rendergraph.ports import InOut, Input, Output, Part, Port, Views
 from rendergraph.steps import checks
 from rendergraph.steps.model import DRAW_ORDERS, MATERIAL_LEVELS, TOPOLOGIES, UniformValue
 from rendergraph.steps.state import State
@@ -70,8 +70,8 @@ class Steps:
     that is used. A texture with a depth format is attached as depth.
     """
 
-    def __init__(self, node: Node, node_id: str, type_name: str, recorder: Recorder) -> None:
-        self.node = node
+    def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
+        self.ports = ports
         self.node_id = node_id
         self.type_name = type_name
         self._recorder = recorder
@@ -90,11 +90,11 @@ class Steps:
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
-        return self.facts.connected(checks.own_port(self.node, port, "connected's argument").name)
+        return self.facts.connected(checks.own_port(self.ports, port, "connected's argument").name)
 
     def used(self, port: Port) -> bool:
         """Whether anybody reads an output; one that nobody reads need not be written."""
-        return self._recorder.used(checks.own_port(self.node, port, "used's argument"))
+        return self._recorder.used(checks.own_port(self.ports, port, "used's argument"))
 
     def needs(self, parameter: str) -> tuple[str, ...]:
         """What the choice of a parameter says that it needs, where choices are includes."""
@@ -106,7 +106,7 @@ class Steps:
         Raises:
             Misuse: it is no port of this node, holds no texture, or is an input that is not connected.
         """
-        own = checks.own_port(self.node, port, "desc's argument")
+        own = checks.own_port(self.ports, port, "desc's argument")
         found = self._desc(own)
         if found is None:
             raise checks.unconnected(own)
@@ -223,11 +223,11 @@ class Steps:
         checks.choice("topology", topology, TOPOLOGIES)
         checks.whole("instances", instances)
         if isinstance(vertices, Port):
-            checks.buffer(checks.own_port(self.node, vertices, "vertices"), "vertices")
+            checks.buffer(checks.own_port(self.ports, vertices, "vertices"), "vertices")
             self._connected(vertices)
         else:
             checks.whole("vertices", vertices)
-        held = checks.attributes(self.node, attributes)
+        held = checks.attributes(self.ports, attributes)
         for port in held.values():
             self._connected(port)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
@@ -273,7 +273,7 @@ class Steps:
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
         """Fill a texture with one value in every channel, or one a channel; a buffer with 0."""
-        part = checks.part_of(self.node, out, "out")
+        part = checks.part_of(self.ports, out, "out")
         numbers = checks.uniform("value", value)
         if not isinstance(numbers, int | float) and len(numbers) > 4:
             raise Misuse(f"value has {len(numbers)} numbers; a texel has up to 4 channels")
@@ -283,7 +283,7 @@ class Steps:
 
     def mipmaps(self, out: Port) -> None:
         """Make mips 1 and up from mip 0 by 2×2 averages."""
-        port = checks.own_port(self.node, out, "out")
+        port = checks.own_port(self.ports, out, "out")
         if isinstance(out, Part):
             raise Misuse(f"out is a part of '{port.name}'; mips are made of a whole texture")
         desc = self._desc(port)
@@ -303,11 +303,11 @@ class Steps:
         if out is None:
             targets = {
                 name: Part(port)
-                for name, port in self.node.ports().items()
+                for name, port in self.ports.items()
                 if isinstance(port, Output | InOut) and self._recorder.used(port)
             }
         else:
-            targets = checks.targets(self.node, out)
+            targets = checks.targets(self.ports, out)
         textures, uniforms = self._bindings(bindings)
         for part in (*targets.values(), *(value for value in textures.values() if isinstance(value, Part))):
             if part.mip is not None or part.layer is not None:
@@ -343,10 +343,10 @@ class Steps:
             if not isinstance(value, Port | Part):
                 uniforms[name] = checks.uniform(name, value)
                 continue
-            port = checks.own_port(self.node, value, name)
+            port = checks.own_port(self.ports, value, name)
             if isinstance(port, Views):
                 raise Misuse(f"{name} is the view table '{port.name}'; give it as `view=` to a step that draws")
-            textures[name] = checks.part_of(self.node, value, name) if isinstance(value, Part) else port
+            textures[name] = checks.part_of(self.ports, value, name) if isinstance(value, Part) else port
         return textures, uniforms
 
     def _check_options(self, options: Mapping[str, Any]) -> None:
@@ -355,7 +355,7 @@ class Steps:
         if not isinstance(state, State):
             raise Misuse(f"state is {checks.shown(state)}, not a State(…)")
         if options.get("view") is not None:
-            port = checks.own_port(self.node, options["view"], "view")
+            port = checks.own_port(self.ports, options["view"], "view")
             if not isinstance(port, Views | Input):
                 raise Misuse(f"view is {checks.shown(port)}; it is a Views port or an input that carries views")
         if options.get("view_index") is not None:
@@ -368,7 +368,7 @@ class Steps:
         if over is not None and not isinstance(over, Port | Part | str):
             return checks.counts("over", over)
         if over is not None:
-            part = checks.part_of(self.node, over, "over")
+            part = checks.part_of(self.ports, over, "over")
             desc = self._desc(part.port)
             if isinstance(desc, BufferDesc):
                 raise Misuse(f"over is the buffer '{part.port.name}'; say how many invocations, as in over=256")
@@ -386,7 +386,7 @@ class Steps:
 
     def _reads(self, named: Mapping[str, Target]) -> Iterator[Part]:
         """What a step reads, every input where it names none."""
-        for target in named.values() or self.node.inputs().values():
+        for target in named.values() or (port for port in self.ports.values() if isinstance(port, Input | InOut)):
             part = target if isinstance(target, Part) else Part(target)
             if getattr(part.port, "kind", "function") not in ("view", "function"):
                 yield part

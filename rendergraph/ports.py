@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
-from rendergraph.declare.facts import Facts
 from rendergraph.errors import Misuse, suggestion
+from rendergraph.facts import Facts
 from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wrap
 
 T = TypeVar("T")
