@@ -120,7 +120,7 @@ def check_outputs(step: Step, program: Program, outputs: Sequence[str]) -> None:
     written = outputs_of(program) - {"gl_FragDepth", "gl_SampleMask"}
     shader = dict(step.shaders).get("fragment", "the step")
     problems = [
-        step.problem("RG437", f"{shader} writes no output '{name}'{suggestion(name, written - set(outputs))}")
+        step.problem("RG437", f"{shader} writes no output '{name}'{suggestion(name, written - set(outputs))}", name)
         for name in outputs
         if name not in written
     ]

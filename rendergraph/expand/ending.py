@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rendergraph.declare import Made
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, Mistake, Problem
 from rendergraph.link import Endpoint
 from rendergraph.steps import Read, Resource, Role, Step, Write
 
@@ -26,7 +26,7 @@ def wanted_resources(numbering: Numbering) -> dict[str, str]:
         if end not in numbering.at_end or end.node in numbering.idle:
             reason = numbering.idle.get(end.node, "it makes no texture")
             text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
-            raise InputError(Problem("RG204", text, numbering.graph[end.node].place))
+            raise InputError(Problem("RG204", text, numbering.graph[end.node].place, mistake=Mistake(str(end), text)))
         resource, version = numbering.at_end[end]
         last = version == numbering.version[resource]
         wanted[name] = resource if last else _keep(numbering, name, end, resource, version)
