@@ -88,15 +88,19 @@ class Bench:
             head += "scene: scene.yaml\n"
         (self.folder / "test.yaml").write_text(head + text)
         loaded = rg.load(self.folder / "test.yaml")
-        return replace(loaded, known_catalog=Catalog.of(*classes, shaders=self.folder))
+        return replace(loaded, catalog=Catalog.of(*classes, shaders=self.folder))
 
     def draw(self, text: str, *classes: type[Node], **options: Any) -> rg.Frame:
-        """Draw it; options of `pipeline` and of `Session.render` mixed."""
+        """Draw it, and give the last frame; options of `pipeline` and of `Session.render` mixed."""
+        return self.frames(text, *classes, **options)[-1]
+
+    def frames(self, text: str, *classes: type[Node], **options: Any) -> list[rg.Frame]:
+        """Draw it, and give every frame."""
         own = {key: options.pop(key) for key in ("shaders", "scene", "size") if key in options}
-        frame = self.session.render(self.pipeline(text, *classes, **own), **options)
-        with self.session.device.current():
+        frames = list(self.session.frames(self.pipeline(text, *classes, **own), **options))
+        with self.session.current():
             assert self.session.device.raw.error() is None
-        return frame
+        return frames
 
 
 @pytest.fixture

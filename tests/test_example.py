@@ -27,7 +27,7 @@ def test_an_example_runs_and_uses_the_node(gl: Any, tmp_path: Path, name: str) -
     file.write_text(shown(name, Catalog.discover()), encoding="utf-8")
     pipeline = rg.load(file, scene="glass", size=(48, 27))  # it has surfaces of every kind
     frame = gl.render(pipeline, warm_up=False)
-    assert [node.id for node in pipeline.graph.nodes if node.type.name == name and node.id not in frame.culled]
+    assert [node.id for node in pipeline.link().graph.nodes if node.type.name == name and node.id not in frame.culled]
 
 
 # --- types that no shipped pipeline uses -----------------------------------------------------------------------------

@@ -118,7 +118,7 @@ def _pair(studio: Studio, stem: str, after: View, before: View | None) -> list[s
 def _figure(studio: Studio, view: View, name: str, scene: str) -> str:
     if studio.draw(view.pipeline.with_scene(scene), f"nodes/{name}.png", view.tap) is None:
         return ""
-    where = "the file below" if view.pipeline.patches else f"`{view.pipeline.name}`"
+    where = "the file below" if view.pipeline.selection.patches else f"`{view.pipeline.resolve().spec.name}`"
     caption = f"{'before: ' if name.endswith('-before') else ''}`{view.name}` of {where}, scene `{scene}`"
     return f"```{{figure}} {name}.png\n:alt: {caption.replace('`', '')}\n\n{caption}\n```"
 

@@ -123,7 +123,7 @@ def exhibit(found: NodeType, port: str) -> tuple[View, View | None] | None:
     """
     needs = getattr(found.cls.outputs()[port], "needs", ())
     for pipeline in [*_studies(), *(pipeline for pipeline, _ in example_and_base(found))]:
-        for node in pipeline.graph.nodes:
+        for node in pipeline.link().graph.nodes:
             if node.type.name == found.name and all(name in node.inputs for name in needs):
                 tap, before = f"{node.id}.{port}", _changed(pipeline, node, port)
                 try:
@@ -148,12 +148,12 @@ def example_and_base(found: NodeType) -> list[tuple[rg.Pipeline, rg.Pipeline]]:
 def _studies() -> list[rg.Pipeline]:
     """Every shipped pipeline with a scene that shows something, the smallest first."""
     pipelines = [rg.load(file.stem).with_scene(SCENES[0]) for file in shipped()]
-    return sorted(pipelines, key=lambda pipeline: len(pipeline.graph.nodes))
+    return sorted(pipelines, key=lambda pipeline: len(pipeline.link().graph.nodes))
 
 
 def _changed(pipeline: rg.Pipeline, node: GraphNode, port: str) -> str | None:
     """The texture that an output is a changed version of: one of the same meaning, kind and size."""
-    textures = pipeline.graph.textures
+    textures = pipeline.link().graph.textures
     made = textures.get(Endpoint(node.id, port))
     for ends in node.inputs.values():
         read = textures.get(ends[0])

@@ -55,7 +55,7 @@ def _svg(pipeline: rg.Pipeline) -> str:
     from rendergraph.views import svg
 
     # A blank line would end the block of raw HTML.
-    return re.sub(r"\n\s*\n", "\n", svg(pipeline.graph).strip())
+    return re.sub(r"\n\s*\n", "\n", svg(pipeline.link().graph).strip())
 
 
 def _comment(text: str) -> str:

@@ -18,13 +18,17 @@ from rendergraph.compile.executable import Draw
 from rendergraph.declare import Node
 from rendergraph.declare.blame import causes, declared_by, declared_in, raised_at
 from rendergraph.errors import InputError, Mistake, Place, Problem, RendergraphError, shown_file
-from rendergraph.execute import Runner
+from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
 from rendergraph.gl.textures import Clear
 from rendergraph.program import prefix
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.session import Pipeline, Session, load
+from rendergraph.session import RenderOptions, Selection, stages
+from rendergraph.session.drawing import Drawing
+from rendergraph.session.gpu import Gpu
+from rendergraph.session.scenes import scene_of
+from rendergraph.session.values import Expanded, Resolved
 from rendergraph.steps import Step
 from rendergraph.textures import FORMATS, BufferDesc
 
@@ -70,8 +74,8 @@ class Trial:
         self.device: Device = open_device()
         let_go(self.device)
         self._before = living(self.device, _MOST_NAMES)
-        self.session = Session(ctx=self.device.ctx)
-        cls = watched(self.type.cls, self.session.device, self._state)
+        self.gpu = Gpu(ctx=self.device.ctx)
+        cls = watched(self.type.cls, self.gpu.device, self._state)
         self.around = Surrounded(replace(self.type, cls=cls), self.folder)
         self._fed: dict[str, npt.NDArray[Any]] = {}
         self._fills_buffers = self.type.cls.update is not Node.update  # perhaps once and for all
@@ -108,10 +112,9 @@ class Trial:
             InputError: it is missing or wrong.
         """
         try:
-            pipeline = self._pipeline(Variant("", outputs=tuple(self.type.cls.outputs())))
-            if pipeline.spec.problems:
-                raise InputError(pipeline.spec.problems)  # of a file that is ours but for the scene's name
-            _ = pipeline.scene
+            resolved = self._resolved(Variant("", outputs=tuple(self.type.cls.outputs())))
+            resolved.spec.check()  # of a file that is ours but for the scene's name
+            scene_of(resolved)
         except InputError as error:
             raise InputError([self._own(problem, None) for problem in error.problems]) from None
 
@@ -121,7 +124,7 @@ class Trial:
         Returns:
             All problems, each once, with the variants it was met in where it was not met in all.
         """
-        self.session.close()
+        self.gpu.close()
         let_go(self.device)
         left = {
             kind: count - self._before[kind]
@@ -156,26 +159,29 @@ class Trial:
     # Running ----------------------------------------------------------------------------------------------------------
 
     def _run(self, variant: Variant) -> None:
-        with self.session.device.current():
+        with self.gpu.current():
             if not self._fed and self.around.fed:
-                alone = self._pipeline(Variant(""))
-                self._fed = self._draw(alone, self.session.prepare(alone, alias=False), 0)
-            pipeline = self._pipeline(variant)  # read only now: both are the same file
-            if variant.end and _is_large(pipeline):
+                self._fed = self._draw(stages.compile(self._expanded(Variant("")), self.gpu), 0)
+            expanded = self._expanded(variant)  # read only now: both are the same file
+            if variant.end and _is_large(expanded.expansion):
                 self.tried.pop()
                 return
-            runner = self.session.prepare(pipeline, alias=False)
-            steps = [c for c in runner.executable.steps[0] if self._is_own(c.step)]
+            drawing = stages.compile(expanded, self.gpu)
+            steps = [c for c in drawing.executable.steps[0] if self._is_own(c.step)]
             for compiled in steps:
                 for draw in compiled.all_draws:
                     self._interface(compiled.step, draw)
                 self._note_files(compiled.step)
-            drawn = [self._draw(pipeline, runner, number) for number in (0, 1)]
+            drawn = [self._draw(drawing, number) for number in (0, 1)]
         self._compare(variant, *drawn)
 
-    def _pipeline(self, variant: Variant) -> Pipeline:
+    def _resolved(self, variant: Variant) -> Resolved:
         file = self.around.write(variant, self.scene)
-        return replace(load(file, asset_roots=[Path(self.scene).parent]), known_catalog=self.around.catalog())
+        selection = Selection(str(file), asset_roots=(Path(self.scene).parent,))
+        return stages.resolve(selection, self.around.catalog())
+
+    def _expanded(self, variant: Variant) -> Expanded:
+        return stages.expand(stages.link(self._resolved(variant)), RenderOptions(alias=False))
 
     def _note_files(self, step: Step) -> None:
         names = [name for _, name in step.shaders] if step.node == self.type.name else []
@@ -185,10 +191,10 @@ class Trial:
     def _is_own(self, step: Step) -> bool:
         return step.node == self.type.name or any(f.node == self.type.name for f in step.functions)
 
-    def _draw(self, pipeline: Pipeline, runner: Runner, number: int) -> dict[str, npt.NDArray[Any]]:
+    def _draw(self, drawing: Drawing, number: int) -> dict[str, npt.NDArray[Any]]:
         """All outputs, after every texture was filled with a poison."""
-        executable = runner.executable
-        plan, memory, device = executable.plan, executable.memory, self.session.device
+        linked, runner, executable = drawing.expanded.linked, drawing.runner, drawing.executable
+        plan, memory, device = executable.plan, executable.memory, self.gpu.device
         for name, resource in plan.resources.items():
             if name not in plan.placement:
                 continue
@@ -201,8 +207,8 @@ class Trial:
                 for parity in range(memory.parities):
                     Clear(device, memory.texture(name, parity), value)()
         runner.reset()
-        scene = pipeline.scene
-        camera = view_matrices(next(iter(scene.cameras.values())), pipeline.graph.size)
+        scene = linked.scene
+        camera = view_matrices(next(iter(scene.cameras.values())), linked.graph.size)
         for frame in range(1, FRAMES + 1):
             runner.run(frame, (frame - 1) / 30, 1 / 30, scene, camera)
         runner.check()
@@ -275,9 +281,8 @@ class Trial:
         return replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
 
 
-def _is_large(pipeline: Pipeline) -> bool:
+def _is_large(made: Expansion) -> bool:
     """Whether an end of a range makes more than a check should wait for."""
-    made = pipeline.expansion()
     return len(made.steps) > _MOST_STEPS or sum(one.bytes for one in made.resources.values()) > _MOST_BYTES
 
 

@@ -9,7 +9,7 @@ from rendergraph.cli.output import emit, emit_json, megabytes, say, table, warn
 from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
-    from rendergraph.session import Frame
+    from rendergraph.session import Frame, Selection
 
 
 @click.command("bench", no_args_is_help=True)
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
 @options.json_option
 @options.device_option
-def command(frames: int, fps: float, no_alias: bool, as_json: bool, device: int | None, **selection: Any) -> None:
+def command(selection: Selection, frames: int, fps: float, no_alias: bool, as_json: bool, device: int | None) -> None:
     """Time each pass.
 
     Renders frames and prints the median time of each pass, with its spread. All of the pipeline's outputs are
@@ -30,8 +30,14 @@ def command(frames: int, fps: float, no_alias: bool, as_json: bool, device: int 
       rendergraph bench forward --frames 5 --size 320x180
       rendergraph bench forward --frames 5 --size 320x180 --json
     """
-    pipeline = options.load(**selection)
-    frame = pipeline.render(frames=range(1, frames + 1), fps=fps, alias=not no_alias, device=device)
+    from rendergraph.session import RenderOptions, stages
+    from rendergraph.session.gpu import Gpu
+
+    linked = stages.link(stages.resolve(selection))
+    warn(linked.warnings)
+    expanded = stages.expand(linked, RenderOptions(range(1, frames + 1), fps, alias=not no_alias))
+    with Gpu(device) as gpu:
+        frame = stages.draw_last(expanded, gpu)
     warn(frame.warnings)
     report = measured(frame)
     emit_json(report) if as_json else emit(_text(report))

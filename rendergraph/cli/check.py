@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
 from rendergraph.cli.output import amount, emit_json, say, warn
 from rendergraph.cli.words import click
 
+if TYPE_CHECKING:
+    from rendergraph.session import Selection
+
 
 @click.command("check", no_args_is_help=True)
 @options.pipeline_options
 @options.json_option
-def command(as_json: bool, **selection: Any) -> None:
+def command(selection: Selection, as_json: bool) -> None:
     """Find every mistake, without a GPU.
 
     Looks at the pipeline, everything it refers to, its scene and the options; given a sweep's file, at every run. Exits
@@ -26,25 +30,25 @@ def command(as_json: bool, **selection: Any) -> None:
     """
     from rendergraph.compare.axes import is_sweep
     from rendergraph.schema import outdated
+    from rendergraph.session import stages
     from rendergraph.settings import Roots
 
-    if is_sweep(Path(selection["pipeline"])):
+    if is_sweep(Path(selection.source)):
         from rendergraph.cli.sweep import check_file
 
-        file = selection.pop("pipeline")
-        runs, warnings = check_file(Path(file), selection)
+        file = selection.source
+        runs, warnings = check_file(Path(file), lambda name: replace(selection, source=name))
         warn(warnings)
         say(f"{file}: a sweep of {amount(runs, 'run')}")
         if as_json:
             emit_json({"sweep": file, "runs": runs, "warnings": [problem.as_json() for problem in warnings]})
         return
-    pipeline = options.load(**selection)
-    graph = pipeline.check()
-    said = {str(problem) for problem in pipeline.warnings}
-    later = [problem for problem in graph.warnings if str(problem) not in said]
-    file = pipeline.spec.path
-    stale = file and outdated(file, Roots.around(file, pipeline.asset_roots), pipeline.catalog, pipeline.plugins)
-    later += [stale] if stale else []
+    linked = stages.link(stages.resolve(selection))
+    warn(linked.warnings)
+    stages.check(linked)
+    graph, path = linked.graph, linked.spec.path
+    stale = path and outdated(path, Roots.around(path, selection.asset_roots), linked.catalog, selection.plugins)
+    later = [stale] if stale else []
     warn(later)
     width, height = graph.size
     links = sum(len(ends) for node in graph.nodes for ends in node.inputs.values())
@@ -57,6 +61,6 @@ def command(as_json: bool, **selection: Any) -> None:
                 "nodes": len(graph.nodes),
                 "links": links,
                 "outputs": {name: str(end) for name, end in graph.outputs.items()},
-                "warnings": [problem.as_json() for problem in [*pipeline.warnings, *later]],
+                "warnings": [problem.as_json() for problem in [*linked.warnings, *later]],
             }
         )

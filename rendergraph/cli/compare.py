@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +15,9 @@ from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
 
 if TYPE_CHECKING:
-    import rendergraph as rg
     from rendergraph.compare.values import Comparison, Result
     from rendergraph.declare import Extensions
+    from rendergraph.session import Pipeline
 
 BEYOND = 4
 """Exit code of a comparison beyond its threshold."""
@@ -96,7 +96,7 @@ def command(
     thresholds: tuple[Limit, ...],
     as_json: bool,
     device: int | None,
-    **selection: Any,
+    select: options.Select,
 ) -> None:
     """Compare pictures, times and memory of pipelines.
 
@@ -117,11 +117,11 @@ def command(
         raise UsageError(Problem("RG500", text))
     if output is not None:
         check_page(output)
-    loaded = [_load(name, pipelines, selection) for name in pipelines]
-    check_limits(thresholds, loaded[0].catalog.extensions)
+    loaded = [_load(name, pipelines, select) for name in pipelines]
+    check_limits(thresholds, loaded[0].link().catalog.extensions)
     bar = Bar("steps")
     found = compare(
-        loaded, load_reference(reference, selection), frames=frames, frame=frame, device=device, progress=bar.show
+        loaded, load_reference(reference, select), frames=frames, frame=frame, device=device, progress=bar.show
     )
     bar.clear()
     warn(found.warnings)
@@ -132,7 +132,7 @@ def command(
     if output is not None:
         from rendergraph.compare.report import comparison_page
 
-        words = ["compare", *pipelines, *options.words(**selection), *_reference_words(reference)]
+        words = ["compare", *pipelines, *options.words(loaded[0].selection), *_reference_words(reference)]
         words += ["-n", str(frames), *(["--at", str(frame)] if frame != 1 else []), "-o", str(output)]
         options.write(comparison_page(found, typed(words)), output)
         written["report"] = str(output)
@@ -148,14 +148,14 @@ def command(
         raise click.exceptions.Exit(BEYOND)
 
 
-def _load(name: str, names: Sequence[str], selection: Mapping[str, Any]) -> rg.Pipeline:
+def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
     """One of the pipelines; an -s that does not fit it and may be meant for another says how to do that.
 
     Raises:
         InputError: with every mistake found on the way.
     """
     try:
-        return options.load(pipeline=name, **selection)
+        return options.load(select(name))
     except InputError as error:
         others = [other for other in names if other != name]
         if not others:
@@ -173,7 +173,7 @@ def _of_setting(problem: Problem) -> bool:
     return problem.place is not None and problem.place.file.startswith("--set ")
 
 
-def load_reference(reference: str | None, selection: Mapping[str, Any]) -> Path | rg.Pipeline | None:
+def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """The reference: a picture's path, or a pipeline on the same scene, without the variants' settings."""
     from rendergraph.compare.reference import is_picture
 
@@ -181,7 +181,7 @@ def load_reference(reference: str | None, selection: Mapping[str, Any]) -> Path 
         return None
     if is_picture(reference):
         return Path(reference)
-    return options.load(pipeline=reference, **{**selection, "sets": (), "patches": ()})
+    return options.load(replace(select(reference), sets=(), patches=()))
 
 
 def check_page(output: Path) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Place, Problem
+
+if TYPE_CHECKING:
+    from rendergraph.session import Selection
 
 _PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr")
 
@@ -16,7 +19,7 @@ _PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr")
 @click.command("config", no_args_is_help=True)
 @options.pipeline_options
 @options.json_option
-def command(as_json: bool, **selection: Any) -> None:
+def command(selection: Selection, as_json: bool) -> None:
     """Print the resolved pipeline, with origins.
 
     That is the file with `extends`, patches and settings applied, and beside each value the line it comes from. Of a
@@ -28,11 +31,12 @@ def command(as_json: bool, **selection: Any) -> None:
       rendergraph config forward -s light.ambient=0.1 --json
       rendergraph config forward.png
     """
-    if Path(selection["pipeline"]).suffix.lower() in _PICTURES:
-        _of_picture(Path(selection["pipeline"]), as_json)
+    from rendergraph.session import stages
+
+    if Path(selection.source).suffix.lower() in _PICTURES:
+        _of_picture(Path(selection.source), as_json)
         return
-    pipeline = options.make(**selection)
-    spec = pipeline.spec
+    spec = stages.resolve(selection).spec
     spec.check()
     warn(spec.notes)
     if as_json:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json
@@ -22,7 +21,7 @@ from rendergraph.cli.words import click
     help="Draw both graphs with the difference coloured.",
 )
 @options.json_option
-def command(a: str, b: str, picture: Path | None, as_json: bool, **selection: Any) -> None:
+def command(a: str, b: str, select: options.Select, picture: Path | None, as_json: bool) -> None:
     """Show what differs between two pipelines.
 
     Nodes, links and parameters after everything is resolved, and what that does to the plan: passes, bytes, peak.
@@ -36,13 +35,17 @@ def command(a: str, b: str, picture: Path | None, as_json: bool, **selection: An
       rendergraph diff forward forward-prepass --json
     """
     from rendergraph import diff
+    from rendergraph.session import stages
 
-    (old, was), (new, now) = (options.sketched(pipeline=name, **selection) for name in (a, b))
-    difference = diff.diff(was, now)
-    missing = [problem for pipeline in (old, new) for problem in pipeline.sketch[1]]
-    plans = None if missing else (diff.figures(old.plan()), diff.figures(new.plan()))
+    old, new = (options.sketched(select(name)) for name in (a, b))
+    difference = diff.diff(old.graph, new.graph)
+    missing = (*old.missing, *new.missing)
+    plans = None
+    if not missing:
+        was, now = (diff.figures(stages.plan(stages.expand(found)).plan) for found in (old, new))
+        plans = was, now
     if picture is not None:
-        options.write(diff.diff_svg(was, now, difference), picture)
+        options.write(diff.diff_svg(old.graph, new.graph, difference), picture)
     if as_json:
         written = {} if picture is None else {"svg": str(picture)}
         lacking = {"missing": [problem.as_json() for problem in missing]}

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
 from rendergraph.cli.output import emit_json
 from rendergraph.cli.words import click
+
+if TYPE_CHECKING:
+    from rendergraph.session import Selection
 
 _FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".svg": "svg"}
 
@@ -23,7 +26,7 @@ _FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".sv
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
-def command(format_name: str | None, output: Path | None, as_json: bool, **selection: Any) -> None:
+def command(selection: Selection, format_name: str | None, output: Path | None, as_json: bool) -> None:
     """Draw the graph as text, DOT, Mermaid or SVG.
 
     Nodes whose type is missing are drawn as such; the exit code is then 3.
@@ -36,13 +39,13 @@ def command(format_name: str | None, output: Path | None, as_json: bool, **selec
     """
     from rendergraph import views
 
-    pipeline, graph = options.sketched(**selection)
+    sketch = options.sketched(selection)
     if as_json and not output:
-        missing = [problem.as_json() for problem in pipeline.sketch[1]]
-        emit_json(views.graph_json(graph) | {"missing": missing})
-        options.conclude(pipeline)
+        missing = [problem.as_json() for problem in sketch.missing]
+        emit_json(views.graph_json(sketch.graph) | {"missing": missing})
+        options.conclude(sketch)
         return
     chosen = format_name or (_FORMATS.get(output.suffix.lower(), "text") if output else "text")
-    text: str = getattr(views, chosen)(graph)
+    text: str = getattr(views, chosen)(sketch.graph)
     options.put(text, output, as_json=as_json)
-    options.conclude(pipeline)
+    options.conclude(sketch)

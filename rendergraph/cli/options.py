@@ -6,18 +6,22 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
-    import rendergraph as rg
-    from rendergraph.link import Graph
+    from rendergraph.session import Pipeline, Selection
+    from rendergraph.session.values import Linked
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+Select: TypeAlias = "Callable[[str], Selection]"
+"""Makes the selection of a pipeline's name, as the options say."""
 
 _NAME = r"[A-Za-z_][A-Za-z0-9_-]*"
 _NODE = rf"{_NAME}(?:/{_NAME})*"
@@ -25,10 +29,11 @@ _NODE = rf"{_NAME}(?:/{_NAME})*"
 
 @dataclass(frozen=True)
 class Target:
-    """A file, and the output or port it shows; None lets the extension choose."""
+    """A file, and the output or port it shows; of an output without a name the extension chooses it."""
 
-    name: str | None
+    name: str
     path: Path
+    is_tap: bool = False
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click only
@@ -73,14 +78,14 @@ def _setting(text: str) -> str:
 def _output(text: str) -> Target:
     found = re.fullmatch(rf"(?:({_NAME})=)?(.*)", text, re.DOTALL)
     assert found
-    return Target(found[1], _picture(found[2], text))
+    return Target(found[1] or "", _picture(found[2], text))
 
 
 def _tap(text: str) -> Target:
     found = re.fullmatch(rf"({_NODE}\.\w+)=(.*)", text, re.DOTALL)
     if not found:
         raise ValueError(f"'{text}' is not NODE.PORT=FILE, as in sun.shadow_map=depth.exr")
-    return Target(found[1], _picture(found[2], text))
+    return Target(found[1], _picture(found[2], text), is_tap=True)
 
 
 def _picture(name: str, text: str) -> Path:
@@ -114,6 +119,8 @@ TAP = Parsed("NODE.PORT=FILE", _tap)
 LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
 _PATH = click.Path(path_type=Path)
+_FIELDS = ("scene", "camera", "environment", "size", "sets", "patches", "asset_roots", "limits", "plugins")
+"""Of a `Selection`, all that an option sets."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
 plugin_option = click.option(
@@ -123,17 +130,33 @@ device_option = click.option("--device", metavar="NUMBER", type=int, help="GL de
 
 
 def pipeline_options(function: F) -> F:
-    """The pipeline, and everything that changes it before anything looks at it."""
-    return click.argument("pipeline")(selection_options(function))
+    """The pipeline, and everything that changes it before anything looks at it; the verb gets it as `selection`."""
+
+    @wraps(function)
+    def selected(*, pipeline: str, select: Select, **given: Any) -> None:
+        function(selection=select(pipeline), **given)
+
+    return click.argument("pipeline")(selection_options(selected))  # type: ignore[return-value]
 
 
 def selection_options(function: F) -> F:
-    """Everything that changes a pipeline before anything looks at it."""
+    """Everything that changes a pipeline before anything looks at it; the verb gets `select`, which takes its name."""
+
+    @wraps(function)
+    def selecting(**given: Any) -> None:
+        from rendergraph.session import Selection
+
+        fields = {name: given.pop(name) for name in _FIELDS}
+        function(select=partial(Selection, **fields), **given)
+
+    decorated: Callable[..., Any] = selecting
     for decorate in reversed(
         [
             click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb."),
             click.option("--camera", metavar="NAME", help="See it through this camera of the scene."),
-            click.option("--environment", metavar="FILE", help="Light it by this picture of the sky (.hdr, .exr)."),
+            click.option(
+                "--environment", type=_PATH, metavar="FILE", help="Light it by this picture of the sky (.hdr, .exr)."
+            ),
             click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
             click.option(
                 "-s",
@@ -158,80 +181,55 @@ def selection_options(function: F) -> F:
             plugin_option,
         ]
     ):
-        function = decorate(function)
-    return function
+        decorated = decorate(decorated)
+    return decorated  # type: ignore[return-value]
 
 
-def load(**selection: Any) -> rg.Pipeline:
-    """The pipeline that `pipeline_options` describe, linked; its warnings are said.
+def load(selection: Selection) -> Pipeline:
+    """The pipeline as Python has it, linked; its warnings are said.
 
     Raises:
         InputError: with every mistake found on the way.
     """
-    pipeline = make(**selection)
-    warn(pipeline.warnings)
+    from rendergraph.session import Pipeline
+
+    pipeline = Pipeline(selection)
+    warn(pipeline.link().warnings)
     return pipeline
 
 
-def sketched(**selection: Any) -> tuple[rg.Pipeline, Graph]:
-    """The pipeline and its graph to look at, where node types may be missing; what is, and its warnings, are said.
+def sketched(selection: Selection) -> Linked:
+    """The graph to look at, where node types may be missing; what is, and its warnings, are said.
 
     Raises:
         InputError: with every mistake found on the way, where something else is wrong.
     """
-    pipeline = make(**selection)
-    graph, missing = pipeline.sketch
-    scene = () if missing else pipeline.scene.warnings  # it may be what cannot be read
-    warn((*pipeline.spec.notes, *graph.warnings, *scene, *missing))
-    return pipeline, graph
+    from rendergraph.session import stages
+
+    found = stages.sketch(stages.resolve(selection))
+    warn(found.warnings)
+    return found
 
 
-def conclude(*pipelines: rg.Pipeline) -> None:
+def conclude(*sketches: Linked) -> None:
     """End with the exit code of a wrong file where something was missing, now that the rest has been shown."""
-    if any(pipeline.sketch[1] for pipeline in pipelines):
+    if any(found.missing for found in sketches):
         click.get_current_context().exit(InputError.exit_code)
 
 
-def make(
-    pipeline: str,
-    *,
-    scene: str | None = None,
-    camera: str | None = None,
-    environment: str | None = None,
-    size: tuple[int, int] | None = None,
-    sets: tuple[str, ...] = (),
-    patches: tuple[Path, ...] = (),
-    asset_roots: tuple[Path, ...] = (),
-    limits: tuple[tuple[str, int], ...] = (),
-    plugins: tuple[Path, ...] = (),
-) -> rg.Pipeline:
-    """The pipeline that `pipeline_options` describe; nothing is read yet."""
-    import rendergraph as rg
-
-    return rg.load(
-        pipeline,
-        scene=scene,
-        camera=camera,
-        environment=environment,
-        size=size,
-        sets=list(sets),
-        patches=list(patches),
-        asset_roots=list(asset_roots),
-        limits=dict(limits),
-        plugins=list(plugins),
-    )
-
-
-def words(**selection: Any) -> list[str]:
-    """What was typed for `selection_options`, so that a report can say how to get it again."""
-    found = [
-        w for key in ("scene", "camera", "environment") if selection.get(key) for w in (f"--{key}", selection[key])
-    ]
-    if size := selection.get("size"):
+def words(selection: Selection) -> list[str]:
+    """The options that make a selection, so that a report can say how to get it again."""
+    found: list[str] = []
+    for name, option in (("scene", "--scene"), ("camera", "--camera"), ("environment", "--environment")):
+        if (value := getattr(selection, name)) is not None:
+            found += [option, str(value)]
+    if size := selection.size:
         found += ["--size", f"{size[0]}x{size[1]}"]
     many = {"sets": "-s", "patches": "-p", "asset_roots": "--asset-root", "plugins": "--plugin"}
-    found += [word for key, option in many.items() for value in selection.get(key, ()) for word in (option, str(value))]
-    return [*found, *(word for name, most in selection.get("limits", ()) for word in ("--limit", f"{name}={most}"))]
+    found += [
+        word for name, option in many.items() for value in getattr(selection, name) for word in (option, str(value))
+    ]
+    return [*found, *(word for name, most in selection.limits for word in ("--limit", f"{name}={most}"))]
 
 
 def put(text: str, output: Path | None, *, as_json: bool = False) -> None:

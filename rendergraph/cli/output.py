@@ -54,6 +54,16 @@ class Warnings:
         self._said.update(str(problem) for problem in problems)
 
 
+def say_summary(report: dict[str, Any]) -> None:
+    """Of what `run --json` prints: what was not drawn, how large, how long and on what."""
+    for node, reason in report["culled"].items():
+        say(f"not drawn: {node}: {reason}")
+    device, (width, height) = report["device"], report["size"]
+    passes = amount(len(report["passes"]), "pass", "passes")
+    text = f"{width}×{height}, {passes}, {report['frame_ms']['median']:.1f} ms a frame"
+    say(f"{text} on {device['renderer']}" + (" (software: no measure of a GPU)" if device["software"] else ""))
+
+
 def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:
     """What stopped us: in words on stderr, and as the document of `--json` on stdout."""
     for problem in problems:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
-from rendergraph.cli.output import emit, emit_json
+from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
+
+if TYPE_CHECKING:
+    from rendergraph.session import Selection
 
 
 @click.command("plan", no_args_is_help=True)
@@ -14,7 +17,7 @@ from rendergraph.cli.words import click
 @options.json_option
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Another legal order.")
-def command(as_json: bool, no_alias: bool, shuffle: int | None, **selection: Any) -> None:
+def command(selection: Selection, as_json: bool, no_alias: bool, shuffle: int | None) -> None:
     """Show order, lifetimes and memory, with reasons.
 
     What runs in which order, how long each texture lives, which of them share memory, and the bytes.
@@ -25,8 +28,11 @@ def command(as_json: bool, no_alias: bool, shuffle: int | None, **selection: Any
       rendergraph plan forward-prepass --size 1920x1080 --json
     """
     from rendergraph import views
+    from rendergraph.session import RenderOptions, stages
 
-    plan = options.load(**selection).plan(alias=not no_alias, shuffle=shuffle)
+    linked = stages.link(stages.resolve(selection))
+    warn(linked.warnings)
+    plan = stages.plan(stages.expand(linked, RenderOptions(alias=not no_alias, shuffle=shuffle))).plan
     if as_json:
         emit_json(views.plan_json(plan))
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
 from rendergraph.cli.options import Target
-from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say
+from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say_summary
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, UsageError
 
 if TYPE_CHECKING:
-    import rendergraph as rg
+    from rendergraph.session import RenderOptions, Selection
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.values import Expanded
 
 
 @click.command("run", no_args_is_help=True)
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 @click.option("--poison", is_flag=True, help="Overwrite textures that are dead, to show who still reads them.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
 def command(
+    selection: Selection,
     frames: range | None,
     fps: float,
     outputs: tuple[Target, ...],
@@ -42,7 +45,6 @@ def command(
     no_alias: bool,
     poison: bool,
     shuffle: int | None,
-    **selection: Any,
 ) -> None:
     """Render a pipeline to picture files.
 
@@ -57,58 +59,67 @@ def command(
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
       rendergraph run my.yaml --watch
     """
-    numbers = frames or range(1, 2)
-    modes = {"alias": not no_alias, "poison": poison, "shuffle": shuffle, "fps": fps, "device": device}
-    draw = partial(_draw, selection, numbers, outputs, taps, modes, quiet=as_json)
+    from rendergraph.session import RenderOptions
+    from rendergraph.session.gpu import Gpu
+
+    modes = RenderOptions(frames or range(1, 2), fps, alias=not no_alias, poison=poison, shuffle=shuffle)
+    warnings = Warnings()
+    read = partial(_read, selection, modes, outputs, taps, warnings)
+    draw = partial(_draw, warnings=warnings, quiet=as_json)
     if watch:
         from rendergraph.cli.watching import keep_drawing
 
-        keep_drawing(draw, selection, device, as_json=as_json)
+        keep_drawing(lambda gpu: draw(*read(), gpu), device, as_json=as_json)
         return
-    report = draw(Warnings())
+    expanded, targets = read()
+    with Gpu(device) as gpu:
+        report = draw(expanded, targets, gpu)
     say_summary(report)
     if as_json:
         emit_json(report)
 
 
-def _draw(
-    selection: dict[str, Any],
-    numbers: range,
+def _read(
+    selection: Selection,
+    modes: RenderOptions,
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
-    modes: dict[str, Any],
     warnings: Warnings,
-    session: rg.Session | None = None,
-    *,
-    quiet: bool,
-) -> dict[str, Any]:
-    """Read, draw and write everything; the document of `--json`. Paths are printed unless `quiet`."""
+) -> tuple[Expanded, list[Target]]:
+    """Everything before the device is opened: what is to be drawn, and the files it goes to, each with its name."""
     from rendergraph import images
+    from rendergraph.session import stages
 
-    pipeline = options.make(**selection)
-    warnings.say(pipeline.warnings)
+    linked = stages.link(stages.resolve(selection))
+    warnings.say(linked.warnings)
     if not outputs and not taps:
-        stem = Path(selection["pipeline"]).stem
-        outputs = (Target(None, Path(f"{stem}.####.png" if len(numbers) > 1 else f"{stem}.png")),)
-    known = pipeline.graph.outputs
-    outputs = tuple(t if t.name else replace(t, name=images.output_for(t.path, known)) for t in outputs)
-    targets = [*outputs, *taps]
-    wanted = list(dict.fromkeys(target.name for target in outputs if target.name))
-    tapped = list(dict.fromkeys(target.name for target in taps if target.name))
-    for name, end in pipeline.wanted(wanted, tapped).items():
-        if pipeline.graph.textures[end].desc is None:
-            text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
-            raise InputError(Problem("RG508", text))
-    _check(targets, numbers, selection)
+        stem = Path(selection.source).stem
+        outputs = (Target("", Path(f"{stem}.####.png" if len(modes.frames) > 1 else f"{stem}.png")),)
+    known = linked.graph.outputs
+    named = [t if t.name else replace(t, name=images.output_for(t.path, known)) for t in outputs]
+    expanded = stages.expand(linked, replace(modes, outputs=_names(named), taps=_names(taps)))
+    targets = [*named, *taps]
+    _check(targets, expanded)
+    return expanded, targets
+
+
+def _names(targets: Iterable[Target]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(target.name for target in targets))
+
+
+def _draw(
+    expanded: Expanded, targets: Sequence[Target], gpu: Gpu, *, warnings: Warnings, quiet: bool
+) -> dict[str, Any]:
+    """Draw and write everything; the document of `--json`. Paths are printed unless `quiet`."""
+    from rendergraph import images
+    from rendergraph.session import stages
 
     written: list[str] = []
-    progress = Progress(len(numbers))
-
-    def save(frame: Any) -> None:
+    progress = Progress(len(expanded.options.frames))
+    for frame in stages.draw(expanded, gpu):
         files = [
-            images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t in taps)
+            images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
             for t in targets
-            if t.name
         ]
         images.save_outputs(files, frame.metadata)
         progress.clear()
@@ -117,41 +128,34 @@ def _draw(
             if not quiet:
                 emit(str(file.path))
         progress.show(len(written) // len(targets))
-
-    frame = pipeline.render(frames=numbers, outputs=wanted, taps=tapped, on_frame=save, session=session, **modes)
     progress.clear()
     warnings.say(frame.warnings)
     return frame.as_json() | {"outputs": written}
 
 
-def _check(targets: Sequence[Target], numbers: range, selection: dict[str, Any]) -> None:
+def _check(targets: Sequence[Target], expanded: Expanded) -> None:
     """Everything that can be said about the files before anything is rendered."""
     from rendergraph import images
     from rendergraph.images.saving import extension
 
-    inputs = {os.path.realpath(str(selection[key])) for key in ("pipeline", "scene", "environment") if selection[key]}
-    seen: dict[str, Path] = {}
+    linked, numbers = expanded.linked, expanded.options.frames
+    for name, end in expanded.wanted.items():
+        if linked.graph.textures[end].desc is None:
+            text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
+            raise InputError(Problem("RG508", text))
+    selection = linked.selection
+    inputs = {os.path.realpath(name) for name in (selection.source, selection.scene, selection.environment) if name}
+    seen: set[str] = set()
     for target in targets:
         extension(target.path)
         place = os.path.realpath(target.path)
         if place in seen:
             raise UsageError(Problem("RG502", f"two pictures go to '{target.path}'; give each a file of its own"))
-        seen[place] = target.path
+        seen.add(place)
         if place in inputs and os.path.exists(place):
             raise UsageError(Problem("RG502", f"'{target.path}' is read by this very run; write to another file"))
         if len(numbers) > 1 and not images.is_numbered(target.path):
-            name = target.path.with_name(f"{target.path.stem}.####{target.path.suffix}")
-            text = f"{len(numbers)} frames do not fit one file '{target.path}'; number them: '{name}'"
+            better = target.path.with_name(f"{target.path.stem}.####{target.path.suffix}")
+            text = f"{len(numbers)} frames do not fit one file '{target.path}'; number them: '{better}'"
             raise UsageError(Problem("RG503", text))
         images.check_target(target.path)
-
-
-def say_summary(report: dict[str, Any]) -> None:
-    """What was not drawn, how large, how long and on what."""
-    for node, reason in report["culled"].items():
-        say(f"not drawn: {node}: {reason}")
-    device, (width, height) = report["device"], report["size"]
-    passes = len(report["passes"])
-    count = f"{passes} pass{'' if passes == 1 else 'es'}"
-    text = f"{width}×{height}, {count}, {report['frame_ms']['median']:.1f} ms a frame"
-    say(f"{text} on {device['renderer']}" + (" (software: no measure of a GPU)" if device["software"] else ""))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
@@ -11,11 +12,10 @@ from rendergraph.cli.output import Bar, amount, emit, emit_json, say, table, war
 from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rendergraph.compare.axes import Axis, SweepFile
     from rendergraph.compare.product import Sweep
     from rendergraph.errors import Problem
+    from rendergraph.session import Selection
 
 
 def _axis(text: str) -> Axis:
@@ -58,7 +58,7 @@ def command(
     thresholds: tuple[shared.Limit, ...],
     as_json: bool,
     device: int | None,
-    **selection: Any,
+    select: options.Select,
 ) -> None:
     """Draw and measure every combination of parameters.
 
@@ -76,9 +76,10 @@ def command(
     from rendergraph.compare.axes import is_sweep, read_sweep
     from rendergraph.compare.report import quality_svg, sweep_page
     from rendergraph.compare.study import kept_runs
+    from rendergraph.session import Pipeline
 
     words = ["sweep", pipeline, *(w for a in axes for w in ("-x", f"{a.path}={','.join(a.values)}"))]
-    words += options.words(**selection) + ([] if reference is None else ["--reference", reference])
+    words += options.words(select(pipeline)) + ([] if reference is None else ["--reference", reference])
     words += ["-n", str(frames)] if frames else []
     words += ["--at", str(frame)] if frame != 1 else []
     if is_sweep(Path(pipeline)):
@@ -86,12 +87,13 @@ def command(
         named = {axis.path for axis in axes}
         axes = (*(axis for axis in file.axes if axis.path not in named), *axes)
         reference, frames = reference or file.reference, frames or file.frames
-        pipeline, selection = file.pipeline, _with_file(file, selection)
+        pipeline, select = file.pipeline, _with_file(file, select)
     bar = Bar("runs")
-    base = options.make(pipeline=pipeline, **selection)
-    shared.check_limits(thresholds, base.catalog.extensions)
+    base = Pipeline(select(pipeline))
+    extensions = base.resolve().catalog.extensions
+    shared.check_limits(thresholds, extensions)
     again = shared.typed([*words, "-o", str(out)])
-    against = shared.load_reference(reference, selection)
+    against = shared.load_reference(reference, select)
     try:
         found = sweep(
             base, axes, out, against, frames=frames or 5, frame=frame, resume=resume, device=device, progress=bar.show
@@ -102,7 +104,7 @@ def command(
         raise
     finally:
         bar.clear()
-    warn([*found.comparison.warnings, *base.catalog.extensions.warnings])
+    warn([*found.comparison.warnings, *extensions.warnings])
     page = out / "report.html"
     options.write(sweep_page(found, again), page)
     chart = out / "quality.svg"
@@ -126,7 +128,7 @@ def command(
         raise click.exceptions.Exit(shared.BEYOND)
 
 
-def check_file(path: Path, selection: Mapping[str, Any]) -> tuple[int, tuple[Problem, ...]]:
+def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, ...]]:
     """Find every mistake in a sweep's file and in its runs, and say how many those are and what was noticed.
 
     Raises:
@@ -134,23 +136,23 @@ def check_file(path: Path, selection: Mapping[str, Any]) -> tuple[int, tuple[Pro
     """
     from rendergraph.compare import check_sweep
     from rendergraph.compare.axes import read_sweep
+    from rendergraph.session import Pipeline
 
     file = read_sweep(path)
-    merged = _with_file(file, selection)
-    runs = check_sweep(
-        options.make(pipeline=file.pipeline, **merged), file.axes, shared.load_reference(file.reference, merged)
-    )
-    return len(runs), tuple(dict.fromkeys(problem for run in runs for problem in run.warnings))
+    select = _with_file(file, select)
+    runs = check_sweep(Pipeline(select(file.pipeline)), file.axes, shared.load_reference(file.reference, select))
+    return len(runs), tuple(dict.fromkeys(problem for run in runs for problem in run.link().warnings))
 
 
-def _with_file(file: SweepFile, selection: Mapping[str, Any]) -> dict[str, Any]:
+def _with_file(file: SweepFile, select: options.Select) -> options.Select:
     """The options with what a file says where they say nothing."""
-    return {
-        **selection,
-        "scene": selection["scene"] or file.scene,
-        "size": selection["size"] or file.size,
-        "sets": (*file.sets, *selection["sets"]),
-    }
+
+    def selected(name: str) -> Selection:
+        found = select(name)
+        sets = (*file.sets, *found.sets)
+        return replace(found, scene=found.scene or file.scene, size=found.size or file.size, sets=sets)
+
+    return selected
 
 
 def _text(found: Sweep) -> str:

@@ -4,41 +4,39 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph.cli.app import unexpected
-from rendergraph.cli.output import Warnings, emit_json, error_document, say
-from rendergraph.cli.run import say_summary
+from rendergraph.cli.output import emit_json, error_document, say, say_summary
 from rendergraph.errors import InputError, RenderError, RendergraphError
 from rendergraph.resources import folder
 
 if TYPE_CHECKING:
-    from rendergraph.session import Session
+    from rendergraph.session.gpu import Gpu
     from rendergraph.session.watch import Turn
 
-Draw = Callable[..., "dict[str, Any]"]
-"""Draws with the warnings said so far and a session; returns the document of `--json`."""
+Draw: TypeAlias = "Callable[[Gpu], dict[str, Any]]"
+"""Reads, draws and writes everything; returns the document of `run --json`."""
 
 _SHIPPED = ("rendergraph.pipelines", "rendergraph.shaders", "rendergraph.nodes")
 _MOST_NAMES = 3
 
 
-def keep_drawing(draw: Draw, selection: Mapping[str, Any], device: int | None, *, as_json: bool) -> None:
+def keep_drawing(draw: Draw, device: int | None, *, as_json: bool) -> None:
     """Draw, and again after every change; ends with the program.
 
     Raises:
         RendergraphError: the first picture failed, and no file of the user's could mend it.
     """
-    from rendergraph.session import Session
+    from rendergraph.session.gpu import Gpu
     from rendergraph.session.watch import turns
 
-    warnings = Warnings()
     told: tuple[str, ...] = ()
-    with Session(device=device) as session:
-        for number, turn in enumerate(turns(partial(_attempt, draw, warnings), session)):
+    with Gpu(device) as gpu:
+        for number, turn in enumerate(turns(partial(_attempt, draw), gpu)):
             if turn.error is not None:
                 if number == 0 and not _can_be_mended(turn.error, turn):
                     raise turn.error
@@ -58,10 +56,10 @@ def keep_drawing(draw: Draw, selection: Mapping[str, Any], device: int | None, *
                 sys.stdout.flush()  # whoever reads a pipe waits for this picture, not for a full buffer
 
 
-def _attempt(draw: Draw, warnings: Warnings, session: Session) -> dict[str, Any]:
+def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
     """Draw; a mistake of the program's own is said like any other, and the next edit tried."""
     try:
-        return draw(warnings, session)
+        return draw(gpu)
     except (RendergraphError, OSError):
         raise
     except Exception as error:

@@ -160,9 +160,9 @@ def pipelines(base: Pipeline, runs: Sequence[Mapping[str, str]]) -> list[Pipelin
     """
     found: list[Pipeline] = []
     problems: dict[tuple[str, str], Problem] = {}
-    shared = replace(base, known_catalog=base.catalog)
+    shared = replace(base, catalog=base.resolve().catalog)
     for run in runs:
-        pipeline = replace(shared, sets=(*base.sets, *(f"{path}={value}" for path, value in run.items())))
+        pipeline = shared.select(sets=(*base.selection.sets, *(f"{path}={value}" for path, value in run.items())))
         try:
             pipeline.check()
         except InputError as error:

@@ -11,15 +11,20 @@ from rendergraph.compare.values import Difference, Pixels
 from rendergraph.declare import InOut, Output
 from rendergraph.diff import GraphDiff
 from rendergraph.link import Endpoint, Graph
+from rendergraph.session import RenderOptions, stages
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
-    from rendergraph.session import Frame, Pipeline, Session
+    from rendergraph.session import Frame
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.values import Planned
 
 
-def every_output(session: Session, pipeline: Pipeline, plan: ResourcePlan, frame: int) -> Frame:
+def every_output(gpu: Gpu, planned: Planned, frame: int) -> Frame:
     """One frame with every texture that a pass of the plan hands to others."""
-    return session.render(pipeline, frames=range(1, frame + 1), outputs=(), taps=taps(pipeline.graph, plan))
+    ports = taps(planned.linked.graph, planned.plan)
+    options = RenderOptions(frames=range(1, frame + 1), outputs=(), taps=tuple(ports))
+    return stages.draw_last(stages.expand(planned.linked, options), gpu)
 
 
 def taps(graph: Graph, plan: ResourcePlan) -> list[str]:

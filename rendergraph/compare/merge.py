@@ -13,12 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TypeAlias
 
 from rendergraph.declare import InOut, TextureInfo
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.session import Pipeline
 
 Key: TypeAlias = "tuple[int, str]"
 """Number of a graph and id of one of its nodes."""
@@ -39,19 +37,6 @@ class Merged:
     def output(self, number: int, name: str) -> str:
         """What an output of a graph is called."""
         return f"{number}/{name}"
-
-
-@dataclass(frozen=True, eq=False)
-class MergedPipeline(Pipeline):
-    """A pipeline whose graph is made of others'; scene and camera are those of the pipeline it was made from."""
-
-    merged: Merged | None = None
-
-    @cached_property
-    def graph(self) -> Graph:
-        """The merged graph."""
-        assert self.merged is not None
-        return self.merged.graph
 
 
 def merge(graphs: Sequence[Graph]) -> Merged:

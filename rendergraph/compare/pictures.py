@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rendergraph import metrics
 from rendergraph.compare.divergence import every_output, first_difference, passes
-from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, unique_names
+from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, scene_name, unique_names
 from rendergraph.compare.timing import Times, times_of
 from rendergraph.compare.values import Comparison, Difference, Pixels, Reference, Result
 from rendergraph.diff import diff
+from rendergraph.link import Graph
+from rendergraph.session import stages
 
 if TYPE_CHECKING:
-    from rendergraph.allocate import ResourcePlan
     from rendergraph.execute import FrameTimes
-    from rendergraph.session import Frame, Pipeline, Session
+    from rendergraph.session import Frame, Pipeline
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.values import Planned
 
 FRAMES_A_TURN = 2
 """Few, so that whatever else the machine does falls on all variants alike."""
@@ -29,11 +31,15 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """A pipeline with its plan and its picture."""
+    """A pipeline's plan and its picture."""
 
-    pipeline: Pipeline
-    plan: ResourcePlan
+    planned: Planned
     frame: Frame
+
+    @property
+    def graph(self) -> Graph:
+        """What was drawn."""
+        return self.planned.linked.graph
 
 
 def compare(
@@ -42,7 +48,7 @@ def compare(
     *,
     frames: int = 10,
     frame: int = 1,
-    session: Session | None = None,
+    session: Gpu | None = None,
     device: int | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
@@ -62,44 +68,46 @@ def compare(
         RenderError: it failed while drawing.
         DeviceError: there is no usable GL device.
     """
+    from rendergraph.session.gpu import opened  # a sweep is checked without GL
+
     own = [] if reference is None or isinstance(reference, Path) else [reference]
     staged, notes = on_one_stage([*pipelines, *own])
-    names = unique_names([pipeline.name for pipeline in staged[: len(pipelines)]])
-    plans = [pipeline.plan() for pipeline in staged]
-    picture = read_picture(reference, staged[0].graph.size, names[0]) if isinstance(reference, Path) else None
+    planned = [stages.plan(pipeline.expand()) for pipeline in staged]
+    first_one = planned[0].linked
+    names = unique_names([each.linked.graph.name for each in planned[: len(pipelines)]])
+    picture = read_picture(reference, first_one.graph.size, names[0]) if isinstance(reference, Path) else None
     output, encoding = compared_output(staged, picture[1] if picture else None)
     step = _Steps(len(staged) + frames + 2 * len(pipelines), progress)
-    with opened(session, device) as session:
+    with opened(session, device) as gpu:
         drawn = []
-        for pipeline, plan in zip(staged, plans, strict=True):
-            drawn.append(_Drawn(pipeline, plan, session.render(pipeline, frames=range(1, frame + 1))))
+        for each in planned:
+            drawn.append(_Drawn(each, stages.draw_last(each.for_frames(range(1, frame + 1)), gpu)))
             step()
         variants = drawn[: len(pipelines)]
         base = drawn[-1] if own else drawn[0]
+        base_name = base.graph.name if own else names[0]
         if picture:
             against = Reference(str(reference), "file", *picture)
         else:
-            name = base.pipeline.name if own else names[0]
-            against = Reference(name, "pipeline" if own else "variant", base.frame[output], encoding)
-        times = _times(session, [d.pipeline for d in variants], frames, step)
-        tapped = every_output(session, base.pipeline, base.plan, frame)
+            against = Reference(base_name, "pipeline" if own else "variant", base.frame[output], encoding)
+        times = _times(gpu, [variant.planned for variant in variants], frames, step)
+        tapped = every_output(gpu, base.planned, frame)
         results = []
-        for name, each, taken in zip(names, variants, times, strict=True):
+        for name, variant, taken in zip(names, variants, times, strict=True):
             first = None
-            if each is not base:
-                seen = every_output(session, each.pipeline, each.plan, frame)
-                difference = diff(base.pipeline.graph, each.pipeline.graph)
-                first = first_difference(tapped, seen, each.plan, each.pipeline.graph, difference)
+            if variant is not base:
+                seen = every_output(gpu, variant.planned, frame)
+                difference = diff(base.graph, variant.graph)
+                first = first_difference(tapped, seen, variant.planned.plan, variant.graph, difference)
             step()
-            results.append(_result(name, each, base, against, taken, first))
+            results.append(_result(name, variant, base, against, taken, first))
             step()
-    first_one = staged[0]
     return Comparison(
         results=tuple(results),
         reference=against,
-        base=(base.pipeline.name if own else names[0], base.pipeline.graph),
-        scene=first_one.spec.scene.stem if first_one.spec.scene else first_one.scene.name,
-        camera=first_one.camera,
+        base=(base_name, base.graph),
+        scene=scene_name(first_one),
+        camera=first_one.selection.camera,
         size=first_one.graph.size,
         frame=frame,
         device=drawn[0].frame.device,
@@ -108,7 +116,7 @@ def compare(
             dict.fromkeys(
                 problem
                 for each in drawn
-                for problem in (*each.frame.warnings, *each.pipeline.catalog.extensions.warnings)
+                for problem in (*each.frame.warnings, *each.planned.linked.catalog.extensions.warnings)
             )
         ),
     )
@@ -117,8 +125,8 @@ def compare(
 def _result(
     name: str, drawn: _Drawn, base: _Drawn, reference: Reference, times: Times, first: Difference | None
 ) -> Result:
-    graph, pixels = drawn.pipeline.graph, drawn.frame[reference.output]
-    plugins = drawn.pipeline.catalog.extensions.metrics()
+    linked, plan, pixels = drawn.planned.linked, drawn.planned.plan, drawn.frame[reference.output]
+    plugins = linked.catalog.extensions.metrics()
     if reference.pixels is pixels:
         found, map_ = metrics.same(pixels, plugins), None
     else:
@@ -129,32 +137,20 @@ def _result(
     light = None if reference.kind == "file" else base.frame.get("radiance")
     return Result(
         name=name,
-        source=drawn.pipeline.source,
+        source=linked.selection.source,
         pixels=pixels,
         encoding=reference.encoding,
         metrics=found,
         times=times,
-        memory=drawn.plan.memory.as_json(),
-        pass_count=len(passes(drawn.plan)),
+        memory=plan.memory.as_json(),
+        pass_count=len(passes(plan)),
         radiance_rmse=light_error(drawn.frame.get("radiance"), light),
         flip_map=map_,
-        graph=graph,
-        plan=drawn.plan,
-        difference=diff(base.pipeline.graph, graph),
+        graph=linked.graph,
+        plan=plan,
+        difference=diff(base.graph, linked.graph),
         first=first,
     )
-
-
-@contextmanager
-def opened(session: Session | None, device: int | None) -> Iterator[Session]:
-    """The session that is given, or one of our own that ends with the block."""
-    from rendergraph.session import Session
-
-    if session is not None:
-        yield session
-        return
-    with Session(device=device) as own:
-        yield own
 
 
 def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
@@ -164,23 +160,23 @@ def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
     return metrics.rmse(metrics.colors(light), metrics.colors(reference))
 
 
-def _times(session: Session, pipelines: Sequence[Pipeline], frames: int, step: Callable[[], None]) -> list[Times]:
+def _times(gpu: Gpu, variants: Sequence[Planned], frames: int, step: Callable[[], None]) -> list[Times]:
     """Times of pipelines that take turns; each turn another one begins."""
-    taken: list[list[FrameTimes]] = [[] for _ in pipelines]
+    taken: list[list[FrameTimes]] = [[] for _ in variants]
     left = frames
     turn = 0
     while left:
         count = min(FRAMES_A_TURN, left)
-        for place in range(len(pipelines)):
-            number = (place + turn) % len(pipelines)
-            taken[number] += session.render(pipelines[number], frames=range(1, count + 1)).times
+        for place in range(len(variants)):
+            number = (place + turn) % len(variants)
+            taken[number] += stages.draw_last(variants[number].for_frames(range(1, count + 1)), gpu).times
         left -= count
         turn += 1
         for _ in range(count):
             step()
     return [
-        times_of(times, {node.id: node.type.name for node in pipeline.graph.nodes})
-        for times, pipeline in zip(taken, pipelines, strict=True)
+        times_of(times, {node.id: node.type.name for node in variant.linked.graph.nodes})
+        for times, variant in zip(taken, variants, strict=True)
     ]
 
 

@@ -12,17 +12,20 @@ from rendergraph import metrics
 from rendergraph.compare.axes import Axis, check_axes, combinations, pipelines, run_name
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
-from rendergraph.compare.pictures import Progress, light_error, opened
-from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, unique_names
+from rendergraph.compare.pictures import Progress, light_error
+from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, scene_name, unique_names
 from rendergraph.compare.runs import NO_TIMES, RUN, Run, found_again, keep, key_of, restored, settle
 from rendergraph.compare.sources import file_digest
 from rendergraph.compare.study import begin, open_folder, study_of
 from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw, measure
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result
 from rendergraph.metrics import Encoding
+from rendergraph.session import stages
 
 if TYPE_CHECKING:
-    from rendergraph.session import Pipeline, Session
+    from rendergraph.session import Pipeline
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.values import Planned
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,7 @@ class _Work:
 
     runs: list[Run]
     encoding: Encoding
-    other: Pipeline | None
+    other: Planned | None
     ledger: Ledger
     frames: int
     results: dict[int, Result] = field(default_factory=dict)
@@ -113,7 +116,7 @@ def sweep(
     frame: int = 1,
     resume: bool = False,
     most_bytes: int = MOST_BYTES,
-    session: Session | None = None,
+    session: Gpu | None = None,
     device: int | None = None,
     progress: Progress | None = None,
 ) -> Sweep:
@@ -140,16 +143,18 @@ def sweep(
         RenderError: it failed while drawing or writing.
         DeviceError: there is no usable GL device.
     """
+    from rendergraph.session.gpu import opened  # a sweep is checked without GL
+
     staged, notes, picture, output, encoding = _looked_at(base, axes, reference)
-    settings = combinations(axes)
-    variants, other = staged[: len(settings)], staged[-1] if len(staged) > len(settings) else None
+    settings, planned = combinations(axes), [pipeline.check() for pipeline in staged]
+    variants, other = planned[: len(settings)], planned[-1] if len(staged) > len(settings) else None
     names = unique_names([run_name(run) for run in settings])
     against = key_of(other or variants[0], frame, "") if picture is None else file_digest(Path(str(reference)))
-    study = study_of(base, frame, str(reference) if picture else other.name if other else names[0])
+    study = study_of(base, frame, str(reference) if picture else other.linked.graph.name if other else names[0])
     ledger, records, torn = open_folder(out, study, resume=resume)
     runs = [
-        Run(name, run, pipeline, output, key_of(pipeline, frame, against), out / name)
-        for name, run, pipeline in zip(names, settings, variants, strict=True)
+        Run(name, run, variant, output, key_of(variant, frame, against), out / name)
+        for name, run, variant in zip(names, settings, variants, strict=True)
     ]
     work = _Work(runs, encoding, other, ledger, frames)
     if picture:
@@ -162,22 +167,22 @@ def sweep(
     timed = len(work.results) - resumed
     redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))
     if work.missing or other:
-        with opened(session, device) as session:
+        with opened(session, device) as gpu:
             begin(out, study)
-            _draw_missing(work, session, frame, most_bytes, progress or (lambda done, total: None))
+            _draw_missing(work, gpu, frame, most_bytes, progress or (lambda done, total: None))
     results = tuple(work.results[number] for number in range(len(runs)))
-    first = variants[0]
+    first = variants[0].linked
     comparison = Comparison(
         results=results,
         reference=work.reference or Reference(names[0], "variant", results[0].pixels, encoding),
         base=(names[0], first.graph),
-        scene=first.spec.scene.stem if first.spec.scene else first.scene.name,
-        camera=first.camera,
+        scene=scene_name(first),
+        camera=first.selection.camera,
         size=first.graph.size,
         frame=frame,
         device=work.device,
         notes=tuple(notes),
-        warnings=tuple(dict.fromkeys(problem for variant in variants for problem in variant.warnings)),
+        warnings=tuple(dict.fromkeys(problem for variant in variants for problem in variant.linked.warnings)),
     )
     return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, timed, redrawn, torn)
 
@@ -203,7 +208,7 @@ def _looked_at(
     own = [] if reference is None or isinstance(reference, Path) else [reference]
     staged, notes = on_one_stage([*variants, *own])
     name = run_name(combinations(axes)[0])
-    picture = read_picture(reference, staged[0].graph.size, name) if isinstance(reference, Path) else None
+    picture = read_picture(reference, staged[0].link().graph.size, name) if isinstance(reference, Path) else None
     return staged, notes, picture, *compared_output(staged, picture[1] if picture else None)
 
 
@@ -217,25 +222,25 @@ def pareto(results: Sequence[Result]) -> list[Result]:
     return found
 
 
-def _draw_missing(work: _Work, session: Session, frame: int, most_bytes: int, progress: Progress) -> None:
+def _draw_missing(work: _Work, gpu: Gpu, frame: int, most_bytes: int, progress: Progress) -> None:
     """Draw, measure and keep the runs that are not there; the reference first, where it is not the first of them."""
     output, missing = work.runs[0].output, work.missing
     if work.reference is None and (work.other or 0 in work.results):
-        pipeline = work.other or work.runs[0].pipeline
-        shown = session.render(pipeline, frames=range(1, frame + 1))
+        planned = work.other or work.runs[0].planned
+        shown = stages.draw_last(planned.for_frames(range(1, frame + 1)), gpu)
         if work.other:
-            work.reference = Reference(work.other.name, "pipeline", shown[output], work.encoding)
+            work.reference = Reference(work.other.linked.graph.name, "pipeline", shown[output], work.encoding)
         else:
             work.reference = Reference(work.runs[0].name, "variant", shown[output], work.encoding)
         work.light, work.device = shown.get("radiance"), shown.device
-    variants = [run.pipeline for run in work.runs]
+    variants = [run.planned for run in work.runs]
     for batch in batches(variants, missing, most_bytes):
         work.executed += batch.pass_count
         if undrawn := any(number not in work.results for number in batch.numbers):
-            for drawn in draw(session, variants, batch, frame):
+            for drawn in draw(gpu, variants, batch, frame):
                 if drawn.number not in work.results:
                     _keep(work, drawn)
-        for number, times in measure(session, variants, batch, work.frames, warm=undrawn):
+        for number, times in measure(gpu, variants, batch, work.frames, warm=undrawn):
             run, result = work.runs[number], replace(work.results[number], times=times)
             work.records[number] = settle(run, work.records[number], times, work.device, work.ledger)
             work.results[number] = result
@@ -257,7 +262,8 @@ def _keep(work: _Work, drawn: Drawn) -> None:
 
 def _compared(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None) -> Result:
     pixels, own = drawn.arrays[run.output], drawn.arrays.get("radiance")
-    plugins = run.pipeline.catalog.extensions.metrics()
+    linked, plan = run.planned.linked, run.planned.plan
+    plugins = linked.catalog.extensions.metrics()
     if reference.pixels is pixels:
         found, map_ = metrics.same(pixels, plugins), None
     else:
@@ -265,10 +271,9 @@ def _compared(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None
         found, map_ = metrics.measure(
             pixels, reference.pixels, encoding=reference.encoding, names=names, plugins=plugins
         )
-    plan = run.pipeline.plan()
     return Result(
         name=run.name,
-        source=run.pipeline.source,
+        source=linked.selection.source,
         pixels=pixels,
         encoding=reference.encoding,
         metrics=found,
@@ -278,6 +283,6 @@ def _compared(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None
         settings=run.settings,
         radiance_rmse=light_error(own, light),
         flip_map=map_,
-        graph=run.pipeline.graph,
+        graph=linked.graph,
         plan=plan,
     )

@@ -14,6 +14,7 @@ from rendergraph.metrics import Encoding, check_sizes
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
+    from rendergraph.session.values import Linked
 
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
 """Extensions that make a reference a picture rather than a pipeline."""
@@ -47,18 +48,25 @@ def read_picture(path: Path, size: tuple[int, int], name: str) -> tuple[Pixels, 
 
 def on_one_stage(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline], list[str]]:
     """The pipelines on the first one's scene and at its size, and what had to be changed for that, in words."""
-    first = pipelines[0]
-    scenes = {pipeline.spec.scene for pipeline in pipelines}
-    notes = []
-    if len(scenes) > 1 and first.spec.scene is not None:
-        others = [p for p in pipelines if p.spec.scene != first.spec.scene]
-        notes += [f"'{p.name}' is drawn with the scene of '{first.name}': {first.spec.scene.stem}" for p in others]
+    specs = [pipeline.resolve().spec for pipeline in pipelines]
+    first, notes = specs[0], []
+    if first.scene is not None and any(spec.scene != first.scene for spec in specs):
+        others = [spec.name for spec in specs if spec.scene != first.scene]
+        notes += [f"'{name}' is drawn with the scene of '{first.name}': {first.scene.stem}" for name in others]
         # All of them, the first one too: one scene named in one way is read once and stays on the GPU.
-        pipelines = [pipeline.with_scene(first.spec.scene) for pipeline in pipelines]
-    width, height = first.spec.size
-    small = [p for p in pipelines if p.spec.size != (width, height)]
-    notes += [f"'{p.name}' is drawn at the size of '{first.name}': {width}×{height}" for p in small]
-    return [p.with_size((width, height)) if p in small else p for p in pipelines], notes
+        pipelines = [pipeline.with_scene(first.scene) for pipeline in pipelines]
+    width, height = first.size
+    others = [spec.name for spec in specs if spec.size != first.size]
+    notes += [f"'{name}' is drawn at the size of '{first.name}': {width}×{height}" for name in others]
+    return [
+        pipeline.with_size(first.size) if spec.size != first.size else pipeline
+        for pipeline, spec in zip(pipelines, specs, strict=True)
+    ], notes
+
+
+def scene_name(linked: Linked) -> str:
+    """What a report calls the scene: as its file is named, else as itself."""
+    return linked.spec.scene.stem if linked.spec.scene else linked.scene.name
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
@@ -85,9 +93,9 @@ def compared_output(pipelines: Sequence[Pipeline], encoding: Encoding | None) ->
     """
     wanted = {"display": ["image"], "linear": ["radiance"]}.get(encoding or "", ["image", "radiance"])
     for output in wanted:
-        if all(output in pipeline.graph.outputs for pipeline in pipelines):
+        if all(output in pipeline.link().graph.outputs for pipeline in pipelines):
             return output, "display" if output == "image" else "linear"
-    lacking = next(p for p in pipelines if wanted[0] not in p.graph.outputs)
-    known = ", ".join(lacking.graph.outputs)
+    lacking = next(graph for p in pipelines if wanted[0] not in (graph := p.link().graph).outputs)
+    known = ", ".join(lacking.outputs)
     text = f"pipeline '{lacking.name}' has no output '{wanted[0]}' to compare; there is {known}"
     raise InputError(Problem("RG522", text))

@@ -20,7 +20,7 @@ from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.metrics import Encoding, Metrics
 
 if TYPE_CHECKING:
-    from rendergraph.session import Pipeline
+    from rendergraph.session.values import Planned
 
 RUN = "run.json"
 NO_TIMES = Times(0, None, None, Spread.of([math.nan]), ())
@@ -35,7 +35,7 @@ class Run:
     Attributes:
         name: unique, and its folder's name.
         settings: path to value.
-        pipeline: with the settings.
+        planned: the pipeline with the settings.
         output: the output that is compared and kept.
         key: what decides its picture and figures, so that it is known again.
         folder: where it is kept.
@@ -43,7 +43,7 @@ class Run:
 
     name: str
     settings: Mapping[str, str]
-    pipeline: Pipeline
+    planned: Planned
     output: str
     key: str
     folder: Path
@@ -54,12 +54,13 @@ class Run:
         return self.folder / ("image.png" if self.output == "image" else "radiance.exr")
 
 
-def key_of(pipeline: Pipeline, frame: int, against: str) -> str:
+def key_of(planned: Planned, frame: int, against: str) -> str:
     """What decides a run: the resolved file, what it is drawn from, camera and frame, what it is measured against."""
-    files = [str(pipeline.spec.scene), str(pipeline.environment), sources_digest(pipeline)]
-    spec = pipeline.spec.to_yaml(origins=False)
-    parts = [__version__, spec, files, pipeline.camera, pipeline.graph.size, frame, against]
-    parts += sorted(metric.name for metric in pipeline.catalog.extensions.metrics())
+    linked, selection = planned.linked, planned.linked.selection
+    files = [str(linked.spec.scene), str(selection.environment), sources_digest(planned)]
+    spec = linked.spec.to_yaml(origins=False)
+    parts = [__version__, spec, files, selection.camera, linked.graph.size, frame, against]
+    parts += sorted(metric.name for metric in linked.catalog.extensions.metrics())
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -76,11 +77,11 @@ def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping
     except OSError as error:
         text = f"the folder cannot be made: {error.strerror}"
         raise RenderError(Problem("RG507", text, Place(str(run.folder)))) from error
-    graph = run.pipeline.graph
+    graph = run.planned.linked.graph
     info = graph.textures[graph.outputs[run.output]]
     described = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
     picture = Saved(run.picture, arrays[run.output], described, raw=False)
-    save_outputs([picture], {"rendergraph:pipeline": run.pipeline.spec.to_yaml(origins=False)})
+    save_outputs([picture], {"rendergraph:pipeline": run.planned.linked.spec.to_yaml(origins=False)})
     record = {
         "key": run.key,
         **_finite(result.as_json()),
@@ -113,7 +114,7 @@ def settle(
 def _describe(run: Run, record: Mapping[str, Any]) -> None:
     from rendergraph.images.files import staged
 
-    resolved = run.pipeline.spec.to_yaml(origins=False)
+    resolved = run.planned.linked.spec.to_yaml(origins=False)
     document = {**record, "resolved": resolved, "metrics": metrics.description()}
     with staged([run.folder / RUN]) as (part,):
         part.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -152,10 +153,10 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
     """A result as it was kept."""
     from rendergraph.images import read
 
-    plan = run.pipeline.plan()
+    linked, plan = run.planned.linked, run.planned.plan
     return Result(
         name=run.name,
-        source=run.pipeline.source,
+        source=linked.selection.source,
         pixels=read(run.picture),
         encoding=encoding,
         metrics=_metrics(record),
@@ -164,7 +165,7 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
         pass_count=len(passes(plan)),
         settings=run.settings,
         radiance_rmse=record["radiance_rmse"],
-        graph=run.pipeline.graph,
+        graph=linked.graph,
         plan=plan,
     )
 

@@ -17,19 +17,21 @@ from rendergraph.program import stage_texts
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from rendergraph.session import Pipeline
+    from rendergraph.link import Graph
+    from rendergraph.session.values import Expanded
 
 _BUILTIN = "rendergraph.nodes"
 
 
-def sources_digest(pipeline: Pipeline) -> str:
+def sources_digest(expanded: Expanded) -> str:
     """SHA-256 of everything that a pipeline is drawn from and its resolved file does not hold.
 
     Shaders count as they reach the driver, without comments; of Python the nodes' modules and what they import of their
     own package; of the scene every file that was read. The framework's own code is told by its version.
     """
     found = hashlib.sha256()
-    for text in (*_shader_texts(pipeline), *_code(pipeline), *_scene_files(pipeline)):
+    files = (file_digest(path) for path in sorted(expanded.linked.scene.files))
+    for text in (*_shader_texts(expanded), *_code(expanded.linked.graph), *files):
         found.update(hashlib.sha256(text.encode()).digest())
     return found.hexdigest()
 
@@ -49,9 +51,9 @@ def _read_digest(path: Path, modified_ns: int, size: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _shader_texts(pipeline: Pipeline) -> Iterator[str]:
-    expansion = pipeline.expansion()
-    types = {node.id: node.type for node in pipeline.graph.nodes}
+def _shader_texts(expanded: Expanded) -> Iterator[str]:
+    expansion = expanded.expansion
+    types = {node.id: node.type for node in expanded.linked.graph.nodes}
     for step in expansion.steps:
         try:
             texts = stage_texts(step, types, expansion.resources, expansion.views)
@@ -61,9 +63,9 @@ def _shader_texts(pipeline: Pipeline) -> Iterator[str]:
         yield from (text.text for text in texts.values())
 
 
-def _code(pipeline: Pipeline) -> Iterator[str]:
+def _code(graph: Graph) -> Iterator[str]:
     seen: set[str] = set()
-    for node in pipeline.graph.nodes:
+    for node in graph.nodes:
         if node.type.is_shader:
             yield file_digest(node.type.file)  # its header's declarations
         else:
@@ -99,7 +101,3 @@ def _imported(module: ModuleType) -> Iterable[str]:
                 base = resolve_name("." * statement.level + base, module.__package__ or "")
             yield base
             yield from (f"{base}.{alias.name}" for alias in statement.names)
-
-
-def _scene_files(pipeline: Pipeline) -> Iterator[str]:
-    return (file_digest(path) for path in sorted(pipeline.scene.files))

@@ -25,12 +25,13 @@ def study_of(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
 
     More values of an axis are the same study, and so are edited shaders: those runs are drawn again.
     """
-    spec, (width, height) = base.spec, base.spec.size
+    selection, spec = base.selection, base.resolve().spec
+    width, height = spec.size
     return {
-        "pipeline": base.name,
+        "pipeline": spec.name,
         "scene": str(spec.scene.stem) if spec.scene else None,
-        "environment": str(base.environment) if base.environment else None,
-        "camera": base.camera,
+        "environment": str(selection.environment) if selection.environment else None,
+        "camera": selection.camera,
         "size": f"{width}x{height}",
         "frame": frame,
         "reference": reference,

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rendergraph.compare.divergence import passes
-from rendergraph.compare.merge import Merged, MergedPipeline, merge
+from rendergraph.compare.merge import Merged, merge
 from rendergraph.compare.timing import Times, times_within
 from rendergraph.compare.values import Pixels
 from rendergraph.errors import InputError
-from rendergraph.session import Pipeline
+from rendergraph.session import stages
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rendergraph.allocate import ResourcePlan
-    from rendergraph.session import Session
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.values import Planned
 
 MOST_BYTES = 512 << 20
 """Textures of one batch; the outputs of all its variants are alive at once."""
@@ -33,24 +33,18 @@ class Batch:
 
     Attributes:
         numbers: which of the variants.
-        pipeline: all of them as one.
-        plan: the plan of that.
+        merged: their graphs as one.
+        planned: what is drawn of that.
     """
 
     numbers: tuple[int, ...]
-    pipeline: MergedPipeline
-    plan: ResourcePlan
-
-    @property
-    def merged(self) -> Merged:
-        """The graphs as one."""
-        assert self.pipeline.merged is not None
-        return self.pipeline.merged
+    merged: Merged
+    planned: Planned
 
     @property
     def pass_count(self) -> int:
         """Passes it draws."""
-        return len(passes(self.plan))
+        return len(passes(self.planned.plan))
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +56,7 @@ class Drawn:
     device: Mapping[str, object]
 
 
-def batches(variants: Sequence[Pipeline], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
+def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
     """The variants in as few batches as fit.
 
     Args:
@@ -74,14 +68,12 @@ def batches(variants: Sequence[Pipeline], numbers: Sequence[int], most_bytes: in
         parts = range(0, len(numbers), MOST_RUNS)
         return [batch for at in parts for batch in batches(variants, numbers[at : at + MOST_RUNS], most_bytes)]
     chosen = [variants[number] for number in numbers]
-    merged = merge([variant.graph for variant in chosen])
-    base = {f.name: getattr(chosen[0], f.name) for f in fields(Pipeline)}
-    pipeline = MergedPipeline(**base, merged=merged)
+    merged = merge([variant.linked.graph for variant in chosen])
     try:
-        expansion, plan = pipeline.expansion(), pipeline.plan()
-        small = plan.memory.allocated_bytes <= most_bytes and len(expansion.views) <= MOST_VIEWS
+        planned = stages.plan(stages.expand(replace(chosen[0].linked, graph=merged.graph)))
+        small = planned.plan.memory.allocated_bytes <= most_bytes and len(planned.expansion.views) <= MOST_VIEWS
         if small or len(numbers) == 1:
-            return [Batch(tuple(numbers), pipeline, plan)]
+            return [Batch(tuple(numbers), merged, planned)]
     except InputError:
         # Each graph has a legal order and all of them together have none: readers of two continued textures wait for
         # each other across graphs. So rare that the way out is the plain one.
@@ -91,35 +83,35 @@ def batches(variants: Sequence[Pipeline], numbers: Sequence[int], most_bytes: in
     return [*batches(variants, numbers[:half], most_bytes), *batches(variants, numbers[half:], most_bytes)]
 
 
-def draw(session: Session, variants: Sequence[Pipeline], batch: Batch, frame: int) -> Iterator[Drawn]:
+def draw(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Iterator[Drawn]:
     """Draw a batch and hand out its variants.
 
     Args:
-        session: where.
+        gpu: where.
         variants: all of them.
         batch: which ones.
         frame: number of the frame whose pictures are wanted.
     """
-    drawn = session.render(batch.pipeline, frames=range(1, frame + 1), warm_up=False)  # nothing is measured here
+    drawn = stages.draw_last(batch.planned.for_frames(range(1, frame + 1), warm_up=False), gpu)  # nothing is measured
     for place, number in enumerate(batch.numbers):
-        arrays = {name: drawn[batch.merged.output(place, name)] for name in variants[number].graph.outputs}
+        arrays = {name: drawn[batch.merged.output(place, name)] for name in variants[number].linked.graph.outputs}
         yield Drawn(number, arrays, drawn.device)
 
 
 def measure(
-    session: Session, variants: Sequence[Pipeline], batch: Batch, frames: int, *, warm: bool
+    gpu: Gpu, variants: Sequence[Planned], batch: Batch, frames: int, *, warm: bool
 ) -> Iterator[tuple[int, Times]]:
     """The times of a batch's variants, each the sum of the passes it needs.
 
     Args:
-        session: where.
+        gpu: where.
         variants: all of them.
         batch: which ones.
         frames: how many frames are measured.
         warm: whether the batch has just been drawn.
     """
-    times = session.render(batch.pipeline, frames=range(1, frames + 1), warm_up=not warm).times
+    times = stages.draw_last(batch.planned.for_frames(range(1, frames + 1), warm_up=not warm), gpu).times
     for place, number in enumerate(batch.numbers):
-        graph = variants[number].graph
-        own = {name: batch.merged.names[place][name] for name in passes(variants[number].plan())}
-        yield number, times_within(times, own, {node.id: node.type.name for node in graph.nodes})
+        variant = variants[number]
+        own = {name: batch.merged.names[place][name] for name in passes(variant.plan)}
+        yield number, times_within(times, own, {node.id: node.type.name for node in variant.linked.graph.nodes})

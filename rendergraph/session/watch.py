@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from rendergraph.errors import RendergraphError
-from rendergraph.session.session import Session
+from rendergraph.session.gpu import Gpu
 from rendergraph.stamps import Stamp, changed, looking, stamp
 
 T = TypeVar("T")
@@ -48,26 +48,26 @@ class Turn(Generic[T]):
     files: Mapping[Path, Stamp]
 
 
-def turns(draw: Callable[[Session], T], session: Session) -> Iterator[Turn[T]]:
+def turns(draw: Callable[[Gpu], T], gpu: Gpu) -> Iterator[Turn[T]]:
     """Draw, and again after every change of a file that the drawing looked at; endless.
 
     Args:
-        draw: does everything afresh, from reading the pipeline on; what has not changed is taken from the session.
-        session: where to draw.
+        draw: does everything afresh, from reading the pipeline on; what has not changed is taken from there.
+        gpu: where to draw.
 
     Yields:
         Every attempt. A mistake is one, too, and is waited upon to be mended.
     """
     seen: tuple[Path, ...] = ()
     while True:
-        start, before = time.perf_counter(), _made(session)
+        start, before = time.perf_counter(), _made(gpu)
         value, error = None, None
         with looking() as files:
             try:
-                value = draw(session)
+                value = draw(gpu)
             except RendergraphError as problem:
                 error = problem
-        made = {name: count - before[name] for name, count in _made(session).items()}
+        made = {name: count - before[name] for name, count in _made(gpu).items()}
         yield Turn(value, error, seen, (time.perf_counter() - start) * 1e3, made, files)
         seen = tuple(wait(files))
 
@@ -97,9 +97,9 @@ def _settle(paths: list[Path]) -> None:
         before = now
 
 
-def _made(session: Session) -> dict[str, int]:
+def _made(gpu: Gpu) -> dict[str, int]:
     return {
-        "programs": session.programs.compiled,
-        "textures": session.device.textures_made,
-        "scenes": session.scenes_made,
+        "programs": gpu.cache.programs.compiled,
+        "textures": gpu.device.textures_made,
+        "scenes": gpu.cache.scenes_made,
     }

@@ -326,7 +326,7 @@ def test_a_forgotten_reader_is_caught(base: Expansion, seed: int) -> None:
 
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines_are_proven_and_valid(name: str) -> None:
-    base = load(name).expansion()
+    base = load(name).expand().expansion
     found = schedule(base)
     assert found.proven
     assert_legal(base, found)

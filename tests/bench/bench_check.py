@@ -117,6 +117,7 @@ def once(path: Path) -> dict[str, Any]:
     from rendergraph.allocate import allocate
     from rendergraph.catalog import Catalog
     from rendergraph.schedule import schedule
+    from rendergraph.session.scenes import scene_of
 
     stages: dict[str, float] = {}
 
@@ -128,13 +129,13 @@ def once(path: Path) -> dict[str, Any]:
 
     def made() -> Any:
         catalog = Catalog.of(Surfaces, Occlude, Filter, Join, shaders=path.parent)
-        return dataclasses.replace(rg.load(path), known_catalog=catalog)
+        return dataclasses.replace(rg.load(path), catalog=catalog)
 
     pipeline = timed("load", made)
-    timed("resolve", lambda: pipeline.spec)
-    timed("scene", lambda: pipeline.scene)
-    timed("link", lambda: pipeline.graph)
-    expansion = timed("expand", pipeline.expansion)
+    resolved = timed("resolve", pipeline.resolve)
+    timed("scene", lambda: scene_of(resolved))
+    timed("link", pipeline.link)
+    expansion = timed("expand", pipeline.expand).expansion
     ordered = timed("schedule", lambda: schedule(expansion))
     plan = timed("allocate", lambda: allocate(ordered))
     assert len(plan.schedule.steps) == 40, len(plan.schedule.steps)
@@ -161,7 +162,7 @@ def child(path: Path) -> None:
     import rendergraph.scene.cameras
     import rendergraph.scene.load
     import rendergraph.schedule
-    import rendergraph.session  # noqa: F401
+    import rendergraph.session.stages  # noqa: F401
 
     print(json.dumps(once(path)))
 

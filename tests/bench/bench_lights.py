@@ -133,7 +133,9 @@ def bench(frames: int, folder: str | None) -> tuple[list[Cell], str]:
                 loop(1)
                 times[name] = [cpu_and_wall(loop, 1)[0] for _ in range(frames)]
                 counted[name] = shaded(session, loop.executable)  # type: ignore[attr-defined]
-                vertices = sum(len(made.scene.meshes[entry.mesh].positions) for entry in made.scene.objects)
+                vertices = sum(
+                    len(made.link().scene.meshes[entry.mesh].positions) for entry in made.link().scene.objects
+                )
             local = evaluations("deferred-stencil-lights", counted["deferred-stencil-lights"], lights, covered)
             for name in PIPELINES:
                 off = np.abs(pictures[name] - pictures["forward"]).max(-1) > 0.01 * pictures["forward"].max()

@@ -69,8 +69,8 @@ def framework(count: int, folder: Path, pictures: str | None) -> dict[str, float
         save(pictures, **{f"objects_{count}_framework": picture, f"objects_{count}_by_hand": by_hand.picture()})
         check_pictures(f"{count} objects", picture, by_hand.picture(), bound=4, share=0.002)
         with session.device.current():
-            runner = session.prepare(pipeline)
-            scene = pipeline.scene
+            runner = session.compile(pipeline).runner
+            scene = pipeline.link().scene
             still = view_matrices(next(iter(scene.cameras.values())), SIZE)
             views = []
             for number in range(8):

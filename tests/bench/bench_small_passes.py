@@ -114,7 +114,7 @@ def pipeline(folder: Path, size: int, scaled: bool) -> Any:
     lines.append(f"outputs: {{radiance: p{COUNT - 1}.color}}")
     (folder / "passes.yaml").write_text("\n".join(lines) + "\n")
     catalog = Catalog.of(Start, Change, Scale, shaders=folder)
-    return dataclasses.replace(rg.load(folder / "passes.yaml"), known_catalog=catalog)
+    return dataclasses.replace(rg.load(folder / "passes.yaml"), catalog=catalog)
 
 
 def bench(size: int, scaled: bool, *, frames: int, turns: int) -> Row:

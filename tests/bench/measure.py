@@ -134,9 +134,10 @@ def frame_loop(session: Any, pipeline: Any) -> Draw:
     from rendergraph.scene.cameras import view_matrices
 
     with session.device.ctx:
-        runner = session.prepare(pipeline)
-    scene = pipeline.scene
-    camera = view_matrices(next(iter(scene.cameras.values())), pipeline.graph.size)
+        drawing = session.compile(pipeline)
+    linked, runner = drawing.expanded.linked, drawing.runner
+    scene = linked.scene
+    camera = view_matrices(next(iter(scene.cameras.values())), linked.graph.size)
     number = 0
 
     def draw(frames: int) -> None:

@@ -205,7 +205,9 @@ def test_every_lighting_node_takes_a_plugins_model(gl: rg.Session, sketch: Path,
 def test_a_g_buffer_keeps_what_a_plugins_model_needs(sketch: Path) -> None:
     def drawn(shading: str) -> set[str]:
         pipeline = rg.load("deferred", plugins=[sketch], size=(8, 8)).set("light.shading", shading)
-        return {write.name for step in pipeline.expansion().steps if step.node == "gbuffer" for write in step.writes}
+        return {
+            write.name for step in pipeline.expand().expansion.steps if step.node == "gbuffer" for write in step.writes
+        }
 
     assert "grain" not in drawn("toon")
     assert "phong_diffuse" not in drawn("toon")
@@ -220,7 +222,7 @@ def test_a_plugins_curve(gl: rg.Session, sketch: Path) -> None:
 
 
 def test_other_choices_of_plugins_leave_the_program_as_it_is(sketch: Path) -> None:
-    steps = rg.load("forward", plugins=[sketch], size=(8, 8)).expansion().steps
+    steps = rg.load("forward", plugins=[sketch], size=(8, 8)).expand().expansion.steps
     assert not any("TOON" in name for step in steps for name, _ in step.defines)
     assert {file.name for step in steps for _, file in step.includes} == {"pbr.glsl", "neutral.glsl"}
 
@@ -339,7 +341,7 @@ def loaders(write: Write, tmp_path: Path) -> Path:
 
 def test_a_plugins_mesh_is_a_scene(gl: rg.Session, loaders: Path, tmp_path: Path) -> None:
     pipeline = rg.load("forward", plugins=[loaders], scene=tmp_path / "a.tri", size=(32, 32))
-    (mesh,) = pipeline.scene.meshes
+    (mesh,) = pipeline.link().scene.meshes
     np.testing.assert_array_equal(mesh.positions, [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
     np.testing.assert_array_equal(mesh.normals, [[0, 0, 1]] * 3)
     assert mesh.colors is not None
@@ -354,7 +356,7 @@ def test_a_plugins_mesh_and_image_in_a_scene_file(gl: rg.Session, loaders: Path,
     from rendergraph.images import decode
 
     pipeline = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml", size=(8, 8))
-    scene = pipeline.scene
+    scene = pipeline.link().scene
     assert [thing.name for thing in scene.objects] == ["one/Piece", "two/Piece"]
     assert [thing.hidden for thing in scene.objects] == [False, True]
     assert len(scene.meshes) == 1
@@ -441,7 +443,7 @@ def test_what_an_image_loader_gives_is_checked(loaders: Path, tmp_path: Path, gi
 
     with (loaders / "loaders.py").open("a") as file:
         file.write(f"\ndef read_raw(data):\n    return {gives}\n")
-    environment = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml").scene.environment
+    environment = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml").link().scene.environment
     assert environment is not None
     with pytest.raises(InputError, match=said):
         decode(environment.image, srgb=False)

@@ -18,6 +18,7 @@ from rendergraph.cli import main
 from rendergraph.errors import InputError, Problem
 from rendergraph.link import link
 from rendergraph.resolve import PipelineSpec, resolve
+from rendergraph.session import stages
 
 EFFECT = """/*---
 doc: It, times a number.
@@ -277,7 +278,7 @@ import sys
 import rendergraph as rg
 pipeline = rg.load(sys.argv[1])
 pipeline.check()
-print(*[note.code for note in pipeline.spec.notes])
+print(*[note.code for note in pipeline.resolve().spec.notes])
 print(*sorted(name for name in sys.modules if "evil" in name or "extension" == name.rpartition(".")[2]))
 """
 
@@ -307,7 +308,7 @@ def test_python_in_its_folder_is_never_imported(write: Write) -> None:
     assert list(folder.rglob("*.ran")) == []
     # The same folder named by the user does run: the test would notice.
     words += ["--", "evil"]
-    user = "import sys, rendergraph as rg\nrg.load(sys.argv[1], plugins=['fx']).catalog.get('evil')\n"
+    user = "import sys, rendergraph as rg\nrg.load(sys.argv[1], plugins=['fx']).resolve().catalog.get('evil')\n"
     done = subprocess.run(
         [sys.executable, "-c", user, "p.yaml"], cwd=folder, capture_output=True, text=True, check=False
     )
@@ -477,7 +478,9 @@ def test_other_mistakes_are_not_drawn(write: Write, capsys: pytest.CaptureFixtur
 
 def test_a_whole_graph_is_the_same_sketched() -> None:
     pipeline = rg.load("deferred")
-    assert pipeline.sketch == (pipeline.graph, ())
+    sketch = stages.sketch(pipeline.resolve())
+    assert sketch.missing == ()
+    assert [node.id for node in sketch.graph.nodes] == [node.id for node in pipeline.link().graph.nodes]
 
 
 # --- what shows them -------------------------------------------------------------------------------------------------

@@ -91,10 +91,10 @@ def test_a_vignette_without_a_header_is_the_same(gl: rg.Session, tmp_path: Path)
 def test_a_change_of_a_uniform_compiles_nothing(gl: rg.Session, tmp_path: Path) -> None:
     files = {"source.frag": SOURCE, "v.frag": PLAIN, "p.yaml": pipeline("v.frag", "fragColor")}
     drawn(gl, tmp_path, files)
-    before = gl.programs.compiled
+    before = gl.cache.programs.compiled
     frame = rg.load(tmp_path / "p.yaml", size=SIZE).set("effect.strength", 0.1).render(session=gl)
     np.testing.assert_allclose(np.asarray(frame["image"])[::-1], vignette(0.1, 3), rtol=0, atol=2**-11 + 2e-6)
-    assert gl.programs.compiled == before
+    assert gl.cache.programs.compiled == before
 
 
 COMPUTE = """/*---

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import rendergraph
 from rendergraph.cli.app import main
+from rendergraph.session import RenderOptions, Selection
 
 
 @dataclass(frozen=True)
@@ -48,26 +49,34 @@ def cli(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     return call
 
 
-class FakePipeline:
-    """Answers what `run` asks, without files or GL; `calls` holds what `render` was told."""
-
-    warnings: tuple[Any, ...] = ()
+class FakeStages:
+    """Answers what `run` asks, without files or GL; `calls` holds what was drawn, and with which device."""
 
     def __init__(self, outputs: tuple[str, ...] = ("image", "radiance")) -> None:
         self.graph = SimpleNamespace(outputs=dict.fromkeys(outputs))
         self.calls: dict[str, Any] = {}
         self.fail: BaseException | None = None
+        self.device: int | None = None
 
-    def wanted(self, outputs: list[str], taps: list[str]) -> dict[str, Any]:
-        return {}
+    def resolve(self, selection: Selection) -> Any:
+        return SimpleNamespace(selection=selection)
 
-    def render(self, *, frames: range, outputs: list[str], taps: list[str], on_frame: Any, **rest: Any) -> Any:
-        self.calls = {"frames": frames, "outputs": outputs, "taps": taps, **rest}
-        for number in frames:
+    def link(self, resolved: Any) -> Any:
+        return SimpleNamespace(selection=resolved.selection, graph=self.graph, warnings=())
+
+    def expand(self, linked: Any, options: RenderOptions) -> Any:
+        return SimpleNamespace(linked=linked, options=options, wanted={})
+
+    def gpu(self, device: int | None) -> Any:
+        self.device = device
+        return nullcontext()
+
+    def draw(self, expanded: Any, gpu: Any) -> Iterator[Any]:
+        self.calls = vars(expanded.options) | {"device": self.device}
+        for number in expanded.options.frames:
             if self.fail and number == 2:
                 raise self.fail
-            on_frame(FakeFrame(number))
-        return FakeFrame(frames[-1])
+            yield FakeFrame(number)
 
 
 class FakeFrame:
@@ -99,8 +108,12 @@ class FakeFrame:
 
 
 @pytest.fixture
-def fake(monkeypatch: pytest.MonkeyPatch) -> FakePipeline:
-    """What `rg.load` returns in this test."""
-    pipeline = FakePipeline()
-    monkeypatch.setattr(rendergraph, "load", lambda source, **options: pipeline, raising=False)
-    return pipeline
+def fake(monkeypatch: pytest.MonkeyPatch) -> FakeStages:
+    """What `run` goes through in this test."""
+    from rendergraph.session import gpu, stages
+
+    made = FakeStages()
+    for name in ("resolve", "link", "expand", "draw"):
+        monkeypatch.setattr(stages, name, getattr(made, name))
+    monkeypatch.setattr(gpu, "Gpu", made.gpu)
+    return made

@@ -158,22 +158,18 @@ def test_a_traceback_is_there_for_who_wants_it(cli: Any, fake: Any, monkeypatch:
         main(["run", "x", "--frames", "1-3", "-o", "a.##.png"])
 
 
-def test_sigterm_ends_with_143_and_leaves_no_files(cli: Any, fake: Any, tmp_path: Path) -> None:
-    class Stop(BaseException):
-        pass
+def test_sigterm_ends_with_143_and_leaves_no_files(
+    cli: Any, fake: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rendergraph.session import stages
 
-    render = fake.render
+    def interrupted(expanded: Any, gpu: Any) -> Any:
+        yield from draw(expanded, gpu)  # ended once its frame is written
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(1)
 
-    def interrupted(**options: Any) -> Any:
-        def on_frame(frame: Any) -> None:
-            options_on_frame(frame)
-            os.kill(os.getpid(), signal.SIGTERM)
-            time.sleep(1)
-
-        options_on_frame = options["on_frame"]
-        return render(**options | {"on_frame": on_frame})
-
-    fake.render = interrupted
+    draw = fake.draw
+    monkeypatch.setattr(stages, "draw", interrupted)
     result = cli("run", "x")
     assert result.code == 143
     assert result.err == "terminated\n"
@@ -183,9 +179,9 @@ def test_sigterm_ends_with_143_and_leaves_no_files(cli: Any, fake: Any, tmp_path
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_signals_end_the_process_cleanly(tmp_path: Path, name: str) -> None:
     code = (
-        "import sys, time, rendergraph; from rendergraph.cli import main\n"
-        "def load(*a, **k):\n print('ready', flush=True); time.sleep(30)\n"
-        "rendergraph.load = load\nsys.exit(main(['check', 'x']))"
+        "import sys, time; from rendergraph.cli import main; from rendergraph.session import stages\n"
+        "def resolve(*a, **k):\n print('ready', flush=True); time.sleep(30)\n"
+        "stages.resolve = resolve\nsys.exit(main(['check', 'x']))"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code],

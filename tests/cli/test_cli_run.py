@@ -18,7 +18,7 @@ def test_without_a_file_the_picture_is_named_after_the_pipeline(cli: Any, fake: 
     assert "not drawn: idle: nobody reads it" in result.err
     assert "6×4, 0 passes, 1.0 ms a frame on none (software: no measure of a GPU)" in result.err
     assert images.read("where.png").shape == (4, 6, 3)
-    assert fake.calls["outputs"] == ["image"]
+    assert fake.calls["outputs"] == ("image",)
     assert fake.calls["frames"] == range(1, 2)
 
 
@@ -26,8 +26,8 @@ def test_json_is_one_document_with_the_paths(cli: Any, fake: Any) -> None:
     result = cli("run", "x", "-o", "a.png", "-o", "b.exr", "--tap", "n.p=c.exr", "--json")
     assert result.json["outputs"] == ["a.png", "b.exr", "c.exr"]
     assert set(result.json) == {"pipeline", "device", "size", "passes", "frame_ms", "memory", "culled", "outputs"}
-    assert fake.calls["outputs"] == ["image", "radiance"]
-    assert fake.calls["taps"] == ["n.p"]
+    assert fake.calls["outputs"] == ("image", "radiance")
+    assert fake.calls["taps"] == ("n.p",)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_the_extension_or_the_name_chooses_the_output(
 ) -> None:
     fake.graph.outputs = dict.fromkeys(outputs)
     assert cli("run", "x", "-o", file).code == 0
-    assert fake.calls["outputs"] == [expected]
+    assert fake.calls["outputs"] == (expected,)
 
 
 def test_a_pipeline_without_the_output_is_told(cli: Any, fake: Any) -> None:
@@ -111,31 +111,32 @@ def test_modes_reach_the_renderer(cli: Any, fake: Any) -> None:
     assert asked == {"alias": False, "poison": True, "shuffle": 7, "device": 1, "fps": 30.0}
 
 
-def test_the_selection_reaches_load(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    import rendergraph
+def test_the_selection_reaches_the_stages(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from rendergraph.errors import InputError, Problem
+    from rendergraph.session import Selection, stages
 
-    seen: dict[str, Any] = {}
+    seen: list[Selection] = []
 
-    def load(source: str, **options: Any) -> Any:
-        seen.update(options, source=source)
+    def resolve(selection: Selection) -> Any:
+        seen.append(selection)
         raise InputError(Problem("RG015", "enough"))
 
-    monkeypatch.setattr(rendergraph, "load", load, raising=False)
+    monkeypatch.setattr(stages, "resolve", resolve)
     words = "run x --scene s.glb --camera c --environment e.hdr --size 4x5 -s a.b=1 -s c=2 -p p.yaml --asset-root r"
     assert cli(*words.split(), "--plugin", "n", "--limit", "yaml-depth=9").code == 3
-    assert seen == {
-        "source": "x",
-        "scene": "s.glb",
-        "camera": "c",
-        "environment": "e.hdr",
-        "size": (4, 5),
-        "sets": ["a.b=1", "c=2"],
-        "patches": [Path("p.yaml")],
-        "asset_roots": [Path("r")],
-        "plugins": [Path("n")],
-        "limits": {"yaml-depth": 9},
-    }
+    expected = Selection(
+        source="x",
+        scene="s.glb",
+        camera="c",
+        environment=Path("e.hdr"),
+        size=(4, 5),
+        sets=("a.b=1", "c=2"),
+        patches=(Path("p.yaml"),),
+        asset_roots=(Path("r"),),
+        plugins=(Path("n"),),
+        limits=(("yaml-depth", 9),),
+    )
+    assert seen == [expected]
 
 
 def test_a_failure_keeps_the_frames_that_are_done(cli: Any, fake: Any, tmp_path: Path) -> None:
@@ -149,7 +150,7 @@ def test_a_failure_keeps_the_frames_that_are_done(cli: Any, fake: Any, tmp_path:
 
 
 def test_one_pass_is_a_pass(capsys: pytest.CaptureFixture[str]) -> None:
-    from rendergraph.cli.run import say_summary
+    from rendergraph.cli.output import say_summary
 
     device = {"renderer": "none", "software": False}
     say_summary({"culled": {}, "device": device, "size": (6, 4), "passes": [{}], "frame_ms": {"median": 1.0}})

@@ -102,7 +102,7 @@ class Maker:
         self.made += 1  # files are read when they are needed: each has a name of its own
         path = self.folder / f"v{self.made}.yaml"
         path.write_text(yaml.safe_dump(text, sort_keys=False))
-        return replace(rg.load(path), known_catalog=self.catalog)
+        return replace(rg.load(path), catalog=self.catalog)
 
     @staticmethod
     def random_nodes(seed: int, count: int = 9) -> dict[str, Any]:

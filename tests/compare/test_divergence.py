@@ -15,8 +15,8 @@ from rendergraph.diff import diff
 
 
 def found(session: rg.Session, a: rg.Pipeline, b: rg.Pipeline, frame: int = 1) -> Difference | None:
-    seen = [every_output(session, pipeline, pipeline.plan(), frame) for pipeline in (a, b)]
-    return first_difference(seen[0], seen[1], b.plan(), b.graph, diff(a.graph, b.graph))
+    seen = [every_output(session, pipeline.check(), frame) for pipeline in (a, b)]
+    return first_difference(seen[0], seen[1], b.plan(), b.link().graph, diff(a.link().graph, b.link().graph))
 
 
 @pytest.mark.slow
@@ -27,7 +27,7 @@ def test_a_mutated_node_is_the_first_that_differs(make: Any, gl: rg.Session) -> 
         nodes = make.random_nodes(seed)
         last = f"{list(nodes)[-1]}.color"
         base = make(nodes, last)
-        tapped = every_output(gl, base, base.plan(), 2)
+        tapped = every_output(gl, base.check(), 2)
         chooser = random.Random(seed)
         for _ in range(5):
             name = chooser.choice(passes(base.plan()))
@@ -35,8 +35,10 @@ def test_a_mutated_node_is_the_first_that_differs(make: Any, gl: rg.Session) -> 
             key = {"pattern": "seed", "mix": "gain", "trail": "weight"}[nodes[name]["type"]]
             mutated[name].setdefault("params", {})[key] = round(chooser.uniform(0.1, 0.9), 4)
             other = make(mutated, last)
-            seen = every_output(gl, other, other.plan(), 2)
-            first = first_difference(tapped, seen, other.plan(), other.graph, diff(base.graph, other.graph))
+            seen = every_output(gl, other.check(), 2)
+            first = first_difference(
+                tapped, seen, other.plan(), other.link().graph, diff(base.link().graph, other.link().graph)
+            )
             hits += first is not None and (first.node, first.causes) == (name, (name,))
     assert hits >= 48
 
@@ -96,7 +98,7 @@ def test_every_version_of_a_continued_texture_is_seen(make: Any, gl: rg.Session)
         "two": {"type": "stamp", "inputs": {"color": "one.color"}},
     }
     base = make(nodes, "two.color")
-    assert taps(base.graph, base.plan()) == ["p.color", "one.color", "two.color"]
+    assert taps(base.link().graph, base.plan()) == ["p.color", "one.color", "two.color"]
     first = found(gl, base, base.set("two.amount", 0.5))
     assert first is not None
     assert first.node == "two"

@@ -46,8 +46,9 @@ def pictures(
 ) -> list[Any]:
     """Every variant's picture, drawn together."""
     drawn: dict[int, Any] = {}
-    for batch in batches(variants, range(len(variants)), most_bytes):
-        for each in draw(session, variants, batch, frame):
+    planned = [variant.check() for variant in variants]
+    for batch in batches(planned, range(len(variants)), most_bytes):
+        for each in draw(session, planned, batch, frame):
             drawn[each.number] = each.arrays["radiance"]
     return [drawn[number] for number in range(len(variants))]
 
@@ -69,8 +70,8 @@ def test_random_variants_draw_each_distinct_pass_once_and_the_same_pictures(
             if nodes[name]["type"] == "mix":
                 other[name].setdefault("params", {})["gain"] = chooser.choice([0.2, 0.8])
         variants.append(make(other, f"{list(nodes)[-1]}.color"))
-    (batch,) = batches(variants, range(4))
-    assert batch.pass_count == distinct([variant.graph for variant in variants])
+    (batch,) = batches([variant.check() for variant in variants], range(4))
+    assert batch.pass_count == distinct([variant.link().graph for variant in variants])
     for together, own in zip(pictures(gl, variants, 3), alone(gl, variants, 3), strict=True):
         np.testing.assert_array_equal(together, own)
 
@@ -78,7 +79,7 @@ def test_random_variants_draw_each_distinct_pass_once_and_the_same_pictures(
 def test_ids_do_not_matter(make: Any) -> None:
     a = make({"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}, "q.color")
     b = make({"x": {"type": "pattern"}, "y": {"type": "mix", "inputs": {"a": "x.color"}}}, "y.color")
-    merged = merge([a.graph, b.graph])
+    merged = merge([a.link().graph, b.link().graph])
     assert [node.id for node in merged.graph.nodes] == ["p", "q"]
     assert merged.names == ({"p": "p", "q": "q"}, {"x": "p", "y": "q"})
     assert {str(end) for end in merged.graph.outputs.values()} == {"q.color"}
@@ -97,7 +98,7 @@ def test_a_texture_that_two_continue_is_made_for_each(make: Any, gl: rg.Session)
         return found
 
     variants = [make(nodes(amount), "late.color") for amount in (0.25, 0.5, None, 0.25)]
-    merged = merge([variant.graph for variant in variants])
+    merged = merge([variant.link().graph for variant in variants])
     assert sum(node.type.name == "pattern" for node in merged.graph.nodes) == 3
     for together, own in zip(pictures(gl, variants), alone(gl, variants), strict=True):
         np.testing.assert_array_equal(together, own)
@@ -112,7 +113,7 @@ def test_last_frame_closes_circles(make: Any, gl: rg.Session) -> None:
         }
 
     variants = [make(nodes(gain), "end.color") for gain in (0.2, 0.8)]
-    (batch,) = batches(variants, range(2))
+    (batch,) = batches([variant.check() for variant in variants], range(2))
     assert batch.pass_count == 4
     for together, own in zip(pictures(gl, variants, 4), alone(gl, variants, 4), strict=True):
         np.testing.assert_array_equal(together, own)
@@ -122,7 +123,7 @@ def test_little_memory_means_several_batches(make: Any, gl: rg.Session) -> None:
     nodes = {"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}
     base = make(nodes, "q.color")
     variants = [base.set("q.gain", gain / 10) for gain in range(6)]
-    few = batches(variants, range(6), most_bytes=4 * 8 * 8 * 16)
+    few = batches([variant.check() for variant in variants], range(6), most_bytes=4 * 8 * 8 * 16)
     assert len(few) > 1
     assert sorted(number for batch in few for number in batch.numbers) == list(range(6))
     for together, own in zip(pictures(gl, variants, most_bytes=1), alone(gl, variants), strict=True):
@@ -134,7 +135,7 @@ def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> Non
     variants = [base.set("sun.resolution", size).set("shadows.taps", taps) for size in (64, 256) for taps in (1, 3)]
     forms = [rg.load("forward", size=(48, 27)).set("sun.resolution", size) for size in (64, 256)]
     variants += [form.set("shadows.taps", 1) for form in forms]
-    (batch,) = batches(variants, range(6))
+    (batch,) = batches([variant.check() for variant in variants], range(6))
     assert batch.pass_count == 1 + 2 + 4 + 4 + 4 + 2 + 2  # prepass, sun, shadows, light and display twice
     for together, own in zip(pictures(gl, variants), alone(gl, variants), strict=True):
         np.testing.assert_array_equal(together, own)
@@ -144,11 +145,12 @@ def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> Non
 @pytest.mark.parametrize("name", shipped_pipelines())
 def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> None:
     base = rg.load(name, size=(48, 27))
-    base = base.set("sun.resolution", 64) if "sun" in base.graph.dag else base
-    ends = {end.node for end in base.graph.outputs.values()}
+    base = base.set("sun.resolution", 64) if "sun" in base.link().graph.dag else base
+    ends = {end.node for end in base.link().graph.outputs.values()}
     variants = [base, *(base.set("display.exposure", 0.5) for _ in range("display" in ends))]
-    (batch,) = batches(variants, range(len(variants)))
-    drawn = [each.arrays for each in draw(gl, variants, batch, 2)]
+    planned = [variant.check() for variant in variants]
+    (batch,) = batches(planned, range(len(variants)))
+    drawn = [each.arrays for each in draw(gl, planned, batch, 2)]
     assert batch.pass_count <= len(passes(base.plan())) + 1
     for arrays, variant in zip(drawn, variants, strict=True):
         for output, pixels in gl.render(variant, frames=range(1, 3)).items():

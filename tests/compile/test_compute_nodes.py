@@ -51,7 +51,7 @@ def test_a_histogram_is_a_class_and_a_shader(histogram: Any, gl: rg.Session, sid
 
 
 def test_a_step_covers_what_it_reads_where_it_writes_no_texture(histogram: Any) -> None:
-    steps = histogram.pipeline(TEXT, size="[17, 9]").expansion(taps=["count.counts"]).steps
+    steps = histogram.pipeline(TEXT, size="[17, 9]").expand(taps=["count.counts"]).expansion.steps
     assert [step.invocations for step in steps if step.kind == "compute"] == [(17, 9, 1)]
 
 
@@ -113,7 +113,7 @@ def test_layers_are_covered_too_and_parts_are_flat(author: Any, gl: rg.Session) 
         "void main() { imageStore(part, ivec2(gl_GlobalInvocationID.xy), uvec4(7u)); }",
     )
     pipeline = author.pipeline("nodes:\n  a: {type: wrong}\noutputs: {image: a.layers}\n")
-    assert [step.invocations for step in pipeline.expansion().steps if step.kind == "compute"] == [
+    assert [step.invocations for step in pipeline.expand().expansion.steps if step.kind == "compute"] == [
         (16, 8, 3),
         (8, 4, 1),
     ]

@@ -102,15 +102,15 @@ def test_a_changed_uniform_rebuilds_nothing_and_a_changed_define_one_program(ben
     pipeline = bench.pipeline(text, Ramp, Add, shaders=shaders)
     session = bench.session
     session.render(pipeline)
-    programs, executable = session.programs.compiled, session.active
+    programs, executable = session.cache.programs.compiled, session.cache.active
     frame = session.render(pipeline.set("b.amount", 2.0).set("a.gain", 0.5))
     np.testing.assert_allclose(frame["image"][..., 0], ramp((16, 8))[..., 0] * 0.5 + 2.0, atol=1e-6)
-    assert session.programs.compiled == programs
-    assert session.active is executable
+    assert session.cache.programs.compiled == programs
+    assert session.cache.active is executable
     session.render(pipeline.set("b.sign", "minus"))
-    assert session.programs.compiled == programs + 1
+    assert session.cache.programs.compiled == programs + 1
     session.render(pipeline.with_size((32, 4)))
-    assert session.programs.compiled == programs + 1
+    assert session.cache.programs.compiled == programs + 1
 
 
 def test_two_readers_of_one_texture_have_their_own_samplers(draw: Draw) -> None:
@@ -239,7 +239,7 @@ def test_what_is_said_beside_like_wins(bench: Any) -> None:
         color = Output(Radiance, format="rgba32f", size=(4, 2), doc="Small.")
 
     text = "nodes: {a: {type: small}, b: {type: half, inputs: {source: a.color}}}\noutputs: {image: b.same, o: b.own}"
-    graph = bench.pipeline(text, Small, Half).graph
+    graph = bench.pipeline(text, Small, Half).link().graph
     described = {end.port: info.desc for end, info in graph.textures.items() if end.node == "b"}
     assert (described["same"].format, described["same"].size) == ("rgba32f", (4, 2))
     assert (described["own"].format, described["own"].size) == ("rgba16f", (16, 8))

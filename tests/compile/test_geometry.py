@@ -256,7 +256,7 @@ cameras: {{main: {{eye: [0, 0, {eye}], target: [0, 0, 0], height: 2, near: 0.1, 
     np.testing.assert_allclose(image[4, 4, 0], expected)
 
 
-def test_a_moving_eye_sorts_anew_within_one_run(draw: Draw) -> None:
+def test_a_moving_eye_sorts_anew_within_one_run(bench: Any) -> None:
     scene = """objects:
   a: {shape: box, size: [2, 2, 0.1], at: [0, 0, -1]}
   b: {shape: box, size: [2, 2, 0.1], at: [0, 0, 1]}
@@ -264,8 +264,7 @@ cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 5
 orbit: {camera: main, degrees_per_second: 180}
 """
     text = "nodes: {b: {type: blended}}\noutputs: {image: b.color}"
-    seen: list[float] = []
-    draw(
+    frames = bench.frames(
         text,
         Blended,
         shaders=BLEND,
@@ -273,8 +272,8 @@ orbit: {camera: main, degrees_per_second: 180}
         size=(8, 8),
         frames=range(1, 3),
         fps=1.0,
-        on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])),
     )
+    seen = [float(frame["image"][4, 4, 0]) for frame in frames]
     assert seen == [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2]
 
 
@@ -291,21 +290,20 @@ def test_ten_objects_and_a_thousand_take_the_same_calls(bench: Any) -> None:
     calls = []
     for count in (10, 1000):
         frame = bench.session.render(bench.pipeline(TEXT, Ids, shaders=SHADERS, scene=_grid(count), size=(64, 64)))
-        executable = bench.session.active
+        executable = bench.session.cache.active
         calls.append([len(step.calls) for step in executable.lists[0]])
         assert len(np.unique(frame["image"])) > 10
     assert calls[0] == calls[1]
 
 
-def test_objects_that_move_past_each_other_are_sorted_anew(draw: Draw) -> None:
+def test_objects_that_move_past_each_other_are_sorted_anew(bench: Any) -> None:
     scene = """objects:
   a: {shape: box, size: [2, 2, 0.1], at: [0, 0, -1]}
   b: {shape: box, size: [2, 2, 0.1], at: [0, 0, 0]}
 keyframes: {objects.a.at: {0: [0, 0, -1], 1: [0, 0, 1]}}
 cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 50}}
 """
-    seen: list[float] = []
-    draw(
+    frames = bench.frames(
         "nodes: {b: {type: blended}}\noutputs: {image: b.color}",
         Blended,
         shaders=BLEND,
@@ -313,6 +311,6 @@ cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 5
         size=(8, 8),
         frames=range(1, 3),
         fps=1.0,
-        on_frame=lambda frame: seen.append(float(frame["image"][4, 4, 0])),
     )
+    seen = [float(frame["image"][4, 4, 0]) for frame in frames]
     np.testing.assert_allclose(seen, [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2])

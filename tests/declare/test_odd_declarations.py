@@ -144,10 +144,10 @@ def test_nothing_is_a_traceback(tmp_path: Path, port: str, name: str) -> None:
         told += bool(mistakes)
         if mistakes:
             continue
-        pipeline = replace(rg.load(file), known_catalog=Catalog.of(Stranger, node, shaders=tmp_path))
+        pipeline = replace(rg.load(file), catalog=Catalog.of(Stranger, node, shaders=tmp_path))
         problems: tuple[Problem, ...] = ()
         try:
-            allocate(schedule(expand(pipeline.graph)))
+            allocate(schedule(expand(pipeline.link().graph)))
         except InputError as error:
             problems = error.problems
         assert all(problem.place is not None for problem in problems), (value, problems)

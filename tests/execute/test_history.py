@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -45,11 +45,10 @@ SHADERS = {
 }
 
 
-def test_previous_starts_with_the_first_value_and_goes_on(draw: Draw) -> None:
+def test_previous_starts_with_the_first_value_and_goes_on(bench: Any) -> None:
     text = "nodes: {a: {type: increment, inputs: {before: a.after@previous}}}\noutputs: {image: a.after}"
-    seen: list[float] = []
-    draw(text, Increment, shaders=SHADERS, frames=range(1, 6), on_frame=lambda f: seen.append(float(f["image"].mean())))
-    assert seen == [101, 102, 103, 104, 105]
+    frames = bench.frames(text, Increment, shaders=SHADERS, frames=range(1, 6))
+    assert [float(frame["image"].mean()) for frame in frames] == [101, 102, 103, 104, 105]
 
 
 def test_two_nodes_that_read_each_others_last_frame(draw: Draw) -> None:
@@ -76,22 +75,14 @@ def test_history_starts_afresh_in_every_run(draw: Draw) -> None:
 
 @pytest.mark.parametrize("units", [None, 24])
 def test_history_goes_back_a_frame_whichever_are_drawn_and_however_few_units_there_are(
-    draw: Draw, gl: rg.Session, monkeypatch: pytest.MonkeyPatch, units: int | None
+    bench: Any, gl: rg.Session, monkeypatch: pytest.MonkeyPatch, units: int | None
 ) -> None:
     if units is not None:
         monkeypatch.setitem(gl.device.limits, "units", units)
-    seen: list[list[float]] = []
     text = "nodes: {c: {type: counter}}\noutputs: {image: c.color}"
     size = (8, 8 if units is None else 9)  # another plan, so that it is compiled anew
-    draw(
-        text,
-        Counter,
-        shaders=SHADERS,
-        size=size,
-        frames=range(2, 9, 2),
-        on_frame=lambda frame: seen.append(frame["image"][0, 0].tolist()),
-    )
-    assert seen == [[6, 5], [7, 6], [8, 7], [9, 8]]
+    frames = bench.frames(text, Counter, shaders=SHADERS, size=size, frames=range(2, 9, 2))
+    assert [frame["image"][0, 0].tolist() for frame in frames] == [[6, 5], [7, 6], [8, 7], [9, 8]]
 
 
 class Halve(Node):

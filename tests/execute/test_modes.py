@@ -91,7 +91,7 @@ def test_random_graphs(bench: Any, parents: list[tuple[int, int, int]], outputs:
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines(gl: rg.Session, name: str) -> None:
     pipeline = rg.load(name, size=(48, 32))
-    if "sun" in {node.id for node in pipeline.graph.nodes}:
+    if "sun" in {node.id for node in pipeline.link().graph.nodes}:
         pipeline = pipeline.set("sun.resolution", 256)  # blurred maps of full size take most of a minute
     plain = gl.render(pipeline, alias=False, frames=range(1, 3))
     assert any(array.any() for array in plain.values())
@@ -110,9 +110,9 @@ def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
     session = bench.session
     right = session.render(pipeline, poison=True)["o4"]
     assert np.isfinite(right).all()
-    plan, views = pipeline.plan(), pipeline.expansion().views
-    types = {node.id: node.type for node in pipeline.graph.nodes}
-    camera = view_matrices(next(iter(pipeline.scene.cameras.values())), (16, 8))
+    plan, views = pipeline.plan(), pipeline.expand().expansion.views
+    types = {node.id: node.type for node in pipeline.link().graph.nodes}
+    camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), (16, 8))
     caught = 0
     cases = [(at, name) for at, names in plan.released.items() for name in names if at > 0]
     for at, name in cases:
@@ -120,10 +120,10 @@ def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
         early[at - 1] = (*early.get(at - 1, ()), name)
         wrong = replace(plan, released=early)
         with session.device.current():
-            scene = session._scene(pipeline)
-            broken = compile_plan(session.device, wrong, types, views, scene, session.programs, poison=True)
-            runner = Runner(broken, pipeline.graph)
-            runner.run(1, 0.0, 0.0, pipeline.scene, camera)
+            scene = session.cache.upload(pipeline.link())
+            broken = compile_plan(session.device, wrong, types, views, scene, session.cache.programs, poison=True)
+            runner = Runner(broken, pipeline.link().graph)
+            runner.run(1, 0.0, 0.0, pipeline.link().scene, camera)
             caught += not np.array_equal(runner.read("n4.mixed"), right)
             broken.release()
     assert cases

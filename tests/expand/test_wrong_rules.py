@@ -238,7 +238,7 @@ def test_a_node_that_nobody_wants_remembers_nothing(author: Any) -> None:
         "nodes:\n  a: {type: wrong}\n  b: {type: reader, inputs: {source: a.spare@previous}}\n"
         "  c: {type: reader, inputs: {source: b.color@previous}}\noutputs: {image: a.color}\n"
     )
-    expansion = author.pipeline(text).expansion()
+    expansion = author.pipeline(text).expand().expansion
     assert set(expansion.idle) == {"b", "c"}
     assert all(resource.role != "history" for resource in expansion.resources.values())
 

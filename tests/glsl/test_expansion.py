@@ -129,6 +129,6 @@ def test_a_bomb_does_not_reach_the_driver(tmp_path: Path, gl: rg.Session) -> Non
     (tmp_path / "test.yaml").write_text(
         "rendergraph: 1\nsize: [8, 8]\nnodes: {bomb: {type: bomb}}\noutputs: {image: bomb.color}"
     )
-    pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=Catalog.of(Bomb, shaders=tmp_path))
+    pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=Catalog.of(Bomb, shaders=tmp_path))
     with pytest.raises(InputError, match=r"bomb\.frag:63:1: RG409"):
         gl.render(pipeline)

@@ -126,5 +126,5 @@ def test_shipped_pipelines_begin_by_saying_what_they_show() -> None:
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_the_radiance_of_a_shipped_pipeline_is_what_its_display_is_given(name: str) -> None:
     """An EXR holds all light that the picture shows: glow and transparent surfaces too."""
-    graph = rg.load(name).graph
+    graph = rg.load(name).link().graph
     assert (graph.outputs["radiance"],) == graph["display"].inputs["radiance"]

@@ -10,7 +10,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.errors import InputError
-from rendergraph.session import kept
+from rendergraph.session import executables
 
 
 def load(project: Path) -> rg.Pipeline:
@@ -22,7 +22,7 @@ def value(gl: rg.Session, pipeline: rg.Pipeline, name: str = "image") -> float:
 
 
 def made(gl: rg.Session) -> tuple[int, int]:
-    return gl.programs.compiled, gl.device.textures_made
+    return gl.cache.programs.compiled, gl.device.textures_made
 
 
 def test_a_changed_include_of_an_include_compiles_the_programs_that_use_it(
@@ -59,14 +59,14 @@ def test_a_parameter_makes_nothing_and_a_define_one_program(gl: rg.Session, proj
 
 def test_a_module_and_its_helper_are_imported_anew(gl: rg.Session, project: Path, edit: Any) -> None:
     before = load(project)
-    old = before.catalog.get("flat").cls
+    old = before.resolve().catalog.get("flat").cls
     assert value(gl, before) == 0.5
     edit("fx/_values.py", "1.0", "2.0")  # as long as before, and within the same second
     after = load(project)
     assert value(gl, after) == 1.0
-    assert after.catalog.get("flat").cls is not old
-    assert old not in vars(sys.modules[after.catalog.get("flat").cls.__module__]).values()
-    assert load(project).catalog.get("flat").cls is after.catalog.get("flat").cls
+    assert after.resolve().catalog.get("flat").cls is not old
+    assert old not in vars(sys.modules[after.resolve().catalog.get("flat").cls.__module__]).values()
+    assert load(project).resolve().catalog.get("flat").cls is after.resolve().catalog.get("flat").cls
     edit("fx/flat.py", "default=GAIN", "default=3.0")
     assert value(gl, load(project)) == 1.5
     assert value(gl, before) == 0.5  # what was loaded stays what it was
@@ -101,12 +101,12 @@ def test_a_changed_mesh_is_read_again_and_an_unchanged_one_is_not(gl: rg.Session
         depth = gl.render(rg.load("deferred", scene=tmp_path / "s.yaml", size=(32, 32)), taps=["gbuffer.depth"])
         return int((depth["gbuffer.depth"] < 1).sum())
 
-    first, scenes = covered(), gl.scenes_made
+    first, scenes = covered(), gl.cache.scenes_made
     assert covered() == first
-    assert gl.scenes_made == scenes
+    assert gl.cache.scenes_made == scenes
     (tmp_path / "it.obj").write_text(triangle.format(0).replace("v 1", "v 0"))
     assert covered() < first * 0.7
-    assert gl.scenes_made == scenes + 1
+    assert gl.cache.scenes_made == scenes + 1
 
 
 def test_executables_are_kept_within_a_budget_of_bytes(
@@ -119,10 +119,10 @@ def test_executables_are_kept_within_a_budget_of_bytes(
     for variant in variants:
         gl.render(variant)
     assert made(gl) == before
-    largest = gl.active.plan.memory.allocated_bytes if gl.active else 0
-    monkeypatch.setattr(kept, "MOST_BYTES", largest)
+    largest = gl.cache.active.plan.memory.allocated_bytes if gl.cache.active else 0
+    monkeypatch.setattr(executables, "MOST_BYTES", largest)
     gl.render(variants[0].set("flat.steps", 4))
-    assert len(gl._kept._entries) == 1
+    assert len(gl.cache._executables._entries) == 1
     gl.render(variants[2])
     assert made(gl)[1] == before[1] + 4
 
@@ -131,8 +131,8 @@ def test_programs_of_a_text_that_is_gone_are_freed(project: Path, edit: Any) -> 
     with rg.Session() as session:
         pipeline = load(project)
         value(session, pipeline)
-        count = len(session.programs._programs)
+        count = len(session.cache.programs._programs)
         for number in range(5):
             edit("fx/inner.glsl", "0.5" if number == 0 else str(number), str(number + 1))
             assert value(session, pipeline) == number + 1
-        assert len(session.programs._programs) == count
+        assert len(session.cache.programs._programs) == count

@@ -195,7 +195,7 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory) -> rg.Pipeline:
         "rendergraph: 1\nsize: [16, 8]\nnodes:\n  s: {type: stranger}\n  a: {type: odd, inputs: {source: s.color}}\n"
         "outputs: {image: a.color}\n"
     )
-    return replace(rg.load(file), known_catalog=Catalog.of(Stranger, Odd, shaders=file.parent))
+    return replace(rg.load(file), catalog=Catalog.of(Stranger, Odd, shaders=file.parent))
 
 
 @pytest.mark.parametrize(("method", "argument"), list(cases()))
@@ -209,7 +209,7 @@ def test_nothing_is_a_traceback(pipeline: rg.Pipeline, gl: rg.Session, method: s
 
         Odd.act = act
         try:
-            allocate(schedule(expand(pipeline.graph)))
+            allocate(schedule(expand(pipeline.link().graph)))
         except InputError as error:
             refused += 1
             (problem,) = error.problems

@@ -68,8 +68,14 @@ def session() -> Iterator[rg.Session]:
 
 
 @pytest.fixture
-def draw(tmp_path: Path, session: rg.Session) -> Draw:
-    """`draw(picture, text)`: the nodes of `text`, which read `picture.radiance`.
+def draw(frames: Callable[..., list[rg.Frame]]) -> Draw:
+    """As `frames`, and gives the last one."""
+    return lambda *given, **options: frames(*given, **options)[-1]
+
+
+@pytest.fixture
+def frames(tmp_path: Path, session: rg.Session) -> Callable[..., list[rg.Frame]]:
+    """`frames(picture, text)`: every frame of the nodes of `text`, which read `picture.radiance`.
 
     The picture is an array (height, width, 1, 3 or 4 channels; alpha 1 where missing), or a function of the frame.
     """
@@ -77,18 +83,18 @@ def draw(tmp_path: Path, session: rg.Session) -> Draw:
     (tmp_path / "shaders/picture.frag").write_text(SHOW)
     catalog = Catalog.of(*NODES, shaders=tmp_path / "shaders")
 
-    def run(picture: Floats | Callable[[int], Floats], text: str, **options: Any) -> rg.Frame:
+    def run(picture: Floats | Callable[[int], Floats], text: str, **options: Any) -> list[rg.Frame]:
         moving = picture if callable(picture) else lambda _frame: picture
         Picture.given = staticmethod(lambda frame: with_alpha(moving(frame)))
         height, width = with_alpha(moving(1)).shape[:2]
         (tmp_path / "test.yaml").write_text(
             f"rendergraph: 1\nsize: [{width}, {height}]\nnodes:\n  picture: {{type: picture}}\n{text}\n"
         )
-        pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=catalog)
-        frame = session.render(pipeline, **options)
-        with session.device.current():
+        pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
+        frames = list(session.frames(pipeline, **options))
+        with session.current():
             assert session.device.raw.error() is None
-        return frame
+        return frames
 
     return run
 

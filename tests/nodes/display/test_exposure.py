@@ -15,6 +15,7 @@ import rendergraph as rg
 
 Floats = npt.NDArray[Any]
 Draw = Callable[..., rg.Frame]
+Frames = Callable[..., list[rg.Frame]]
 Noise = Callable[..., Floats]
 
 RELATIVE = 3e-6  # float32 sums of a few thousand logarithms
@@ -117,39 +118,34 @@ def grey(value: float) -> Floats:
     return np.full((3, 5, 3), value, np.float32)
 
 
-def over_frames(draw: Draw, picture: Any, text: str, count: int, **options: Any) -> Floats:
-    seen: list[float] = []
-
-    def keep(frame: rg.Frame) -> None:
-        seen.append(float(frame["luminance"][0, 0, 0]))
-
-    draw(picture, text, frames=range(1, count + 1), on_frame=keep, **options)
-    return np.array(seen)
+def over_frames(frames: Frames, picture: Any, text: str, count: int, **options: Any) -> Floats:
+    drawn = frames(picture, text, frames=range(1, count + 1), **options)
+    return np.array([float(frame["luminance"][0, 0, 0]) for frame in drawn])
 
 
-def test_reference_adaptation(draw: Draw, shared: Path) -> None:
+def test_reference_adaptation(frames: Frames, shared: Path) -> None:
     case = json.loads((shared / "reference/b7_post/values.json").read_text())["images"]["adaptation"]
     text = nodes(previous=True, start=case["start"], seconds_to_light=case["tau"], seconds_to_dark=9, delta=1e-9)
-    seen = over_frames(draw, grey(case["target"]), text, len(case["values"]), fps=1 / case["dt"])
+    seen = over_frames(frames, grey(case["target"]), text, len(case["values"]), fps=1 / case["dt"])
     np.testing.assert_allclose(seen, case["values"], rtol=5e-6)
 
 
 @pytest.mark.parametrize(("start", "target", "seconds"), [(0.01, 4.0, 0.3), (4.0, 0.01, 1.2)])
 @pytest.mark.parametrize("fps", [10.0, 60.0])
-def test_the_eye_follows_exponentially(draw: Draw, start: float, target: float, seconds: float, fps: float) -> None:
+def test_the_eye_follows_exponentially(frames: Frames, start: float, target: float, seconds: float, fps: float) -> None:
     """`target + (start - target) exp(-t / seconds)` with the time constant of the direction, at any frame rate."""
     text = nodes(previous=True, start=start, seconds_to_light=0.3, seconds_to_dark=1.2, delta=1e-9)
     count = 1 + int(fps)
-    seen = over_frames(draw, grey(target), text, count, fps=fps)
+    seen = over_frames(frames, grey(target), text, count, fps=fps)
     time = np.arange(count) / fps
     np.testing.assert_allclose(seen, target + (start - target) * np.exp(-time / seconds), rtol=1e-5)
 
 
-def test_light_goes_on_and_off(draw: Draw) -> None:
+def test_light_goes_on_and_off(frames: Frames) -> None:
     """The first frame is at once; then the light goes on for ten frames, and off again."""
     rooms = [0.1] * 5 + [10.0] * 10 + [0.1] * 10
     text = nodes(previous=True, seconds_to_light=0.2, seconds_to_dark=0.8, delta=1e-9)
-    seen = over_frames(draw, lambda frame: grey(rooms[frame - 1]), text, len(rooms))
+    seen = over_frames(frames, lambda frame: grey(rooms[frame - 1]), text, len(rooms))
     expected = [rooms[0]]
     for room in rooms[1:]:
         old, seconds = expected[-1], 0.2 if room > expected[-1] else 0.8
@@ -157,15 +153,15 @@ def test_light_goes_on_and_off(draw: Draw) -> None:
     np.testing.assert_allclose(seen, expected, rtol=1e-5)
 
 
-def test_no_time_constant_is_at_once(draw: Draw) -> None:
+def test_no_time_constant_is_at_once(frames: Frames) -> None:
     rooms = [0.1, 10.0, 0.3]
     text = nodes(previous=True, seconds_to_light=0, seconds_to_dark=0, delta=1e-9)
-    seen = over_frames(draw, lambda frame: grey(rooms[frame - 1]), text, 3)
+    seen = over_frames(frames, lambda frame: grey(rooms[frame - 1]), text, 3)
     np.testing.assert_allclose(seen, rooms, rtol=RELATIVE)
 
 
-def test_without_last_frame_it_adapts_at_once(draw: Draw) -> None:
-    seen = over_frames(draw, lambda frame: grey(float(frame)), nodes(start=50, delta=1e-9), 3)
+def test_without_last_frame_it_adapts_at_once(frames: Frames) -> None:
+    seen = over_frames(frames, lambda frame: grey(float(frame)), nodes(start=50, delta=1e-9), 3)
     np.testing.assert_allclose(seen, [1, 2, 3], rtol=RELATIVE)
 
 

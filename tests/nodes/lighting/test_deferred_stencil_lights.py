@@ -88,11 +88,11 @@ def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shad
 
 def fragments(session: rg.Session, pipeline: rg.Pipeline) -> list[int]:
     """Fragments that each step of `light` lets through, in order."""
-    camera = view_matrices(next(iter(pipeline.scene.cameras.values())), pipeline.graph.size)
+    camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), pipeline.link().graph.size)
     raw, counts = session.device.raw, []
     with session.device.ctx:
-        runner = session.prepare(pipeline)
-        runner.run(1, 0.0, 0.0, pipeline.scene, camera)
+        runner = session.compile(pipeline).runner
+        runner.run(1, 0.0, 0.0, pipeline.link().scene, camera)
         for step in runner.executable.lists[0]:
             query = raw.make("glCreateQueries", _SAMPLES_PASSED)
             raw.glBeginQuery(_SAMPLES_PASSED, query)
@@ -114,14 +114,14 @@ def test_a_light_is_computed_where_it_reaches(session: rg.Session, tmp_path: Pat
     """The pixels whose surface lies in the ball or cone, counted in NumPy, and few more: the volume has flat faces."""
     pipeline = rg.load("deferred-stencil-lights", scene=room(tmp_path, LIGHTS[name]), size=SIZE, sets=[FULL])
     depth = np.asarray(session.render(pipeline, taps=["gbuffer.depth"])["gbuffer.depth"], np.float64)[..., 0]
-    view = view_matrices(next(iter(pipeline.scene.cameras.values())), SIZE)
+    view = view_matrices(next(iter(pipeline.link().scene.cameras.values())), SIZE)
     x = (np.arange(SIZE[0]) + 0.5) / SIZE[0] * 2 - 1
     y = 1 - (np.arange(SIZE[1]) + 0.5) / SIZE[1] * 2
     clip = np.stack([*np.meshgrid(x, y), depth * 2 - 1, np.ones_like(depth)], -1)
     world = clip @ np.linalg.inv(view.projection @ view.view).T
     everywhere, copied, *draws = fragments(session, pipeline)
     assert everywhere == copied == SIZE[0] * SIZE[1]
-    local = [light for light in pipeline.scene.lights if light.type != "directional"]
+    local = [light for light in pipeline.link().scene.lights if light.type != "directional"]
     assert len(draws) == 2 * len(local)
     for light, shaded in zip(local, draws[1::2], strict=True):
         towards = world[..., :3] / world[..., 3:] - light.position

@@ -109,9 +109,9 @@ nodes:
   disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}}}}}
 outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, rough: ao.rough, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
 """)
-        pipeline = replace(rg.load(tmp_path / "test.yaml"), known_catalog=catalog)
+        pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
         frame = session.render(pipeline)
-        camera = view_matrices(next(iter(pipeline.scene.cameras.values())), size)
+        camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), size)
         return frame, camera
 
     return run

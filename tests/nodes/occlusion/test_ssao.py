@@ -189,7 +189,7 @@ def test_occlusion_stays_where_it_is_when_the_eye_goes_back(
         sets = ["ao.samples=128", "ao.radius=0.7"]
         pipeline = rg.load(f"ssao-{technique}", scene=file, size=(240, 180), sets=sets, patches=[patch])
         frame = session.render(pipeline)
-        view = view_matrices(next(iter(pipeline.scene.cameras.values())), (240, 180))
+        view = view_matrices(next(iter(pipeline.link().scene.cameras.values())), (240, 180))
         return frame["occlusion"][::-1, :, 0].astype(float), frame["depth"][::-1, :, 0].astype(float), view
 
     (near, depth, close), (far, far_depth, away) = look(4), look(6)

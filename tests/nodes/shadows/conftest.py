@@ -77,10 +77,10 @@ def look(session: rg.Session) -> Callable[..., Looked]:
         taps = ("sun.shadow_map", "shadows.visibility", "gbuffer.depth")
         frame = session.render(loaded, outputs=(), taps=taps, warm_up=False)
         depth, visibility, seen = (np.asarray(frame[tap], np.float64)[..., ::-1, :, 0] for tap in taps)
-        stage = loaded.scene
+        stage = loaded.link().scene
         camera = view_matrices(next(iter(stage.cameras.values())), size)
-        table = [end for end in loaded.graph.textures if str(end) == "sun.shadow_map"]
-        view = light_views(loaded.graph.textures[table[0]].lights, Stage(stage), camera, resolution)[0]
+        table = [end for end in loaded.link().graph.textures if str(end) == "sun.shadow_map"]
+        view = light_views(loaded.link().graph.textures[table[0]].lights, Stage(stage), camera, resolution)[0]
         y, x = np.mgrid[0 : size[1], 0 : size[0]]
         clip = np.stack([(x + 0.5) / size[0], (y + 0.5) / size[1], seen, np.ones_like(seen)], -1)
         clip[..., :3] = clip[..., :3] * 2 - 1

@@ -137,7 +137,7 @@ def test_layers_share_what_they_are_filtered_through(tmp_path: Path) -> None:
     """One texture of rows for nine layers: a step a layer writes it, the next reads it."""
     sets = ("shadows.type=shadow_vsm", "sun.light=[sun, lamp, bulb, far]", "sun.resolution=256")
     loaded = rg.load("forward", scene=stage(tmp_path, *LIGHTS), size=(160, 120), sets=sets)
-    resources = loaded.expansion().resources
+    resources = loaded.expand().expansion.resources
     layers = {name: each.desc.layers for name, each in resources.items() if isinstance(each.desc, TextureDesc)}
     assert layers["shadows.filtered"] == 9
     assert layers["shadows.rows"] == 1

@@ -1,13 +1,17 @@
-"""Compiled pipelines that a session keeps, each with its textures."""
+"""Compiled pipelines that stay on the GPU, each with its textures."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from rendergraph.compile import Executable
+from rendergraph.declare import Node
+from rendergraph.expand import Expansion
 from rendergraph.gl.programs import Program
+from rendergraph.session.values import Expanded
 from rendergraph.stamps import Stamp, again, changed
 
 MOST = 4
@@ -28,7 +32,7 @@ class _Entry:
 
 
 @dataclass(eq=False)
-class Kept:
+class ExecutableCache:
     """The last few that were drawn, as long as their shader files stay as they were.
 
     Attributes:
@@ -73,6 +77,44 @@ class Kept:
         for entry in self._entries.values():
             entry.executable.release()
         self._entries.clear()
+
+
+def key_of(expanded: Expanded) -> Hashable:
+    """What decides that a compiled pipeline can be drawn in place of another: all but the values of uniforms."""
+    linked, options = expanded.linked, expanded.options
+    sources = tuple(
+        (node.id, node.type.shaders, node.type.inherited, _declared(node.type.cls)) for node in linked.graph.nodes
+    )
+    modes = options.alias, options.poison, options.shuffle
+    return _structure(expanded.expansion), sources, id(linked.scene), modes
+
+
+def _declared(cls: type[Node]) -> tuple[Any, ...]:
+    """What program text takes from a class beside the steps it recorded: a module that is imported anew may differ."""
+    return tuple(
+        (
+            name,
+            type(port),
+            getattr(port, "kind", None),
+            getattr(port, "semantic", None),
+            getattr(port, "signature", None),
+        )
+        for name, port in cls.ports().items()
+    )
+
+
+def _structure(expansion: Expansion) -> tuple[Any, ...]:
+    """An expansion without the values that can change in a compiled pipeline."""
+    steps = tuple(
+        replace(
+            step,
+            uniforms=tuple((name, None) for name, _ in step.uniforms),  # type: ignore[misc]
+            functions=tuple(replace(f, uniforms=()) for f in step.functions),
+        )
+        for step in expansion.steps
+    )
+    resources = tuple(expansion.resources.values())
+    return steps, resources, tuple(expansion.wanted.items()), tuple(expansion.views.items())
 
 
 def _programs(executable: Executable) -> set[Program]:

@@ -1,0 +1,130 @@
+"""What is asked for, before anything is read: which pipeline with what said about it, and how it is to be drawn.
+
+Both are plain frozen values without GL, files or modules in them, so that a run can be sent to another process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, TypedDict
+
+from rendergraph.errors import Problem, UsageError, suggestion
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A pipeline's name with everything that changes it, as the options of every verb say it.
+
+    Attributes:
+        source: a shipped name (`forward`) or a path.
+        scene, size: override the file's; `size` is width and height in pixels.
+        environment: an equirectangular image that replaces the scene's.
+        camera: name of the scene's camera; its first by default.
+        sets: what `-s` takes, such as `ao.radius=0.8`.
+        patches: merge patches, as files or mappings.
+        asset_roots: more folders that the file may reach.
+        limits: what files may ask for, by the names that messages give: `yaml-depth`, `scene-vertices`, …;
+            `plan-memory`, in MiB, is what textures may take.
+        plugins: Python files or folders with node types.
+
+    Raises:
+        UsageError: a limit of an unknown name.
+    """
+
+    source: str
+    scene: str | None = None
+    camera: str | None = None
+    environment: Path | None = None
+    size: tuple[int, int] | None = None
+    sets: tuple[str, ...] = ()
+    patches: tuple[Path | Mapping[str, Any], ...] = ()
+    asset_roots: tuple[Path, ...] = ()
+    limits: tuple[tuple[str, int], ...] = ()
+    plugins: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.limits:
+            return
+        known = {name for names in _limit_names().values() for name in names}
+        for name, _ in self.limits:
+            if name not in known:
+                raise UsageError(Problem("RG500", f"there is no limit '{name}'{suggestion(name, known)}"))
+
+    def allowed(self, kind: str) -> dict[str, int]:
+        """The limits set for `yaml` or `scene` files, or for the `plan`, by field."""
+        names = _limit_names()[kind] if self.limits else {}
+        return {names[name]: most for name, most in self.limits if name in names}
+
+
+def _limit_names() -> dict[str, dict[str, str]]:
+    """What each kind of file has limits of: the name on the command line to the field."""
+    from rendergraph.document import Limits as YamlLimits
+    from rendergraph.scene.files import Limits as SceneLimits
+
+    names = {
+        kind: {f"{kind}-{entry.name.replace('_', '-')}": entry.name for entry in fields(limits)}
+        for kind, limits in (("yaml", YamlLimits), ("scene", SceneLimits))
+    }
+    return {**names, "plan": {"plan-memory": "memory"}}
+
+
+class RenderKeywords(TypedDict, total=False):
+    """The fields of `RenderOptions` as keywords; names may be any sequence there, or the text of a single one."""
+
+    frames: range
+    fps: float
+    outputs: Sequence[str] | None
+    taps: Sequence[str]
+    alias: bool
+    poison: bool
+    shuffle: int | None
+    warm_up: bool
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """What is drawn of a pipeline, and how; keywords of `render`, `frames` and `plan`.
+
+    Attributes:
+        frames: frame numbers from 1; frame 1 is time 0.
+        fps: frames a second.
+        outputs: names of the outputs to compute, all of the file's by default.
+        taps: further ports to read, `node.port`.
+        alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, the seed of a random legal
+            order instead of the best one.
+        warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it.
+
+    Raises:
+        UsageError: frames or frames a second that there cannot be.
+    """
+
+    frames: range = range(1, 2)
+    fps: float = 30.0
+    outputs: tuple[str, ...] | None = None
+    taps: tuple[str, ...] = ()
+    alias: bool = True
+    poison: bool = False
+    shuffle: int | None = None
+    warm_up: bool = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.frames, range) or not self.frames or min(self.frames) < 1:
+            text = f"frames is {self.frames!r}; it is a range of numbers from 1, as in range(1, 31) for the first 30"
+            raise UsageError(Problem("RG500", text))
+        if not self.fps > 0:
+            raise UsageError(Problem("RG500", f"fps is {self.fps}; it is a number above 0"))
+
+    @classmethod
+    def of(cls, keywords: RenderKeywords) -> RenderOptions:
+        """The options that keywords spell; None is the default."""
+        given: dict[str, Any] = {name: value for name, value in keywords.items() if value is not None}
+        for name in {"outputs", "taps"} & given.keys():
+            given[name] = _each(given[name])
+        return cls(**given)
+
+
+def _each(names: Iterable[str]) -> tuple[str, ...]:
+    """Several names, or a text that is one: its letters are never meant."""
+    return (names,) if isinstance(names, str) else tuple(names)

@@ -1,0 +1,182 @@
+"""The way from what is asked for to pictures: each stage once, in this order.
+
+    Selection ──resolve──▶ Resolved ──link──▶ Linked ──expand──▶ Expanded ──plan──▶ Planned ──draw──▶ Frames
+
+Every verb, Python's `render` and all comparisons go this way, and stop where they have enough. Nothing here is kept but
+scenes in use (`scenes`) and, from `draw` on, what a `Gpu` keeps. GL is imported when something is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import rendergraph.allocate
+import rendergraph.expand
+import rendergraph.link
+import rendergraph.program
+import rendergraph.resolve
+import rendergraph.schedule
+from rendergraph.catalog import Catalog
+from rendergraph.document import Limits
+from rendergraph.errors import InputError, Problem
+from rendergraph.scene.animate import complete
+from rendergraph.scene.cameras import light_facts
+from rendergraph.scene.model import Scene
+from rendergraph.scene.selection import unfilled_selections
+from rendergraph.session.scenes import scene_of
+from rendergraph.session.selection import RenderOptions, Selection
+from rendergraph.session.values import Expanded, Linked, Planned, Resolved
+from rendergraph.session.wanted import wanted_ports
+
+if TYPE_CHECKING:
+    from rendergraph.session.drawing import Drawing
+    from rendergraph.session.frame import Frame
+    from rendergraph.session.gpu import Gpu
+
+
+def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
+    """Read the file and all it refers to, and apply what was said about it.
+
+    Args:
+        selection: what was asked for.
+        catalog: the node types that can be used; by default those that are installed and those of plugins.
+
+    Raises:
+        InputError: a file is missing, is no YAML, or leads back to itself. What else is wrong `link` raises.
+    """
+    catalog = catalog or Catalog.discover(selection.plugins)
+    spec = rendergraph.resolve.resolve(
+        selection.source,
+        patches=selection.patches,
+        sets=selection.sets,
+        scene=selection.scene,
+        size=selection.size,
+        asset_roots=selection.asset_roots,
+        limits=Limits(**selection.allowed("yaml")),
+        catalog=catalog,
+    )
+    return Resolved(selection, catalog, spec)
+
+
+def link(resolved: Resolved) -> Linked:
+    """Read the scene and make the checked graph.
+
+    Raises:
+        InputError: with all mistakes of the file.
+    """
+    selection, catalog, spec = resolved.selection, resolved.catalog, resolved.spec
+    try:
+        scene = scene_of(resolved)
+    except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
+        raise InputError([*spec.problems, *error.problems]) from None
+    graph = rendergraph.link.link(spec, catalog, light_facts(scene), unfilled_selections(scene))
+    return Linked(selection, catalog, spec, scene, graph)
+
+
+def sketch(resolved: Resolved) -> Linked:
+    """The graph to look at, where node types may be missing: they are in it as far as known, and in `missing`.
+
+    Raises:
+        InputError: something else is wrong; with all mistakes of the file.
+    """
+    selection, catalog, spec = resolved.selection, resolved.catalog, resolved.spec
+    try:
+        return link(resolved)
+    except InputError as error:
+        unread: tuple[Problem, ...] = ()
+        try:
+            scene = scene_of(resolved)
+        except InputError as lacking:  # a mesh that a missing plugin would read
+            if not spec.missing or any(problem.code != "RG303" for problem in lacking.problems):
+                raise error from None
+            scene, unread = complete(Scene("missing")), lacking.problems
+        graph, missing = rendergraph.link.sketch(spec, catalog, light_facts(scene))
+        return Linked(selection, catalog, spec, scene, graph, (*missing, *unread))
+
+
+def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
+    """Record the steps of everything that is wanted.
+
+    Raises:
+        InputError: an output or port that there is not, or a node recorded what its declaration does not allow.
+    """
+    wanted = wanted_ports(linked.graph, options)
+    return Expanded(linked, options, wanted, rendergraph.expand.expand(linked.graph, wanted))
+
+
+def plan(expanded: Expanded) -> Planned:
+    """Order the steps and give their textures memory.
+
+    Raises:
+        InputError: the steps have no legal order.
+    """
+    linked, options, wanted, expansion = expanded.linked, expanded.options, expanded.wanted, expanded.expansion
+    schedule = rendergraph.schedule.schedule(expansion, shuffle=options.shuffle)
+    return Planned(linked, options, wanted, expansion, rendergraph.allocate.allocate(schedule, alias=options.alias))
+
+
+def check(linked: Linked) -> Planned:
+    """Find everything that can be wrong before GL is used, for all of the file's outputs.
+
+    Raises:
+        InputError: with all mistakes found.
+    """
+    planned = plan(expand(linked))
+    types = {node.id: node.type for node in linked.graph.nodes}
+    rendergraph.program.check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
+    return planned
+
+
+def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
+    """Make everything a frame needs; what the `gpu` has kept is taken again where only uniforms differ.
+
+    To be called inside `with gpu.current()`, where the drawing is used too, before anything else is drawn.
+
+    Raises:
+        InputError: a mistake in a shader, or the steps have no legal order.
+        RenderError: the device cannot hold it.
+    """
+    from rendergraph.session.drawing import Drawing
+
+    scene = gpu.cache.upload(expanded.linked)
+    key, executable = gpu.cache.take(expanded)
+    if executable is None:
+        planned = expanded if isinstance(expanded, Planned) else plan(expanded)
+        executable = gpu.cache.make(key, planned, scene)
+    return Drawing(expanded, executable, scene, gpu)
+
+
+def draw(expanded: Expanded, gpu: Gpu) -> Iterator[Frame]:
+    """Draw frame after frame; each is there to look at before the next one is drawn.
+
+    Between two frames the device is as it was before, so that a borrowed one may be used; nothing else can be drawn
+    with this `gpu` meanwhile.
+
+    Raises:
+        InputError: a mistake in a shader.
+        RenderError: it failed while drawing.
+    """
+    with gpu.current():
+        drawing = compile(expanded, gpu)
+        drawing.begin()
+    for number in expanded.options.frames:
+        with gpu.current():
+            drawing.draw(number)
+            frame = drawing.read()
+        yield frame
+
+
+def draw_last(expanded: Expanded, gpu: Gpu) -> Frame:
+    """Draw all frames, and look at the last one only.
+
+    Raises:
+        InputError: a mistake in a shader.
+        RenderError: it failed while drawing.
+    """
+    with gpu.current():
+        drawing = compile(expanded, gpu)
+        drawing.begin()
+        for number in expanded.options.frames:
+            drawing.draw(number)
+        return drawing.read()

@@ -1,0 +1,80 @@
+"""What the stages before the first use of GL hand on, each with what it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from rendergraph.allocate import ResourcePlan
+    from rendergraph.catalog import Catalog
+    from rendergraph.errors import Problem
+    from rendergraph.expand import Expansion
+    from rendergraph.link import Endpoint, Graph
+    from rendergraph.resolve import PipelineSpec
+    from rendergraph.scene.model import Scene
+    from rendergraph.session.selection import RenderOptions, Selection
+
+
+@dataclass(frozen=True, eq=False)
+class Resolved:
+    """The file with everything applied.
+
+    Attributes:
+        selection: what was asked for.
+        catalog: the node types that can be used.
+        spec: the resolved file.
+    """
+
+    selection: Selection
+    catalog: Catalog
+    spec: PipelineSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Linked(Resolved):
+    """The checked graph with its scene.
+
+    Attributes:
+        scene: completed by a camera and a light where it has none.
+        graph: typed nodes and links.
+        missing: what a sketch lacks, such as node types that nobody has; nothing in what can be drawn.
+    """
+
+    scene: Scene
+    graph: Graph
+    missing: tuple[Problem, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What was noticed in the pipeline and the scene and is no error."""
+        return (*self.spec.notes, *self.graph.warnings, *self.scene.warnings, *self.missing)
+
+
+@dataclass(frozen=True, eq=False)
+class Expanded:
+    """The steps of what is wanted.
+
+    Attributes:
+        linked: where they come from.
+        options: what was wanted of it.
+        wanted: the ports that must exist at the end of a frame, by output name or tap.
+        expansion: all steps with what they read and write.
+    """
+
+    linked: Linked
+    options: RenderOptions
+    wanted: Mapping[str, Endpoint]
+    expansion: Expansion
+
+    def for_frames(self, frames: range, *, warm_up: bool = True) -> Self:
+        """The same to be drawn for other frames, which changes neither steps nor plan."""
+        return replace(self, options=replace(self.options, frames=frames, warm_up=warm_up))
+
+
+@dataclass(frozen=True, eq=False)
+class Planned(Expanded):
+    """Steps with their order and their memory."""
+
+    plan: ResourcePlan
