@@ -13,7 +13,7 @@ import numpy.typing as npt
 from rendergraph.compile import Executable
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import happened
-from rendergraph.errors import Misuse, Problem, RenderError, node_named
+from rendergraph.errors import InputError, Misuse, Problem, RenderError, node_named
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.surroundings import settle
@@ -29,7 +29,10 @@ from rendergraph.textures import BufferDesc, TextureDesc
 
 @dataclass(frozen=True)
 class StepTime:
-    """Milliseconds of one step in one frame; `gpu_ms` is None where the driver has no timer."""
+    """Milliseconds of one step in one frame; `gpu_ms` is None where the driver has no timer.
+
+    A node's `update` counts as part of its first step.
+    """
 
     node: str
     cpu_ms: float
@@ -172,7 +175,7 @@ class Runner:
             timed: measure each step; otherwise nothing is measured and None returned.
 
         Raises:
-            RenderError: the driver reported an error, or a node's `update` failed.
+            InputError: a node's `update` failed (RG432, RG433).
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
@@ -182,8 +185,11 @@ class Runner:
         moved = False
         if self._scene is None or self._scene.scene is not scene:
             self._scene, moved = FrameScene(scene), True
+        updates: dict[str, float] = {}
         for node in self._updating:
+            before = perf_counter()
             self._update(node, index, time, camera, self._scene)
+            updates[node.id] = perf_counter() - before
         if not self._complete:
             self._check_views()
         if views.changed or moved:
@@ -215,14 +221,15 @@ class Runner:
                 call()
             if measured:
                 step.timer.stop()
-            taken.append((step.step.node, perf_counter() - before, step.timer))
+            node_id = step.step.node
+            taken.append((node_id, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
         executable.done()
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        steps = tuple(
-            StepTime(node, cpu * 1e3, timer.milliseconds() if measured else None) for node, cpu, timer in taken
-        )
-        return FrameTimes(frame_ms, steps)
+        steps = [StepTime(node_id, cpu * 1e3, None) for node_id, cpu in updates.items()]  # those that draw nothing
+        for node_id, cpu, timer in taken:
+            steps.append(StepTime(node_id, cpu * 1e3, timer.milliseconds() if measured else None))
+        return FrameTimes(frame_ms, tuple(steps))
 
     def activate(self) -> None:
         """Write what holds for all frames; needed once, and again when another pipeline used the programs."""
@@ -241,7 +248,7 @@ class Runner:
             code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
             mistake = happened(error, type(node.node), node.type.file)
             doing = f"{node_named(node.id, node.type.name)} failed in update"
-            raise RenderError(mistake.problem(code, doing, node.place)) from error
+            raise InputError(mistake.problem(code, doing, node.place)) from error
 
     def _check_views(self) -> None:
         """Every table of a node that runs has been filled by its `update`."""
@@ -250,7 +257,7 @@ class Runner:
             if table.count and maker in self._active and name not in self.executable.views.current:
                 node = self.graph[maker]
                 text = f"{node_named(maker, node.type.name)} never sets the views of '{name}'; do so in `update`"
-                raise RenderError(Problem("RG433", text, node.place))
+                raise InputError(Problem("RG433", text, node.place))
         self._complete = True
 
     def check(self) -> None:
@@ -280,7 +287,7 @@ class Runner:
 
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:
-    """Per node, in order of execution, the median over frames of its steps' summed times."""
+    """Per node, in order of execution, the median over frames of its steps' summed times; 0 where none of them ran."""
     sums: dict[str, list[tuple[float, float | None]]] = {}
     for frame in frames:
         totals: dict[str, tuple[float, float | None]] = {}
@@ -293,6 +300,8 @@ def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:
             sums.setdefault(node, []).append(total)
     result = []
     for node, totals_of in sums.items():
+        measured = any(gpu is not None for _, gpu in totals_of)
+        totals_of += [(0.0, 0.0 if measured else None)] * (len(frames) - len(totals_of))
         gpus = [gpu for _, gpu in totals_of if gpu is not None]
         result.append(StepTime(node, _median([cpu for cpu, _ in totals_of]), _median(gpus) if gpus else None))
     return result

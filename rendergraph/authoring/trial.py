@@ -206,6 +206,7 @@ class Trial:
                 value = _POISON[FORMATS[resource.desc.format].family][number]
                 for parity in range(memory.parities):
                     Clear(device, memory.texture(name, parity), value)()
+        executable.renew()  # what is kept has been filled with a poison, too
         runner.reset()
         scene = linked.scene
         camera = view_matrices(next(iter(scene.cameras.values())), linked.graph.size)

@@ -186,8 +186,12 @@ def _recorded(
         except (Exception, SystemExit) as error:  # whatever a stranger's node raises is a mistake in that node
             raise InputError(author_problem(node, error)) from error
         ports = node.node.ports()
-        if recorder.unfilled and not recorder.requests and all(recorder.continues(ports[port]) for port in used):
-            idle[name] = f"the scene has no {recorder.unfilled[0]} objects: there is nothing to draw"
+        if not recorder.requests and all(recorder.continues(ports[port]) for port in used):
+            idle[name] = (
+                f"the scene has no {recorder.unfilled[0]} objects: there is nothing to draw"
+                if recorder.unfilled
+                else "it recorded no step"
+            )
             _pass_on(node, used, demanded)
             continue
         recorders[name] = recorder

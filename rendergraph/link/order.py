@@ -112,7 +112,7 @@ def _readers(nodes: Mapping[str, Bound], writers: Mapping[Endpoint, tuple[Bound,
                 if now not in writers:
                     continue
                 writer, written = writers[now]
-                if link is written or writer is bound:
+                if link is written or (writer is bound and not link.source.previous):
                     continue
                 newer = f"'{writer.spec.id}.{_port(writer, written)}'"
                 where = line_of(written.value.place, link.value.place)

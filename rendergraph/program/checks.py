@@ -96,6 +96,12 @@ def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str,
         return None
     desc = resources[read.resource].desc
     assert isinstance(desc, TextureDesc)
+    if desc.samples > 1 and declared == right.replace("MS", ""):
+        text = (
+            f"'{read.name}' is read as one sample a texel ({declared}), but '{read.resource}' has {desc.samples} "
+            f"samples; resolve it before, or declare it as {right}"
+        )
+        return step.problem("RG214", text)
     what = f"a {read.kind} of {desc.format}" + (f" with {desc.samples} samples" if desc.samples > 1 else "")
     how = ", read with `compare`," if read.sampler.compare else ""
     text = f"'{read.name}' is declared as {declared}, but '{read.resource}'{how} is {what}; declare it as {right}"

@@ -10,7 +10,7 @@ import pytest
 
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Frame, Input, Internal, Node, Output, Radiance, Steps, param
-from rendergraph.errors import RenderError
+from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,7 +133,7 @@ def test_an_update_that_writes_too_much_is_named(draw: Draw) -> None:
 
     text = "nodes: {q: {type: too_much}}\noutputs: {image: q.color}"
     with pytest.raises(
-        RenderError, match=r"RG432 node 'q' .*test_buffers\.py:\d+: it writes 36 bytes into 'corners', which holds 32"
+        InputError, match=r"RG432 node 'q' .*test_buffers\.py:\d+: it writes 36 bytes into 'corners', which holds 32"
     ):
         draw(text, TooMuch, shaders=QUADS)
 

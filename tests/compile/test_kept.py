@@ -24,7 +24,7 @@ from rendergraph.api import (
     Steps,
     param,
 )
-from rendergraph.errors import InputError, RenderError
+from rendergraph.errors import InputError
 
 Draw = Callable[..., rg.Frame]
 
@@ -388,5 +388,5 @@ def test_update_fills_nothing_that_is_kept(bench: Any) -> None:
         "void main() { color = all_numbers; }"
     }
     text = WRONG.replace("NAME", "uploads").replace("a.table}", "a.color}")
-    with pytest.raises(RenderError, match=r"it writes 'numbers', which is kept, in each frame"):
+    with pytest.raises(InputError, match=r"it writes 'numbers', which is kept, in each frame"):
         bench.session.render(bench.pipeline(text, Uploads, DepthMaker, Show, shaders=shaders))

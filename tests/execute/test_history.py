@@ -10,9 +10,11 @@ import pytest
 from rendergraph.api import ADD, History, InOut, Input, Luminance, Node, Output, State, Steps
 from rendergraph.api import Any as AnyTexel
 from rendergraph.declare import declaration_mistakes
+from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
     import rendergraph as rg
 
@@ -128,6 +130,61 @@ def test_the_first_frame_of_a_continued_texture_is_what_its_reader_s_source_says
   plus: {type: plus_from, inputs: {color: half.color}}
 outputs: {image: plus.color}"""
     assert np.all(draw(text, Halve, PlusFrom, shaders=CONTINUED)["image"] == 3)
+
+
+class Blends(Node):
+    """Halves last frame's value and adds one onto what it continues."""
+
+    old = Input(AnyTexel, doc="Last frame's.")
+    color = InOut(AnyTexel, doc="What is added to.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("halve.frag", old=self.old, out=self.color, state=State(blend=ADD))
+
+
+def test_whoever_overwrites_a_texture_does_not_read_its_last_frame_s_value(bench: Any) -> None:
+    text = """nodes:
+  one: {type: ones}
+  blend: {type: blends, inputs: {old: one.color@previous, color: one.color}}
+outputs: {image: blend.color}"""
+    said = r"5:39: RG127 'blend.color' \(line 5\) overwrites 'one.color', last frame's value too; read 'blend.color@previous'"
+    with pytest.raises(InputError, match=said):
+        bench.pipeline(text, Ones, Blends, shaders=CONTINUED).check()
+    mended = text.replace("one.color@previous", "blend.color@previous")
+    frames = [
+        bench.draw(mended, Ones, Blends, shaders=CONTINUED, frames=range(1, count + 1))["image"] for count in (1, 2, 3)
+    ]
+    assert [float(frame.max()) for frame in frames] == [1.0, 1.5, 1.75]
+
+
+class Ones(Node):
+    """One everywhere."""
+
+    color = Output(AnyTexel, format="r32f", doc="1.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("plus.frag", out=self.color)
+
+
+class Silent(Node):
+    """Has nothing to add to what it continues."""
+
+    color = InOut(AnyTexel, doc="What it continues.")
+
+    def record(self, steps: Steps) -> None:
+        pass
+
+
+def test_a_node_that_records_nothing_passes_on_what_it_continues(draw: Draw) -> None:
+    text = """nodes:
+  one: {type: ones}
+  silent: {type: silent, inputs: {color: one.color}}
+  last: {type: plus, inputs: {color: silent.color}}
+outputs: {image: last.color, between: silent.color}"""
+    frame = draw(text, Ones, Silent, Plus, shaders=CONTINUED)
+    assert np.all(frame["image"] == 2)
+    assert np.all(frame["between"] == 1)
+    assert frame.culled["silent"] == "it recorded no step"
 
 
 class Nothing(Node):

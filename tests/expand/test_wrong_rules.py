@@ -150,6 +150,8 @@ def test_an_update_that_fails(author: Any, gl: rg.Session, body: str) -> None:
     )
     author.write(wrong__comp="layout(local_size_x = 1) in;\nvoid main() {}")
     (said,) = author.said(lambda: gl.render(author.pipeline()))
+    with pytest.raises(InputError, match=r"RG43[23]"):  # the author's file is at fault: exit code 3
+        gl.render(author.pipeline())
     where = f"wrong.py:{author.line()}"
     code = "RG432" if UPDATES[body].startswith("RG432") else "RG433"
     text = UPDATES[body].removeprefix("RG432 ")
@@ -176,7 +178,10 @@ def test_views_that_nobody_sets(author: Any, gl: rg.Session) -> None:
         f'{COLOR}views = Views(count=2, doc="Views.")\n\n'
         'def record(self, steps):\n    steps.geometry("wrong.frag", view=self.views)'
     )
-    (said,) = author.said(lambda: gl.render(author.pipeline(scene="objects: {box: {shape: box}}\n")))
+    pipeline = author.pipeline(scene="objects: {box: {shape: box}}\n")
+    with pytest.raises(InputError, match="RG433"):
+        gl.render(pipeline)
+    (said,) = author.said(lambda: gl.render(pipeline))
     assert said == "test.yaml:5:3: RG433 node 'a' (wrong) never sets the views of 'a.views'; do so in `update`"
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from rendergraph.api import ADD, Depth, InOut, Input, Internal, Node, Output, Radiance, State, Steps, structural
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Depth, Input, Internal, Node, Output, Radiance, Steps
 from rendergraph.errors import InputError
 
 
@@ -68,7 +68,7 @@ def test_a_sampler_fits_its_texture(bench: Any, port: str, source: str, right: s
     made = pipeline(bench, port, source, right)
     made.check()
     bench.session.render(made)
-    for declared in CALLS.keys() - {right}:
+    for declared in CALLS.keys() - {right, right.replace("MS", "")}:
         how = ", read with `compare`," if port == "compared" else ""
         said = (
             rf"reader\.frag:1:{10 + len(declared)}: RG447 node 'r' \(reader\): '{port}' is declared as {declared}, "
@@ -112,3 +112,45 @@ def test_a_missing_shader_is_found_by_check(bench: Any) -> None:
         InputError, match=r"test\.yaml:3:27: RG400 node 'r' \(reader\): there is no shader '\S+reader\.frag'"
     ):
         bench.pipeline(text, Maker, Reader).check()
+
+
+def test_one_sample_of_a_multisampled_texture_wants_a_resolve(bench: Any) -> None:
+    said = (
+        r"reader\.frag:1:19: RG214 node 'r' \(reader\): 'many' is read as one sample a texel \(sampler2D\), but 'm.many' "
+        r"has 4 samples; resolve it before, or declare it as sampler2DMS"
+    )
+    with pytest.raises(InputError, match=said):
+        pipeline(bench, "many", "m.many", "sampler2D").check()
+
+
+class Glow(Node):
+    """Reads what it continues."""
+
+    radiance = InOut(Radiance, doc="Picture.")
+    bright = Internal(Radiance, size=0.5)
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("bright.frag", radiance=self.radiance, out={"color": self.bright})
+        steps.fullscreen("add.frag", bright=self.bright, out=self.radiance, state=State(blend=ADD))
+
+
+class Many(Node):
+    """Radiance with some samples."""
+
+    radiance = Output(Radiance, samples=lambda node, facts: node.samples, clear=0.5, doc="Picture.")
+    samples: int = structural(default=4, min=1, max=8, doc="Samples.")
+
+    def record(self, steps: Steps) -> None:
+        steps.clear(self.radiance, 0.5)
+
+
+def test_an_inout_that_is_read_has_one_sample(bench: Any) -> None:
+    shaders = {
+        "bright.frag": "uniform sampler2D radiance; out vec4 color; void main() { color = texelFetch(radiance, ivec2(0), 0); }",
+        "add.frag": "uniform sampler2D bright; out vec4 color; void main() { color = texelFetch(bright, ivec2(0), 0); }",
+    }
+    text = "nodes: {m: {type: many}, g: {type: glow, inputs: {radiance: m.radiance}}}\noutputs: {image: g.radiance}"
+    glow = bench.pipeline(text, Many, Glow, shaders=shaders)
+    glow.set("m.samples", 1).check()
+    with pytest.raises(InputError, match=r"RG214 node 'g' \(glow\): \S+: 'radiance' is read as one sample a texel"):
+        glow.check()
