@@ -16,7 +16,7 @@ from rendergraph.declare.blame import happened
 from rendergraph.errors import InputError, Misuse, Problem, RenderError, node_named
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
-from rendergraph.gl.surroundings import settle
+from rendergraph.gl.saved_state import settle
 from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import bounds

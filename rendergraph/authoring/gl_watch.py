@@ -8,18 +8,18 @@ from typing import Any
 
 from rendergraph.declare import Node
 from rendergraph.gl.device import Device
-from rendergraph.gl.surroundings import Surroundings
+from rendergraph.gl.saved_state import SavedState
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "VertexArray", "Sampler", "Program", "Query", "Renderbuffer")
 _KEPT = {
-    "_enabled": "what is enabled",
-    "_indexed": "blending or the scissor test",
-    "_units": "bound textures and samplers",
-    "_images": "bound images",
-    "_blocks": "bound blocks",
-    "_settings": "settings such as the depth function",
+    "enabled": "what is enabled",
+    "indexed": "blending or the scissor test",
+    "units": "bound textures and samplers",
+    "images": "bound images",
+    "blocks": "bound blocks",
+    "settings": "settings such as the depth function",
 }
-"""What `Surroundings` holds, in words."""
+"""What `SavedState` holds, in words."""
 
 
 def living(device: Device, most: int) -> dict[str, int]:
@@ -80,7 +80,7 @@ def _compared(cls: type[Node], name: str, device: Device, tell: Callable[[str, s
 
 def _state(device: Device) -> dict[str, Any]:
     """The state now; without the buffer that is bound for uploads, which uploading itself changes."""
-    found = dict(vars(Surroundings(device)))
+    found = dict(vars(SavedState(device.raw, device.ctx)))
     bind = device.raw.glBindBuffer
-    found["_settings"] = [setting for setting in found["_settings"] if setting[0] is not bind]
+    found["settings"] = [setting for setting in found["settings"] if setting[0] is not bind]
     return found

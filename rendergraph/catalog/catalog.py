@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from rendergraph.catalog import find, modules
+from rendergraph.catalog.configured import Named, configured, plain, projects
 from rendergraph.catalog.extensions import extensions
-from rendergraph.catalog.surroundings import Named, plain, projects, surroundings
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
@@ -54,7 +54,7 @@ class Catalog:
         """
         from importlib.metadata import entry_points  # takes longer than reading a pipeline
 
-        named = {entry.path.resolve(): entry for entry in surroundings()} if installed else {}
+        named = {entry.path.resolve(): entry for entry in configured()} if installed else {}
         named |= {path.resolve(): Named(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
         own = projects(path for path in named if path.is_dir())

@@ -10,7 +10,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
-from rendergraph.catalog.surroundings import plain
+from rendergraph.catalog.configured import plain
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
 from rendergraph.declare.blame import raised_at
 from rendergraph.errors import Place, Problem, shown_file

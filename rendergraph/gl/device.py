@@ -14,7 +14,7 @@ import moderngl
 
 from rendergraph.errors import DeviceError, Problem
 from rendergraph.gl.raw import RawGL
-from rendergraph.gl.surroundings import Surroundings, settle
+from rendergraph.gl.saved_state import SavedState, settle
 
 REQUIRED_VERSION = 450
 TIME_ELAPSED = 0x88BF
@@ -61,12 +61,12 @@ class Device:
 
     @contextmanager
     def _borrowed(self) -> Iterator[None]:
-        surroundings = Surroundings(self)
+        saved = SavedState(self.raw, self.ctx)
         try:
             settle(self.raw)
             yield
         finally:
-            surroundings.restore()
+            saved.restore()
 
     @property
     def can_time(self) -> bool:

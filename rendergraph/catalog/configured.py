@@ -38,7 +38,7 @@ class Named:
         return self.where or (f", which {self.place.file} names" if self.place is not None else ", given as a plugin")
 
 
-def surroundings() -> Iterator[Named]:
+def configured() -> Iterator[Named]:
     """What the settings of the project around the current folder name, then what the environment names.
 
     Raises:

@@ -1,7 +1,7 @@
 """The state around a frame that no step states: set to what every frame needs, and given back on a borrowed context.
 
 One table says how each piece of OpenGL's state is read, how it is set, and what frames need of it. `settle` sets what
-is needed; `Surroundings` keeps all that drawing changes and puts it back.
+is needed; `SavedState` keeps all that drawing changes and puts it back.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 from rendergraph.errors import Problem, RenderError
 
 if TYPE_CHECKING:
-    from rendergraph.gl.device import Device
+    import moderngl
+
     from rendergraph.gl.raw import RawGL
 
 _FRONT, _BACK = 0x0404, 0x0405
-_DRAW_BUFFERS, _VIEWPORTS, _IMAGE_UNITS = 0x8824, 0x825B, 0x8F38  # MAX_…
+_DRAW_BUFFERS, _VIEWPORTS, _IMAGE_UNITS, _TEXTURE_UNITS = 0x8824, 0x825B, 0x8F38, 0x8B4D  # MAX_…
 _ACTIVE_TEXTURE, _TEXTURE0, _SAMPLER_BINDING = 0x84E0, 0x84C0, 0x8919
 _FEEDBACK, _FEEDBACK_PAUSED, _FEEDBACK_ACTIVE = 0x8E22, 0x8E23, 0x8E24
 _SAMPLES_PASSED, _QUERY_NO_WAIT = 0x8914, 0x8E14
@@ -176,37 +177,44 @@ def settle(raw: RawGL) -> None:
             call(*setting.first, *index, *setting.needed)
 
 
-class Surroundings:
+class SavedState:
     """A borrowed context's state as its owner has it, and the way back to it.
 
     Not kept, since drawing does not touch it: program pipelines, tessellation, hints but one, clear values, atomic
     counters, debug output. A query that the owner has begun counts what is drawn meanwhile.
+
+    Attributes:
+        enabled: capabilities and whether they are.
+        indexed: the same of each draw buffer and viewport.
+        units: the active unit, and each unit with its sampler and textures.
+        images: what is bound to each image unit.
+        blocks: what is bound to each binding point of blocks.
+        settings: raw functions and what they are called with.
     """
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, raw: RawGL, ctx: moderngl.Context) -> None:
         """Read everything; a transform feedback under way is paused.
 
         Raises:
             RenderError: conditional rendering is under way, which can neither be paused nor taken up again.
         """
-        raw = self._raw = device.raw
-        self._ctx = device.ctx
+        self._raw, self._ctx = raw, ctx
         raw.error()  # the owner's own, which must not be taken for ours
         _refuse_conditional(raw)
         self._feedback = bool(raw.integer(_FEEDBACK_ACTIVE)) and not raw.integer(_FEEDBACK_PAUSED)
         if self._feedback:
             raw.glPauseTransformFeedback()
-        self._framebuffer = device.ctx.fbo, device.ctx.mglo.fbo  # moderngl binds again what it believes bound
-        self._enabled = [(capability, raw.glIsEnabled(capability)) for capability in (*NEEDED, *_STATED)]
-        self._indexed = [
+        self._framebuffer = ctx.fbo, ctx.mglo.fbo  # moderngl binds again what it believes bound
+        self.enabled = [(capability, raw.glIsEnabled(capability)) for capability in (*NEEDED, *_STATED)]
+        self.indexed = [
             (capability, index, raw.glIsEnabledi(capability, index))
             for capability, count in _INDEXED
             for index in range(raw.integer(count))
         ]
-        self._units = raw.integer(_ACTIVE_TEXTURE), list(_units(raw, device.limits["units"]))
-        self._images = list(_images(raw))
-        self._blocks = list(_blocks(raw))
-        self._settings = [
+        self.units = raw.integer(_ACTIVE_TEXTURE), list(_units(raw, raw.integer(_TEXTURE_UNITS)))
+        self.images = list(_images(raw))
+        self.blocks = list(_blocks(raw))
+        self.settings = [
             (getattr(raw, setting.call), (*setting.first, *index, *_values(raw, setting, index)))
             for setting in SETTINGS
             for index in _indices(raw, setting)
@@ -216,11 +224,11 @@ class Surroundings:
         """Set everything as it was."""
         raw = self._raw
         self._ctx.fbo, self._ctx.mglo.fbo = self._framebuffer
-        for capability, on in self._enabled:
+        for capability, on in self.enabled:
             (raw.glEnable if on else raw.glDisable)(capability)
-        for capability, index, on in self._indexed:
+        for capability, index, on in self.indexed:
             (raw.glEnablei if on else raw.glDisablei)(capability, index)
-        active, units = self._units
+        active, units = self.units
         raw.glBindTextures(0, len(units), None)
         raw.glBindSamplers(0, len(units), (ctypes.c_uint * len(units))(*(sampler for _, sampler, _ in units)))
         for unit, _, bound in units:
@@ -228,14 +236,14 @@ class Surroundings:
                 raw.glActiveTexture(_TEXTURE0 + unit)
                 raw.glBindTexture(target, texture)
         raw.glActiveTexture(active)
-        for image in self._images:
+        for image in self.images:
             raw.glBindImageTexture(*image)
-        for target, index, buffer, start, size in self._blocks:
+        for target, index, buffer, start, size in self.blocks:
             if size:
                 raw.glBindBufferRange(target, index, buffer, start, size)
             else:
                 raw.glBindBufferBase(target, index, buffer)
-        for call, arguments in self._settings:  # after the points of blocks, which change what is bound beside them
+        for call, arguments in self.settings:  # after the points of blocks, which change what is bound beside them
             call(*arguments)
         if self._feedback:
             raw.glResumeTransformFeedback()
