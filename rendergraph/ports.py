@@ -8,29 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeAlias, TypeVar, get_args
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from rendergraph.errors import Misuse, suggestion
+from rendergraph.annotations import Known, Length, Range, right
 from rendergraph.facts import Facts
-from rendergraph.textures import Filter, Kind, Sampler, Semantic, Signature, Wrap
+from rendergraph.textures import FORMATS, Filter, Kind, Sampler, Semantic, Signature, Wrap
 
 T = TypeVar("T")
-Ruled: TypeAlias = "T | Callable[[Any, Facts], T]"
+Rule: TypeAlias = Annotated[Callable[[Any, Facts], T], "a function of node and facts"]
+Ruled: TypeAlias = T | Rule[T]
 """A constant, or a function of the node and the facts known before the schedule."""
 
-Texel: TypeAlias = "float | tuple[float, ...]"
-"""One value for every channel, or one a channel, up to four."""
-
-SizeRule: TypeAlias = "float | tuple[int, int] | str | tuple[str, float] | Callable[[Any, Facts], tuple[int, int]]"
+Meaning: TypeAlias = Annotated[Semantic, "a Semantic such as Radiance"]
+Called: TypeAlias = Annotated[Signature, "a Signature such as ShadowLookup"]
+Count: TypeAlias = Annotated[int, Range(0)]
+Texel: TypeAlias = Annotated[float | tuple[float, ...], Length(1, 4), "a number, up to four of them"]
+"""One value for every channel, or one a channel."""
+Shader: TypeAlias = Annotated[str, Length(1), "the name of a file"]
+_Side: TypeAlias = Annotated[int, Range(1)]
+_Factor: TypeAlias = Annotated[float, Range(0, above=True)]
+SizeRule: TypeAlias = Annotated[
+    _Factor | tuple[_Side, _Side] | str | tuple[str, _Factor] | Rule[tuple[int, int]],
+    "a factor of the viewport above 0, width and height from 1 up, an input's name, that with a factor, a function",
+]
 """A factor of the viewport; width and height; an input's name; an input's name with a factor; a function."""
-
-
-def _sampler(filter: Filter, wrap: Wrap, compare: bool) -> Sampler:
-    """A sampler that drivers know."""
-    for what, word, known in (("filter", filter, get_args(Filter)), ("wrap", wrap, get_args(Wrap))):
-        if word not in known:
-            raise Misuse(f"sampled has the {what} {word!r}{suggestion(str(word), known)}")
-    return Sampler(filter, wrap, compare)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Port:
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The whole texture, read with this sampler; inputs have theirs declared."""
-        return Part(self, sampler=_sampler(filter, wrap, compare))
+        return Part(self).sampled(filter, wrap, compare)
 
     def tested(self) -> Part:
         """The texture attached read-only for the depth test, of an input that other steps sample."""
@@ -66,11 +67,14 @@ class Part:
     """A port's texture, or one mip or layer of it; `previous` is last frame's value of a history texture."""
 
     port: Port
-    mip: int | None = None
-    layer: int | None = None
+    mip: Count | None = None
+    layer: Count | None = None
     previous: bool = False
     sampler: Sampler | None = None
     use: Literal["depth_test"] | None = None
+
+    def __post_init__(self) -> None:
+        right(self, f"a part of '{getattr(self.port, 'name', '')}'")
 
     def at_mip(self, level: int) -> Part:
         """The same layer's level."""
@@ -82,7 +86,7 @@ class Part:
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The same part, read with this sampler."""
-        return replace(self, sampler=_sampler(filter, wrap, compare))
+        return replace(self, sampler=right(Sampler(filter, wrap, compare), "sampled"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +106,13 @@ class Input(Port):
         doc: one line.
     """
 
-    semantic: Semantic | Signature
+    semantic: Meaning | Called
     kind: Kind = "texture2d"
     size: Literal["same", "any"] = "same"
     filter: Ruled[Filter] = "nearest"
     wrap: Wrap = "clamp"
     compare: bool = False
-    anisotropy: int = 1
+    anisotropy: Annotated[int, Range(1)] = 1
     samples: Literal["single", "multi", "any"] = "single"
     optional: bool = False
     many: bool = False
@@ -141,19 +145,19 @@ class Made(Port):
         doc: one line.
     """
 
-    semantic: Semantic | None = None
+    semantic: Meaning | None = None
     like: str | None = None
-    kind: Kind = "texture2d"
-    format: Ruled[str] | None = None
+    kind: Literal["texture2d", "texture2d_array", "texture_cube", "buffer"] = "texture2d"
+    format: Ruled[Annotated[str, Known(tuple(FORMATS)), "a format such as 'rgba16f'"]] | None = None
     size: SizeRule | None = None
-    mips: Ruled[int] = 1
-    layers: Ruled[int] | None = None
-    samples: Ruled[int] = 1
-    bytes: Ruled[int] = 0
+    mips: Ruled[Count] = 1
+    layers: Ruled[Count] | None = None
+    samples: Ruled[Annotated[int, Range(1)]] = 1
+    bytes: Ruled[Count] = 0
     clear: Ruled[Texel | None] = None
     first: float | None = None
     view: str | None = None
-    lights: str | Callable[[Any, Facts], tuple[int, ...]] | None = None
+    lights: str | Rule[tuple[int, ...]] | None = None
     doc: str = ""
 
 
@@ -214,8 +218,8 @@ class Views(Port):
         doc: one line.
     """
 
-    count: Ruled[int] = 1
-    lights: Callable[[Any, Facts], tuple[int, ...]] | None = None
+    count: Ruled[Count] = 1
+    lights: Rule[tuple[int, ...]] | None = None
     public: bool = True
     doc: str = ""
 
@@ -232,8 +236,8 @@ class Function(Port):
         doc: one line.
     """
 
-    signature: Signature
-    shader: str
+    signature: Called
+    shader: Shader
     reads: tuple[str | Part, ...] = ()
     needs: tuple[str, ...] = ()
     doc: str = ""

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
+from rendergraph.annotations import Form, mistakes_of
 from rendergraph.errors import Mistake
 from rendergraph.textures import Semantic
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-Metric: TypeAlias = "Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]"
-ImageLoader: TypeAlias = "Callable[[bytes], npt.NDArray[Any]]"
-MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
+    Metric: TypeAlias = Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]
+    ImageLoader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
+    MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
+else:
+    Metric = ImageLoader = MeshLoader = Callable
+
+Include: TypeAlias = Annotated[str | Path, "the name of an include"]
+Word: TypeAlias = Annotated[str, Form(r"[a-z][a-z0-9]*(_[a-z0-9]+)*"), "a word of small letters, digits and single '_'"]
+"""What becomes part of a macro."""
+Ending: TypeAlias = Annotated[
+    str, Form(r"\.[a-z0-9][a-z0-9_-]*"), "a file's ending, a dot and small letters as in '.stl'"
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +74,12 @@ class Extension:
     """
 
     semantics: tuple[Semantic, ...] = ()
-    choices: Mapping[str, Mapping[str, str | Path]] = field(default_factory=dict)
-    meshes: Mapping[str, MeshLoader] = field(default_factory=dict)
-    images: Mapping[str, ImageLoader] = field(default_factory=dict)
-    metrics: Mapping[str, Metric] = field(default_factory=dict)
+    choices: Mapping[str, Mapping[Word, Include]] = field(default_factory=dict)
+    meshes: Mapping[Ending, MeshLoader] = field(default_factory=dict)
+    images: Mapping[Ending, ImageLoader] = field(default_factory=dict)
+    metrics: Mapping[Word, Metric] = field(default_factory=dict)
 
 
-_WORD = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")  # becomes part of a macro
-_ENDING = re.compile(r"\.[a-z0-9][a-z0-9_-]*\Z")
 _READ_MESHES = (".yaml", ".yml", ".obj", ".gltf", ".glb")
 READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
 """Endings of image files that need no plugin."""
@@ -86,58 +93,18 @@ def extension_mistakes(extension: Extension, folder: Path) -> list[Mistake]:
         extension: as the plugin wrote it.
         folder: where the files it names are.
     """
-    if not isinstance(extension.semantics, Iterable):
-        return [Mistake("semantics", "'semantics' is a tuple of Semantic")]
-    mistakes = [
-        Mistake("semantics", f"'semantics' holds {value!r}, which is no Semantic")
-        for value in extension.semantics
-        if not isinstance(value, Semantic)
-    ]
-    for name in ("choices", "meshes", "images", "metrics"):
-        if not isinstance(getattr(extension, name), Mapping):
-            mistakes.append(Mistake(name, f"'{name}' is a mapping, not {type(getattr(extension, name)).__name__}"))
-    if mistakes:
+    if mistakes := list(mistakes_of(extension, "")):
         return mistakes
     for parameter, choices in extension.choices.items():
-        if not isinstance(choices, Mapping):
-            text = f"choices['{parameter}'] maps a choice to its include, it is {type(choices).__name__}"
-            mistakes.append(Mistake("choices", text))
-            continue
-        for name, choice in choices.items():
-            texts = _wrong_choice(f"choices['{parameter}']['{name}']", str(name), choice, folder)
-            mistakes += [Mistake("choices", text) for text in texts]
+        for name, include in choices.items():
+            if not (folder / include).is_file():
+                text = f"choices['{parameter}']['{name}']: there is no file '{include}' beside the extension"
+                mistakes.append(Mistake("choices", text))
     for kind, loaders, own in (("meshes", extension.meshes, _READ_MESHES), ("images", extension.images, READ_IMAGES)):
-        mistakes += [
-            Mistake(kind, text) for text in (*_wrong_functions(kind, loaders), *_wrong_endings(kind, loaders, own))
-        ]
-    mistakes += [Mistake("metrics", text) for text in _wrong_functions("metrics", extension.metrics)]
-    for name in map(str, extension.metrics):
-        if not _WORD.match(name):
-            mistakes.append(Mistake("metrics", f"metric '{name}' is not of small letters, digits and single '_'"))
-        elif name in _OWN_METRICS:
+        taken = [ending for ending in loaders if ending in own]
+        mistakes += [Mistake(kind, f"{kind} has '{ending}', which rendergraph reads itself") for ending in taken]
+    for name in extension.metrics:
+        if name in _OWN_METRICS:
             text = f"metric '{name}' is one of rendergraph's own; choose another name"
             mistakes.append(Mistake("metrics", text))
     return mistakes
-
-
-def _wrong_endings(kind: str, loaders: Mapping[str, object], own: Collection[str]) -> Iterator[str]:
-    for ending in map(str, loaders):
-        if not _ENDING.match(ending):
-            yield f"{kind} has '{ending}'; a file's ending is a dot and small letters, as in '.stl'"
-        elif ending in own:
-            yield f"{kind} has '{ending}', which rendergraph reads itself"
-
-
-def _wrong_choice(what: str, name: str, choice: object, folder: Path) -> Iterator[str]:
-    if not _WORD.match(name):
-        yield f"{what}: a choice is of small letters, digits and single '_'"
-    if not isinstance(choice, str | Path):
-        yield f"{what} is {choice!r}, not the name of an include"
-    elif not (folder / choice).is_file():
-        yield f"{what}: there is no file '{choice}' beside the extension"
-
-
-def _wrong_functions(kind: str, table: Mapping[str, object]) -> Iterator[str]:
-    for name, value in table.items():
-        if not callable(value):
-            yield f"{kind}['{name}'] is {value!r}, not a function"

@@ -11,6 +11,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import ValidationError
 
+from rendergraph.annotations import mistakes_in
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
@@ -103,10 +104,7 @@ def _docs(cls: type[Node]) -> Iterator[Mistake]:
     if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
         yield Mistake("", "the class has no docstring")
     for name, port in cls.ports().items():
-        doc = getattr(port, "doc", "")
-        if not isinstance(doc, str):
-            yield Mistake(name, f"port '{name}' has a doc that is no text")
-        elif not doc and not isinstance(port, Internal | History):
+        if not getattr(port, "doc", "") and not isinstance(port, Internal | History):
             yield Mistake(name, f"port '{name}' has no doc", "doc")
     for name, parameter in cls.parameters().items():
         if parameter.role == "plain":
@@ -144,8 +142,7 @@ def _parameters(cls: type[Node]) -> Iterator[Mistake]:
             yield Mistake(name, f"parameter '{name}' is {wrong}")
         low, high = parameter.minimum, parameter.maximum
         for word, limit in (("min", low), ("max", high)):
-            if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int | float)):
-                yield Mistake(name, f"parameter '{name}' has {word}={limit!r}, which is no number")
+            yield from mistakes_in(f"parameter '{name}': {word}", limit, float | None, name)
         if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
             yield Mistake(name, f"parameter '{name}' goes from {low} to {high}, which is nothing")
         if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):

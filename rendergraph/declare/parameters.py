@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-import types
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, Union, get_args, get_origin
+from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from pydantic import Field
 from pydantic.fields import FieldInfo
+
+from rendergraph.annotations import Range, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 
@@ -64,7 +65,7 @@ class Parameter:
         Args:
             added: the choices that plugins add.
         """
-        return self._takes(self.closed(added))
+        return words_for(self.closed(added), Range(self.minimum, self.maximum), file=True)
 
     def beyond(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
@@ -78,26 +79,6 @@ class Parameter:
             if isinstance(self.maximum, int | float) and number > self.maximum:
                 return f"must be at most {self.maximum}"
         return None
-
-    def _takes(self, annotation: Any) -> str:
-        origin, arguments = get_origin(annotation), get_args(annotation)
-        if origin in (Union, types.UnionType):
-            return " or ".join(self._takes(part) for part in arguments if part is not types.NoneType)
-        if origin is Literal:
-            listed = ", ".join(map(str, arguments))
-            return f"one of {listed}" if len(arguments) > 1 else f"only {listed}"
-        if origin in (tuple, list):
-            of = {int: "whole numbers", str: "words"}.get(next(iter(arguments), float), "numbers")
-            count = "" if origin is list or Ellipsis in arguments else f"{len(arguments)} "
-            return f"a list of {count}{of}"
-        words = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
-        word = words.get(annotation, "a mapping")
-        low, high = self.minimum, self.maximum
-        if annotation not in (int, float) or (low is None and high is None):
-            return word
-        if low is None:
-            return f"{word} up to {high}"
-        return f"{word} from {low}" + (f" to {high}" if high is not None else " up")
 
 
 def _listed(annotation: Any) -> Iterator[Any]:

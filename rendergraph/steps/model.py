@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 from rendergraph.errors import Mistake, Place, Problem, node_named, shown_file
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 
 Topology = Literal["points", "lines", "line_strip", "triangles", "triangle_strip", "triangles_adjacency"]
-TOPOLOGIES: tuple[str, ...] = get_args(Topology)
-MATERIAL_LEVELS = ("full", "alpha", "none")
-DRAW_ORDERS = ("front_to_back", "back_to_front", "scene")
+MaterialLevel = Literal["full", "alpha", "none"]
+DrawOrder = Literal["front_to_back", "back_to_front", "scene"]
 Use: TypeAlias = Literal["sample", "depth_test", "image", "buffer", "attach"]
-UniformValue: TypeAlias = "float | int | bool | Sequence[float] | Sequence[int]"
+UniformValue: TypeAlias = float | int | bool | Sequence[float] | Sequence[int]
 
 
 @dataclass(frozen=True)
@@ -145,8 +144,8 @@ class Step:
     view: str | None = None
     view_index: int | None = 0
     objects: str | tuple[str, ...] = "all"
-    materials: Literal["full", "alpha", "none"] = "full"
-    order: Literal["front_to_back", "back_to_front", "scene"] = "front_to_back"
+    materials: MaterialLevel = "full"
+    order: DrawOrder = "front_to_back"
     per_light: int | None = None
     vertices: int | str = 3
     topology: Topology = "triangles"

@@ -5,13 +5,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, TypeAlias
+from types import FrameType
+from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
+from rendergraph.annotations import quoted
 from rendergraph.errors import Misuse, is_framework
 from rendergraph.facts import Facts, LightFacts
-from rendergraph.ports import InOut, Input, Output, Part, Port, Views
+from rendergraph.ports import Count, InOut, Input, Output, Part, Port, Shader, Texel, Views
 from rendergraph.steps import checks
-from rendergraph.steps.model import DRAW_ORDERS, MATERIAL_LEVELS, TOPOLOGIES, UniformValue
+from rendergraph.steps.checks import Counts, Macro, checked
+from rendergraph.steps.model import DrawOrder, MaterialLevel, Topology, UniformValue
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -56,9 +59,9 @@ class Request:
     caller: tuple[str, int] | None = None
 
 
-Target: TypeAlias = "Port | Part"
-
-_REQUIRED = {"fullscreen": "fragment", "geometry": "vertex", "draw": "vertex", "compute": "compute"}
+Target: TypeAlias = Port | Part
+Defines: TypeAlias = Annotated[Mapping[str, Macro], "a mapping from macros to values"]
+Objects: TypeAlias = Annotated[str | Sequence[str], "all, opaque, transparent, casters or a list of objects' names"]
 
 
 class Steps:
@@ -127,33 +130,35 @@ class Steps:
 
     # Steps ----------------------------------------------------------------------------------------------------------
 
+    @checked
     def fullscreen(
         self,
-        shader: str,
+        shader: Shader,
         *,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
-        defines: Mapping[str, Any] | None = None,
+        defines: Defines | None = None,
         **bindings: Target | UniformValue,
     ) -> None:
         """One fragment shader over the whole target."""
         self._add("fullscreen", {"fragment": shader}, out, bindings, defines, state=state)
 
+    @checked
     def geometry(
         self,
-        fragment: str | None,
+        fragment: Shader | None,
         *,
-        vertex: str = "<geometry.vert>",
-        geometry: str | None = None,
+        vertex: Shader = "<geometry.vert>",
+        geometry: Shader | None = None,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
-        defines: Mapping[str, Any] | None = None,
+        defines: Defines | None = None,
         view: Port | None = None,
-        view_index: int | None = 0,
-        objects: str | Sequence[str] = "all",
-        materials: Literal["full", "alpha", "none"] = "full",
-        order: Literal["front_to_back", "back_to_front", "scene"] = "front_to_back",
-        per_light: int | None = None,
+        view_index: Count | None = 0,
+        objects: Objects = "all",
+        materials: MaterialLevel = "full",
+        order: DrawOrder = "front_to_back",
+        per_light: Count | None = None,
         **bindings: Target | UniformValue,
     ) -> None:
         """The scene's objects, one indirect multi-draw a batch.
@@ -170,12 +175,8 @@ class Steps:
             order: `front_to_back`, `back_to_front` or `scene`.
             per_light: one light's index, for a pass a light.
         """
-        checks.choice("materials", materials, MATERIAL_LEVELS)
-        checks.choice("order", order, DRAW_ORDERS)
-        if per_light is not None:
-            checks.whole("per_light", per_light)
-            if per_light >= len(self.lights):
-                raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
+        if per_light is not None and per_light >= len(self.lights):
+            raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         self._add(
             "geometry",
@@ -192,21 +193,22 @@ class Steps:
             per_light=per_light,
         )
 
+    @checked
     def draw(
         self,
-        fragment: str | None,
+        fragment: Shader | None,
         *,
-        vertex: str,
-        vertices: int | Port,
+        vertex: Shader,
+        vertices: Count | Port,
         attributes: Mapping[str, Port] | None = None,
-        geometry: str | None = None,
-        topology: str = "triangles",
-        instances: int = 1,
+        geometry: Shader | None = None,
+        topology: Topology = "triangles",
+        instances: Count = 1,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
-        defines: Mapping[str, Any] | None = None,
+        defines: Defines | None = None,
         view: Port | None = None,
-        view_index: int | None = 0,
+        view_index: Count | None = 0,
         **bindings: Target | UniformValue,
     ) -> None:
         """A draw over the node's own buffers.
@@ -220,13 +222,11 @@ class Steps:
             out, state, defines, bindings: see the class.
             view, view_index: as for `geometry`.
         """
-        checks.choice("topology", topology, TOPOLOGIES)
-        checks.whole("instances", instances)
         if isinstance(vertices, Port):
             checks.buffer(checks.own_port(self.ports, vertices, "vertices"), "vertices")
             self._connected(vertices)
         else:
-            checks.whole("vertices", vertices)
+            checks.argument("vertices", vertices, Count)
         held = checks.attributes(self.ports, attributes)
         for port in held.values():
             self._connected(port)
@@ -246,14 +246,15 @@ class Steps:
             attributes=held,
         )
 
+    @checked
     def compute(
         self,
-        shader: str,
+        shader: Shader,
         *,
-        over: Target | int | tuple[int, ...] | None = None,
-        groups: tuple[int, int, int] | None = None,
+        over: Target | Counts | None = None,
+        groups: Counts | None = None,
         out: Target | Mapping[str, Target] | None = None,
-        defines: Mapping[str, Any] | None = None,
+        defines: Defines | None = None,
         **bindings: Target | UniformValue,
     ) -> None:
         """A compute dispatch: `out` is bound as images and buffers; barriers follow from who reads them next.
@@ -268,15 +269,14 @@ class Steps:
         """
         if groups is not None and over is not None:
             raise Misuse("both over and groups are given; over finds the number of groups itself")
-        options = {"over": over} if groups is None else {"groups": checks.counts("groups", groups)}
+        options = {"over": over} if groups is None else {"groups": checks.counts(groups)}
         self._add("compute", {"compute": shader}, out, bindings, defines, **options)
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
         """Fill a texture with one value in every channel, or one a channel; a buffer with 0."""
         part = checks.part_of(self.ports, out, "out")
         numbers = checks.uniform("value", value)
-        if not isinstance(numbers, int | float) and len(numbers) > 4:
-            raise Misuse(f"value has {len(numbers)} numbers; a texel has up to 4 channels")
+        checks.argument("value", numbers, Texel)
         if getattr(part.port, "kind", "") == "buffer" and numbers != 0:
             raise Misuse(f"'{part.port.name}' is a buffer, which is cleared to 0 alone")
         self._add("clear", {}, out, {}, None, value=numbers)
@@ -297,7 +297,7 @@ class Steps:
         shaders: Mapping[str, str | None],
         out: Target | Mapping[str, Target] | None,
         bindings: Mapping[str, Target | UniformValue],
-        defines: Mapping[str, Any] | None,
+        defines: Defines | None,
         **options: Any,
     ) -> None:
         if out is None:
@@ -317,19 +317,17 @@ class Steps:
         self._check_options(options)
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
-        caller = sys._getframe(2)  # what the author's `record`, or a helper of it, called is one frame further down
-        own = not is_framework(str(caller.f_globals.get("__name__")))
         self._recorder.add(
             Request(
                 kind=kind,
-                shaders=checks.shader_files(shaders, _REQUIRED.get(kind, "")),
+                shaders=tuple((stage, file) for stage, file in shaders.items() if file is not None),
                 out=tuple(targets.items()),
                 bindings=textures,
                 default_inputs=not textures and kind in ("fullscreen", "geometry", "draw", "compute"),
                 uniforms=uniforms,
-                defines=checks.macros(defines),
+                defines={name: checks.macro(name, value) for name, value in (defines or {}).items()},
                 options=options,
-                caller=(caller.f_code.co_filename, caller.f_lineno) if own else None,
+                caller=_caller(),
             )
         )
 
@@ -351,22 +349,18 @@ class Steps:
 
     def _check_options(self, options: Mapping[str, Any]) -> None:
         """What several kinds of step take."""
-        state = options.get("state", State())
-        if not isinstance(state, State):
-            raise Misuse(f"state is {checks.shown(state)}, not a State(…)")
         if options.get("view") is not None:
             port = checks.own_port(self.ports, options["view"], "view")
             if not isinstance(port, Views | Input):
-                raise Misuse(f"view is {checks.shown(port)}; it is a Views port or an input that carries views")
-        if options.get("view_index") is not None:
-            checks.whole("view_index", options["view_index"])
+                raise Misuse(f"view is {quoted(port)}; it is a Views port or an input that carries views")
 
     def _invocations(
-        self, over: object, targets: Mapping[str, Part], reads: Mapping[str, Target]
+        self, over: Target | Counts | None, targets: Mapping[str, Part], reads: Mapping[str, Target]
     ) -> tuple[int, int, int]:
         """How many invocations a dispatch needs along each axis."""
         if over is not None and not isinstance(over, Port | Part | str):
-            return checks.counts("over", over)
+            checks.argument("over", over, Counts)
+            return checks.counts(over)
         if over is not None:
             part = checks.part_of(self.ports, over, "over")
             desc = self._desc(part.port)
@@ -390,6 +384,16 @@ class Steps:
             part = target if isinstance(target, Part) else Part(target)
             if getattr(part.port, "kind", "function") not in ("view", "function"):
                 yield part
+
+
+def _caller() -> tuple[str, int] | None:
+    """The line of an author that asked for a step; None where the framework did by itself."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith(f"{__package__}."):
+        frame = frame.f_back
+    if frame is None or is_framework(str(frame.f_globals.get("__name__"))):
+        return None
+    return frame.f_code.co_filename, frame.f_lineno
 
 
 def _texels(desc: TextureDesc, part: Part) -> tuple[int, int, int]:

@@ -1,0 +1,247 @@
+"""Python values against their own annotations: whether one fits, and in words what would.
+
+Metadata of an `Annotated` says more than a type can: limits (`Range`, `Length`), words that a table has (`Known`), and
+a text that stands for the annotation in messages. `Parameter` has its words for files from here, too.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import types
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from rendergraph.errors import Mistake, Misuse, suggestion
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    T = TypeVar("T", bound=DataclassInstance)
+
+
+@dataclass(frozen=True)
+class Range:
+    """Limits of a number, which is then finite; `above` leaves `low` itself out."""
+
+    low: float | None = None
+    high: float | None = None
+    above: bool = False
+
+    def __str__(self) -> str:
+        if self.low is None:
+            return "" if self.high is None else f" up to {self.high}"
+        to = f" to {self.high}" if self.high is not None else "" if self.above else " up"
+        return f" above {self.low}{to}" if self.above else f" from {self.low}{to}"
+
+    def holds(self, value: Any) -> bool:
+        """Whether a number lies inside."""
+        if not math.isfinite(value) or (self.low is not None and value < self.low):
+            return False
+        return not (self.above and value == self.low) and (self.high is None or value <= self.high)
+
+
+@dataclass(frozen=True)
+class Length:
+    """How many entries a list or letters a text has; a single value counts as one."""
+
+    low: int
+    high: float = math.inf
+
+    def holds(self, value: Any) -> bool:
+        """Whether it has as many."""
+        return self.low <= (len(value) if isinstance(value, str | Sequence) else 1) <= self.high
+
+
+@dataclass(frozen=True)
+class Known:
+    """A word that stands in a table."""
+
+    words: Collection[str]
+
+    def holds(self, value: Any) -> bool:
+        """Whether it does."""
+        return value in self.words
+
+
+@dataclass(frozen=True)
+class Form:
+    """A text that a regular expression matches from its first letter to its last."""
+
+    pattern: str
+
+    def holds(self, value: Any) -> bool:
+        """Whether it does."""
+        return re.fullmatch(self.pattern, value) is not None
+
+
+def fits(value: object, annotation: Any) -> bool:
+    """Whether a value is what an annotation says; a float may be written as a whole number, a number is no switch."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if annotation is Any:
+        return True
+    if annotation is None:
+        return value is None
+    if origin is Annotated:
+        rules = [rule for rule in annotation.__metadata__ if not isinstance(rule, str)]
+        return fits(value, annotation.__origin__) and all(rule.holds(value) for rule in rules)
+    if origin in (Union, types.UnionType):
+        return any(fits(value, part) for part in arguments)
+    if origin is Literal:
+        return any(type(value) is type(choice) and value == choice for choice in arguments)
+    if origin is tuple and Ellipsis not in arguments:
+        return isinstance(value, tuple) and len(value) == len(arguments) and all(map(fits, value, arguments))
+    if origin in (tuple, Sequence):
+        return isinstance(value, tuple | list) and all(fits(entry, arguments[0]) for entry in value)
+    if origin is Mapping:
+        key, entry = arguments
+        return isinstance(value, Mapping) and all(fits(k, key) and fits(v, entry) for k, v in value.items())
+    if Callable in (origin, annotation):
+        return callable(value)
+    if annotation in (int, float):
+        return isinstance(value, int if annotation is int else int | float) and not isinstance(value, bool)
+    return isinstance(value, annotation)
+
+
+def words_for(annotation: Any, limits: Range = Range(), *, file: bool = False) -> str:
+    """What an annotation takes, in words: `a whole number from 1 to 64`.
+
+    Args:
+        annotation: a type as it is written.
+        limits: of each number in it.
+        file: what a YAML file may give, instead of a Python value.
+    """
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        said = next((rule for rule in annotation.__metadata__ if isinstance(rule, str)), None)
+        rules = [rule for rule in annotation.__metadata__ if isinstance(rule, Range)]
+        return said or words_for(annotation.__origin__, next(iter(rules), limits), file=file)
+    if origin in (Union, types.UnionType):
+        parts = [words_for(part, limits, file=file) for part in arguments if not (file and part is types.NoneType)]
+        return " or ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+    if origin is Literal:
+        listed = ", ".join(map(str, arguments))
+        return f"one of {listed}" if len(arguments) > 1 else f"only {listed}"
+    if origin in (tuple, list, Sequence):
+        first = next(iter(arguments), float)
+        if isinstance(first, type) and first not in (bool, int, float, str):
+            return f"a tuple of {first.__name__}"
+        of = {int: "whole numbers", str: "words"}.get(first, "numbers")
+        count = "" if origin is not tuple or Ellipsis in arguments else f"{len(arguments)} "
+        return f"a list of {count}{of}" if file else f"{count}{of}"
+    if Callable in (origin, annotation):
+        return "a function"
+    if annotation in (int, float):
+        return f"{'a whole number' if annotation is int else 'a number'}{limits}"
+    if annotation in (None, types.NoneType):
+        return "None"
+    if annotation is bool:
+        return "true or false" if file else "True or False"
+    if annotation is str:
+        return "text"
+    if file or origin is Mapping or not isinstance(annotation, type):
+        return "a mapping"
+    return f"{'an' if annotation.__name__[0] in 'AEIOU' else 'a'} {annotation.__name__}"
+
+
+def quoted(value: object) -> str:
+    """A Python value as messages show it: as it is written, and not too long; a port by its name."""
+    name = getattr(value, "name", "")
+    if is_dataclass(value) and isinstance(name, str) and name:
+        return f"the {type(value).__name__} '{name}'"
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") -> Iterator[Mistake]:
+    """What is wrong with a value, or with each entry of a mapping.
+
+    Args:
+        what: how messages name it.
+        value: any.
+        annotation: what it should be.
+        subject: see `Mistake`.
+    """
+    if fits(value, annotation):
+        return
+    parts = list(_parts(annotation))
+    table = next((get_args(part) for part in parts if get_origin(part) is Mapping), None)
+    if table is not None and isinstance(value, Mapping):
+        for key, entry in value.items():
+            if not fits(key, table[0]):
+                yield Mistake(subject, f"{what} has the key {key!r}, which is not {words_for(table[0])}")
+            yield from mistakes_in(f"{what}[{key!r}]", entry, table[1], subject)
+        return
+    if get_origin(annotation) is tuple and Ellipsis in get_args(annotation) and isinstance(value, tuple):
+        for number, entry in enumerate(value):
+            yield from mistakes_in(f"{what}[{number}]", entry, parts[0], subject)
+        return
+    word = value if isinstance(value, str) else ""
+    choices = [choice for part in parts for choice in _choices(part)]
+    plain = all(get_origin(part) is Literal or part is types.NoneType for part in parts)
+    hint = suggestion(word, choices, most=20) if word or plain else ""
+    if not hint:
+        whole = int in parts and float not in parts and any(isinstance(entry, float) for entry in _entries(value))
+        hint = f", not {words_for(annotation)}" + ("; divide with //" if whole else "")
+    yield Mistake(subject, f"{what} is {quoted(value)}{hint}")
+
+
+def mistakes_of(thing: DataclassInstance, who: str, subject: str = "") -> Iterator[Mistake]:
+    """What is wrong with the fields of a dataclass.
+
+    Args:
+        thing: an instance.
+        who: how messages name it, if at all.
+        subject: see `Mistake`; the field by default.
+    """
+    hints = hints_of(type(thing))
+    for entry in fields(thing):
+        if entry.init:
+            what = f"{who}: {entry.name}" if who else entry.name
+            yield from mistakes_in(what, getattr(thing, entry.name), hints[entry.name], subject or entry.name)
+
+
+def right(thing: T, who: str = "") -> T:
+    """A dataclass's instance, all of whose fields are what their annotations say.
+
+    Raises:
+        Misuse: one of them is not.
+    """
+    for mistake in mistakes_of(thing, who or type(thing).__name__):
+        raise Misuse(mistake.text)
+    return thing
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """What a union is of, without metadata but for words of a table; of a list its entries."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated and not any(isinstance(rule, Known) for rule in annotation.__metadata__):
+        yield from _parts(annotation.__origin__)
+    elif origin in (Union, types.UnionType, tuple, Sequence):
+        for part in arguments:
+            yield from _parts(part)
+    else:
+        yield annotation
+
+
+def _choices(part: Any) -> Iterator[str]:
+    if get_origin(part) is Literal:
+        yield from map(str, get_args(part))
+    elif get_origin(part) is Annotated:
+        yield from (word for rule in part.__metadata__ if isinstance(rule, Known) for word in rule.words)
+
+
+def _entries(value: object) -> Sequence[object]:
+    return value if isinstance(value, tuple | list) else (value,)
+
+
+@cache
+def may_be(annotation: Any, wanted: type) -> bool:
+    """Whether a value of an annotation, or an entry of it, may be an instance of a class."""
+    return annotation is wanted or any(may_be(part, wanted) for part in get_args(annotation))
+
+
+hints_of = cache(partial(get_type_hints, include_extras=True))
+"""The annotations of a class or function by name, worked out once."""

@@ -1,0 +1,105 @@
+"""The one checker of Python values: what fits an annotation, and what is said where a value does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import pytest
+
+from rendergraph.annotations import Form, Known, Length, Range, fits, mistakes_in, mistakes_of, right, words_for
+from rendergraph.errors import Misuse
+
+Count = Annotated[int, Range(0)]
+Factor = Annotated[float, Range(0, above=True)]
+Texel = Annotated[float | tuple[float, ...], Length(1, 4)]
+Side = Literal["left", "right"]
+
+FITS: list[tuple[Any, list[object], list[object]]] = [
+    (Any, [None, object()], []),
+    (None, [None], [0, False]),
+    (bool, [True, False], [0, 1, "true"]),
+    (int, [0, -3], [True, 1.0, "1"]),
+    (float, [0, 1.5, float("nan")], [False, "1.5"]),
+    (str, ["", "a"], [b"a", 1]),
+    (int | None, [1, None], [False, 0.5]),
+    (Side, ["left"], ["up", 0, None]),
+    (Literal[1, 2], [1], [True, 1.0, 3]),
+    (Side | Callable[[Any], Side], ["right", len], ["lef", 1]),
+    (tuple[int, int], [(1, 2)], [(1,), (1, 2, 3), [1, 2], (1, 2.0)]),
+    (tuple[int, ...], [(), (1, 2), [1]], [("a",), 1, "12"]),
+    (Sequence[str], [["a"], ("a", "b")], ["ab", {"a"}]),
+    (Mapping[str, int], [{}, {"a": 1}], [{1: 1}, {"a": "b"}, [("a", 1)]]),
+    (Count, [0, 7], [-1, 0.5, True]),
+    (Factor, [0.5, 3], [0, -1, float("inf"), float("nan")]),
+    (Annotated[int, Range(1, 16)], [1, 16], [0, 17]),
+    (Texel, [0, (1, 2), (0.5,) * 4], [(), (1,) * 5, "a"]),
+    (Annotated[str, Known(("r8", "rg8"))], ["r8"], ["r9", 8]),
+    (Annotated[str, Form("[a-z]+")], ["ab"], ["ab\n", "A", 1]),
+    (Range, [Range()], [Range, 1]),
+]
+
+
+@pytest.mark.parametrize(("annotation", "right_ones", "wrong_ones"), FITS)
+def test_what_fits(annotation: Any, right_ones: list[object], wrong_ones: list[object]) -> None:
+    assert [value for value in right_ones if not fits(value, annotation)] == []
+    assert [value for value in wrong_ones if fits(value, annotation)] == []
+    assert all(list(mistakes_in("it", value, annotation)) == [] for value in right_ones)
+    assert all(list(mistakes_in("it", value, annotation)) for value in wrong_ones)
+
+
+SAID: list[tuple[object, Any, str]] = [
+    ("yes", bool, "it is 'yes', not True or False"),
+    (-1, Count, "it is -1, not a whole number from 0 up"),
+    (1.5, Count | None, "it is 1.5, not a whole number from 0 up or None; divide with //"),
+    (0, Factor, "it is 0, not a number above 0"),
+    (300, Annotated[int, Range(0, 255)], "it is 300, not a whole number from 0 to 255"),
+    ("lef", Side, "it is 'lef'; did you mean 'left'?"),
+    (3, Side, "it is 3; there is left, right"),
+    ("lef", Side | Callable[[], Side], "it is 'lef'; did you mean 'left'?"),
+    (3, Side | Callable[[], Side], "it is 3, not one of left, right or a function"),
+    ("rgb8", Annotated[str, Known(("r8", "rgba8")), "a format"] | None, "it is 'rgb8'; did you mean 'rgba8'?"),
+    (8, Annotated[str, Known(("r8",)), "a format"] | None, "it is 8, not a format or None"),
+    ("x" * 99, int, f"it is '{'x' * 56}..., not a whole number"),
+    (
+        {"a": {"b": 1, "c": 2.5}},
+        Mapping[str, Mapping[str, int]],
+        "it['a']['c'] is 2.5, not a whole number; divide with //",
+    ),
+    ({1: 2}, Mapping[str, int], "it has the key 1, which is not text"),
+    ((Range(), 3), tuple[Range, ...], "it[1] is 3, not a Range"),
+]
+
+
+@pytest.mark.parametrize(("value", "annotation", "said"), SAID)
+def test_what_is_said(value: object, annotation: Any, said: str) -> None:
+    (mistake,) = mistakes_in("it", value, annotation, "subject")
+    assert (mistake.subject, mistake.text) == ("subject", said)
+
+
+def test_a_file_gives_other_values_than_python() -> None:
+    annotation = bool | tuple[float, float, float] | None
+    assert words_for(annotation) == "True or False, 3 numbers or None"
+    assert words_for(annotation, file=True) == "true or false or a list of 3 numbers"
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Something with fields."""
+
+    side: Side
+    count: Count = 1
+
+    def __post_init__(self) -> None:
+        right(self)
+
+
+def test_a_dataclass_refuses_what_its_fields_do_not_say() -> None:
+    assert right(Lens("left"), "a lens") == Lens("left")
+    with pytest.raises(Misuse, match=r"^Lens: count is -1, not a whole number from 0 up$"):
+        Lens("left", -1)
+    wrong = Lens("left")
+    object.__setattr__(wrong, "side", 7)
+    object.__setattr__(wrong, "count", None)
+    assert [mistake.subject for mistake in mistakes_of(wrong, "a lens")] == ["side", "count"]
