@@ -104,7 +104,8 @@ def _docs(cls: type[Node]) -> Iterator[Mistake]:
     if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
         yield Mistake("", "the class has no docstring")
     for name, port in cls.ports().items():
-        if not getattr(port, "doc", "") and not isinstance(port, Internal | History):
+        doc = getattr(port, "doc", "")
+        if isinstance(doc, str) and not doc and not isinstance(port, Internal | History):
             yield Mistake(name, f"port '{name}' has no doc", "doc")
     for name, parameter in cls.parameters().items():
         if parameter.role == "plain":
