@@ -171,7 +171,7 @@ def shader_files(found: NodeType) -> list[Path]:
         names.insert(0, found.cls.shader or f"{found.name}.frag")
     files: list[Path] = []
     for name in names:
-        _with_includes(found.shaders / name, files)
+        _with_includes(found.shader_file(name)[0], files)
     return files
 
 

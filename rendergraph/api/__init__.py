@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rendergraph.declare import (
+    DROPPED,
     Extension,
     Facts,
     Function,
@@ -62,6 +63,7 @@ from rendergraph.textures import (
 __all__ = [
     "ADD",
     "ALPHA",
+    "DROPPED",
     "MULTIPLY",
     "PREMULTIPLIED",
     "Albedo",

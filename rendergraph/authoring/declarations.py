@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
@@ -81,11 +82,9 @@ def shader_text(file: Path) -> str:
 
 
 def _python_text(node: NodeType) -> str:
-    """The module and the helpers beside it."""
+    """The modules of the node and of those that it extends."""
     if node.is_shader:
         return ""
-    text = node.file.read_text(encoding="utf-8", errors="replace")
-    for helper in re.findall(r"from \.+(_\w+) import", text):
-        beside = node.file.parent / f"{helper}.py"
-        text += beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
-    return text
+    modules = {cls.__module__ for cls in node.cls.__mro__ if issubclass(cls, Node) and cls is not Node}
+    files = {Path(sys.modules[module].__file__ or "") for module in modules}
+    return "".join(file.read_text(encoding="utf-8", errors="replace") for file in files)

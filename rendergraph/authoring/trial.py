@@ -187,6 +187,7 @@ class Trial:
         names = [name for _, name in step.shaders] if step.node == self.type.name else []
         names += [function.shader for function in step.functions if function.node == self.type.name]
         self.files |= {self.type.shader_file(name)[0] for name in names}
+        self.files |= {file for _, file in step.includes}
 
     def _is_own(self, step: Step) -> bool:
         return step.node == self.type.name or any(f.node == self.type.name for f in step.functions)

@@ -47,6 +47,13 @@ def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
         yield from _modules(Path(folder), package, plugin, shaders)
 
 
+def shader_folder(module: str, file: Path) -> Path:
+    """Where the shaders of a node's module lie: of `X.nodes.family.a` in `X.shaders/family`, else beside its file."""
+    before, nodes, family = module.rpartition(".")[0].partition(".nodes")
+    shaders = _shader_folder(before + nodes) if nodes and family[:1] in ("", ".") else None
+    return file.parent if shaders is None else shaders.joinpath(*family.split("."))
+
+
 def _shader_folder(package: str) -> Path | None:
     """`X.shaders` beside `X.nodes`."""
     parent, _, last = package.rpartition(".")

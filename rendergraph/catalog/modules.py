@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import sys
+from pathlib import Path
 
 from pydantic import PydanticUserError
 
+from rendergraph.catalog import find
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes
 from rendergraph.declare.blame import declared_by, raised_at
@@ -41,7 +44,16 @@ def load(name: str, listed: Listed) -> NodeType:
                 for mistake in mistakes
             ]
         )
-    return NodeType(name, listed.family, cls, listed.file, listed.shaders, listed.plugin)
+    return NodeType(
+        name, listed.family, cls, listed.file, listed.shaders, listed.plugin, inherited=_inherited(cls, listed)
+    )
+
+
+def _inherited(cls: type[Node], listed: Listed) -> tuple[Path, ...]:
+    """The folders of shaders of the nodes that a class extends, the nearest first."""
+    modules = [base.__module__ for base in cls.__mro__[1:] if issubclass(base, Node) and base is not Node]
+    folders = [find.shader_folder(module, Path(sys.modules[module].__file__ or "")) for module in modules]
+    return tuple(dict.fromkeys(folder for folder in folders if folder != listed.shaders))
 
 
 def _failed(name: str, listed: Listed, error: BaseException, place: Place) -> Problem:

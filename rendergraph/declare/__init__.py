@@ -5,7 +5,7 @@ from __future__ import annotations
 from rendergraph.declare.extension import READ_IMAGES, Extension, MeshData, extension_mistakes
 from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
-from rendergraph.declare.node import Node
+from rendergraph.declare.node import DROPPED, Node
 from rendergraph.declare.parameters import Parameter, define, param, structural
 from rendergraph.facts import Facts, LightFacts, TextureInfo
 from rendergraph.ports import (
@@ -26,6 +26,7 @@ from rendergraph.ports import (
 )
 
 __all__ = [
+    "DROPPED",
     "NO_EXTENSIONS",
     "PORT_TYPES",
     "READ_IMAGES",

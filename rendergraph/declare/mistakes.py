@@ -95,6 +95,10 @@ def _names(cls: type[Node]) -> Iterator[Mistake]:
     for group in dict.fromkeys(group for group in named if isinstance(group, str)):
         if group in ports or group in parameters:
             yield Mistake(group, f"group '{group}' has the name of a port or parameter")
+    inherited = {name for base in cls.__mro__[1:] if issubclass(base, Node) for name in base.ports()}
+    for name, value in vars(cls).items():
+        if value is None and name != "shader" and name[0] != "_" and name not in inherited:
+            yield Mistake(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
         yield Mistake("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")

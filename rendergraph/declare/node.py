@@ -12,6 +12,9 @@ from rendergraph.declare.parameters import Parameter
 from rendergraph.ports import PORT_TYPES, Function, InOut, Input, Output, Port, Views
 from rendergraph.steps import Frame, Steps
 
+DROPPED: Any = None
+"""What a subclass sets a port of its base to that it does without: `depth = DROPPED`."""
+
 
 @cache
 def _ports_of(cls: type[Node]) -> dict[str, Port]:
@@ -23,7 +26,7 @@ def _ports_of(cls: type[Node]) -> dict[str, Port]:
                 if isinstance(value, Port):
                     found[name] = value
                 elif name in found:
-                    del found[name]  # a subclass may drop a port by setting it to None
+                    del found[name]  # a subclass drops a port by setting it to DROPPED, which is None
     return found
 
 
@@ -52,7 +55,7 @@ class Node(BaseModel):
         frozen=True,
         strict=True,
         extra="forbid",
-        ignored_types=PORT_TYPES,
+        ignored_types=(*PORT_TYPES, type(DROPPED)),
         protected_namespaces=(),
     )
 

@@ -106,7 +106,8 @@ def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
         for name in out:
             if not isinstance(name, str) or not name.isidentifier():
                 raise Misuse(f"out has the key {quoted(name)}; the keys are the shader's names")
-        found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in out.items()}
+        there = {name: value for name, value in out.items() if value is not None or name in ports}  # others are dropped
+        found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in there.items()}
     else:
         part_of(ports, out, "out")  # says what it is instead
         raise AssertionError

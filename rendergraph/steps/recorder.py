@@ -70,7 +70,8 @@ class Steps:
     Textures a step reads are given by the name they have in the shader (`source=self.source`); with none named the
     step reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a
     port, a part, or a mapping from the shader's output names; without it the step writes every output of the node
-    that is used. A texture with a depth format is attached as depth.
+    that is used. A texture with a depth format is attached as depth. What is None, a port that a subclass drops, is
+    left out.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -91,13 +92,13 @@ class Steps:
         """The scene's lights, in its order."""
         return self.facts.lights
 
-    def connected(self, port: Port) -> bool:
-        """Whether anything is linked to an input."""
-        return self.facts.connected(checks.own_port(self.ports, port, "connected's argument").name)
+    def connected(self, port: Port | None) -> bool:
+        """Whether anything is linked to an input; nothing is to one that the class drops."""
+        return port is not None and self.facts.connected(checks.own_port(self.ports, port, "connected's argument").name)
 
-    def used(self, port: Port) -> bool:
-        """Whether anybody reads an output; one that nobody reads need not be written."""
-        return self._recorder.used(checks.own_port(self.ports, port, "used's argument"))
+    def used(self, port: Port | None) -> bool:
+        """Whether anybody reads an output; one that nobody reads, or that the class drops, need not be written."""
+        return port is not None and self._recorder.used(checks.own_port(self.ports, port, "used's argument"))
 
     def needs(self, parameter: str) -> tuple[str, ...]:
         """What the choice of a parameter says that it needs, where choices are includes."""
@@ -309,6 +310,7 @@ class Steps:
         else:
             targets = checks.targets(self.ports, out)
         textures, uniforms = self._bindings(bindings)
+        named = len(uniforms) < len(bindings)
         for part in (*targets.values(), *(value for value in textures.values() if isinstance(value, Part))):
             if part.mip is not None or part.layer is not None:
                 desc = self._desc(part.port)
@@ -323,7 +325,7 @@ class Steps:
                 shaders=tuple((stage, file) for stage, file in shaders.items() if file is not None),
                 out=tuple(targets.items()),
                 bindings=textures,
-                default_inputs=not textures and kind in ("fullscreen", "geometry", "draw", "compute"),
+                default_inputs=not named and kind in ("fullscreen", "geometry", "draw", "compute"),
                 uniforms=uniforms,
                 defines={name: checks.macro(name, value) for name, value in (defines or {}).items()},
                 options=options,
@@ -338,6 +340,8 @@ class Steps:
         textures: dict[str, Target] = {}
         uniforms: dict[str, UniformValue] = {}
         for name, value in bindings.items():
+            if value is None and name not in self.ports:  # a port that the class drops
+                continue
             if not isinstance(value, Port | Part):
                 uniforms[name] = checks.uniform(name, value)
                 continue
