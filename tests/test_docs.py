@@ -155,6 +155,7 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_every_node_type_has_its_page(generated: Path) -> None:
     from rendergraph.catalog import Catalog
 
@@ -165,6 +166,7 @@ def test_every_node_type_has_its_page(generated: Path) -> None:
             assert f"| `{word}` |" in page, f"{name}: {word}"
 
 
+@pytest.mark.slow
 def test_the_sources_of_a_node_are_on_its_page(generated: Path) -> None:
     page = (generated / "nodes" / "shadow_pcf.md").read_text(encoding="utf-8")
     shown = re.findall(r"<summary><code>(.*?)</code>", page)
@@ -172,11 +174,13 @@ def test_the_sources_of_a_node_are_on_its_page(generated: Path) -> None:
     assert {"shadow_pcf.glsl", "map_shadow.glsl", "map_visibility.frag"} <= set(shown)  # own, included, and the base's
 
 
+@pytest.mark.slow
 def test_every_error_code_has_its_page(generated: Path) -> None:
     codes = {file.name.partition("-")[0] for file in (ROOT / "rendergraph" / "errors").glob("RG*.yaml")}
     assert codes == {file.stem for file in (generated / "errors").glob("RG*.md")}
 
 
+@pytest.mark.slow
 def test_every_verb_and_shipped_file_is_listed(generated: Path) -> None:
     verbs = (generated / "cli.md").read_text(encoding="utf-8")
     assert all(f"## {verb}\n" in verbs for verb in VERBS)
@@ -197,6 +201,7 @@ def test_every_page_of_the_gallery_has_a_picture() -> None:
     assert not without
 
 
+@pytest.mark.slow
 def test_names_for_node_authors_are_all_documented(generated: Path) -> None:
     import rendergraph.api
 
@@ -221,6 +226,7 @@ def test_the_picture_is_what_the_file_draws(gl: Any, tmp_path: Path) -> None:
     assert difference.mean() < 1.0, "render README's study.yaml again: docs/images/study.png"
 
 
+@pytest.mark.slow
 def test_the_comparison_is_what_the_files_give(gl: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The table's figures but for times, which are a machine's, and the pictures beside it."""
     from rendergraph.images import read

@@ -21,6 +21,7 @@ def shown(name: str, catalog: Catalog) -> str:
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TYPES)
 def test_an_example_runs_and_uses_the_node(gl: Any, tmp_path: Path, name: str) -> None:
     file = tmp_path / "example.yaml"

@@ -283,6 +283,7 @@ print(*sorted(name for name in sys.modules if "evil" in name or "extension" == n
 """
 
 
+@pytest.mark.slow
 def test_python_in_its_folder_is_never_imported(write: Write) -> None:
     """In a process of its own: nothing of the folder is in `sys.modules`, and its files have not run."""
     names = (
@@ -387,6 +388,7 @@ def test_a_pipe_in_a_folder_is_not_waited_for(write: Write) -> None:
     assert messages(folder / "p.yaml") == ["3:18: RG011 './own.frag' is not a regular file"]
 
 
+@pytest.mark.slow
 def test_check_node_takes_it(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
     """With a version of its own; what is missing and what the compiler removed are warnings."""
     text = "#version 330\nuniform float unused;\nout vec4 c;\nvoid main() { c = vec4(0.5); }\n"

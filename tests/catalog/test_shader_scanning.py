@@ -179,6 +179,7 @@ KINDS: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_what_is_written_is_what_is_read(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     """Random declarations in random layouts, printed and scanned."""

@@ -82,6 +82,7 @@ def test_mistakes(cli: Any, words: tuple[str, ...], code: int, message: str) -> 
     assert message in found.err
 
 
+@pytest.mark.slow
 def test_sweep_draws_keeps_and_resumes(cli: Any, tmp_path: Path) -> None:
     words = (
         "sweep",

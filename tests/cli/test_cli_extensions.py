@@ -82,6 +82,7 @@ def test_what_is_broken_is_left_out_of_lists_with_a_warning(cli: Any, plugin: Pa
     assert cli("explain", "depth_prepass", "--plugin", str(plugin)).err == ""
 
 
+@pytest.mark.slow
 def test_compare_shows_a_plugins_metric(cli: Any, plugin: Path, tmp_path: Path) -> None:
     words = ("compare", "forward", "shading-unlit", *SMALL, "--plugin", str(plugin))
     result = cli(*words, "-o", "report.html")
@@ -102,6 +103,7 @@ def test_compare_shows_a_plugins_metric(cli: Any, plugin: Path, tmp_path: Path) 
     assert "there is no metric 'drker'; did you mean 'darker'?" in unknown.err
 
 
+@pytest.mark.slow
 def test_sweep_keeps_a_plugins_metric(cli: Any, plugin: Path) -> None:
     words = ("sweep", "forward", "-x", "light.shading=pbr,unlit", *SMALL, "-o", "out", "--plugin", str(plugin))
     first = cli(*words, "--json").json["runs"]

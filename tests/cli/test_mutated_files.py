@@ -62,6 +62,7 @@ def mutated(text: str, rng: random.Random) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pipeline", "scene", "shader"])
 def test_a_file_with_mistakes_is_checked_to_an_end(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

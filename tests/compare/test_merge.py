@@ -57,6 +57,7 @@ def alone(session: rg.Session, variants: Sequence[rg.Pipeline], frame: int = 1) 
     return [session.render(variant, frames=range(1, frame + 1))["radiance"] for variant in variants]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_random_variants_draw_each_distinct_pass_once_and_the_same_pictures(
     make: Any, gl: rg.Session, seed: int

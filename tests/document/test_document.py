@@ -189,6 +189,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_refused_at_once(name: str) -> None:
     start = time.process_time()
@@ -213,6 +214,7 @@ def test_limits_are_named_with_their_option() -> None:
 # --- any text --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(st.text(alphabet=st.sampled_from("ab1 .:-?,[]{}&*!|>'\"%@#<\n\t\\\x00\x85\u2028\ufeff\ud800~="), max_size=60))
 @settings(max_examples=600, deadline=None)
 def test_any_text_is_read_or_refused(text: str) -> None:

@@ -29,6 +29,7 @@ ELSEWHERE = (  # need several files or a GPU
     "RG204",
     "RG205",
     "RG206",
+    "RG401",
     "RG493",
     "RG494",
     "RG495",

@@ -105,6 +105,7 @@ def test_a_link_does_not_lead_out_of_the_root(shaders: Path, tmp_path: Path) -> 
         expand(shaders / "a.frag", shaders.parent / "include")
 
 
+@pytest.mark.slow
 def test_limits_of_depth_and_size(shaders: Path) -> None:
     for number in range(40):
         (shaders / f"n{number}.glsl").write_text(f'#include "n{number + 1}.glsl"\n')

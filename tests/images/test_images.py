@@ -571,6 +571,7 @@ def test_limits_can_be_set(tmp_path: Path) -> None:
         decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=Limits(side=29))
 
 
+@pytest.mark.slow
 def test_a_bomb_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.png").write_bytes(png(8000, 8000, bytes(8000 * 32001)))
     assert "above 64 MiB the limit is 1000:1" in refused(tmp_path / "a.png", capfd)

@@ -426,6 +426,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_files_are_answered_soon(toy_catalog: Catalog, name: str) -> None:
     start = time.process_time()

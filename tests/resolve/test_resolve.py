@@ -356,6 +356,7 @@ names = st.text(min_size=1, max_size=8)
 values = st.recursive(scalars, lambda inner: st.lists(inner) | st.dictionaries(names, inner), max_leaves=8)
 
 
+@pytest.mark.slow
 @given(values)
 @settings(max_examples=300, deadline=None)
 def test_any_value_is_written_so_that_it_reads_back(value: Any) -> None:
@@ -505,6 +506,7 @@ def test_a_shipped_scene(tmp_path: Path, toy_catalog: Catalog) -> None:
     assert resolve(parse(spec.to_yaml()), catalog=toy_catalog).scene == spec.scene
 
 
+@pytest.mark.slow
 @given(st.text(alphabet=st.sampled_from("ab1 .:-?,[]{}&*!|>'\"%@#<\n\\$~=/"), max_size=40))
 @settings(max_examples=300, deadline=None)
 def test_any_setting_is_applied_or_refused(toy_catalog: Catalog, text: str) -> None:

@@ -385,6 +385,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", HOSTILE)
 def test_hostile_text_ends_soon(tmp_path: Path, case: str) -> None:
     start = time.process_time()

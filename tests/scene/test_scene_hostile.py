@@ -87,6 +87,7 @@ WORDS = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @CALM
 @given(words=st.lists(WORDS, max_size=60))
 def test_any_obj_text(tmp_path: Path, words: list[str]) -> None:
@@ -95,6 +96,7 @@ def test_any_obj_text(tmp_path: Path, words: list[str]) -> None:
     survives(path)
 
 
+@pytest.mark.slow
 @CALM
 @given(data=st.binary(max_size=200))
 @pytest.mark.parametrize("name", ["a.obj", "a.gltf", "a.glb", "a.yaml"])
@@ -155,6 +157,7 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
+@pytest.mark.slow
 @CALM
 @given(data=st.data())
 def test_any_change_to_a_gltf(tmp_path: Path, data: st.DataObject) -> None:
@@ -332,6 +335,7 @@ BALLOONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BALLOONS)
 def test_a_small_file_does_not_balloon(tmp_path: Path, case: str) -> None:
     (tmp_path / "a.bin").write_bytes(bytes(48))

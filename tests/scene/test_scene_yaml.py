@@ -244,6 +244,7 @@ def test_shipped_scenes_are_all_there() -> None:
     assert set(shipped_scenes()) >= {"cornell_box", "spheres", "shadow_study", "stairs", "many_lights", "glass"}
 
 
+@pytest.mark.slow
 def test_what_casts_shadows_in_shipped_scenes_is_closed() -> None:
     """Shadow volumes need closed casters: open planes must not cast."""
     for path in shipped_scenes().values():

@@ -240,6 +240,7 @@ def test_dependencies_are_a_networkx_graph_with_reasons() -> None:
     assert dag.edges[("draw0", 0), ("light0", 0)] == {"resource": "draw0.x", "why": "reads"}
 
 
+@pytest.mark.slow
 def test_ten_thousand_steps_take_seconds() -> None:
     chooser = random.Random(1)
     steps = [step("n0", (), ("n0.x",))]

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rendergraph import stamps
 
@@ -59,6 +60,7 @@ FILES = {
 }
 
 
+@pytest.mark.slow
 def test_every_file_that_is_opened_was_looked_at(tmp_path: Path) -> None:
     from rendergraph.images import encode
 

@@ -165,6 +165,7 @@ def test_without_last_frame_it_adapts_at_once(frames: Frames) -> None:
     np.testing.assert_allclose(seen, [1, 2, 3], rtol=RELATIVE)
 
 
+@pytest.mark.slow
 def test_shipped_pipelines(session: rg.Session) -> None:
     """`adaptation` begins dark, for an eye that comes from the light, and ends as `hdr`."""
     taps = ["exposure.luminance"]

@@ -58,6 +58,7 @@ cameras: {main: {eye: [0.5, 2, 4.2], target: [0, 0.4, 0.2], fov_y_degrees: 42, n
 # --- full precision: the same picture --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_full_precision_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
     """Visibility from the pre-pass's depth is that of the G-buffer's, so that shadow edges are the same too."""
@@ -74,6 +75,7 @@ def test_the_picture_is_that_of_forward(session: rg.Session, scene: str) -> None
     assert (np.abs(deferred - forward).max(-1) > 1).mean() <= 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ASSETS)
 def test_full_precision_draws_the_forward_picture_of_assets(
     radiance: Any, steps_off: Any, shared: Path, scene: str
@@ -82,6 +84,7 @@ def test_full_precision_draws_the_forward_picture_of_assets(
     same(steps_off(radiance("deferred", file, FULL), radiance("forward-prepass", file)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shading", MODELS)
 def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shading: str) -> None:
     scene, model = mixture(tmp_path), f"light.shading={shading}"
@@ -96,6 +99,7 @@ def test_the_fast_visibility(radiance: Any, steps_off: Any) -> None:
     same(steps_off(*pictures))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shading", ["phong", "pbr"])
 def test_an_obj_with_its_own_coefficients(radiance: Any, steps_off: Any, shared: Path, shading: str) -> None:
     """Ka, Kd, Ks and Ns of an MTL, textured: what the empirical targets are there for."""
@@ -122,6 +126,7 @@ def test_shadows_looked_up_in_place_or_in_screen_space(radiance: Any) -> None:
     assert screen[..., :3].mean() < 0.98 * bare[..., :3].mean()
 
 
+@pytest.mark.slow
 def test_textures_masks_and_both_sides(radiance: Any, steps_off: Any, shared: Path) -> None:
     """Alpha-masked, blended and two-sided surfaces."""
     file = shared / "assets" / "gltf" / "AlphaBlendModeTest.glb"
@@ -157,6 +162,7 @@ def decode(encoded: Floats) -> Floats:
     return np.asarray(np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_compact_is_off_by_half_a_step_of_eight_bit_base_colour(session: rg.Session, scene: str) -> None:
     """Radiance without emission is linear in base colour, so no pixel can be off by more than base colour is.

@@ -12,6 +12,8 @@ import pytest
 import rendergraph as rg
 from rendergraph.scene.cameras import view_matrices
 
+pytestmark = pytest.mark.slow  # many lights
+
 FULL = "gbuffer.precision=full"
 SIZE = (120, 90)
 _SAMPLES_PASSED = 0x8914

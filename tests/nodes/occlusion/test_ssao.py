@@ -14,6 +14,8 @@ import pytest
 import rendergraph as rg
 from rendergraph.scene.cameras import view_matrices
 
+pytestmark = pytest.mark.slow  # pictures of many samples
+
 Floats = npt.NDArray[np.float64]
 Occlusion = Callable[..., Floats]
 BOTH = pytest.mark.parametrize("technique", ["hemisphere", "disc"])

@@ -13,6 +13,8 @@ import pytest
 import rendergraph as rg
 from rendergraph.textures import TextureDesc
 
+pytestmark = pytest.mark.slow  # pictures with large maps
+
 Floats = npt.NDArray[np.float64]
 
 NARROW = {

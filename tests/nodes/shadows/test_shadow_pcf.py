@@ -49,6 +49,7 @@ def test_brute_force_is_the_reference(shared: Path, bilinear: Bilinear, taps: in
         assert brute_force(bilinear, depth, place, grid(taps)) == pytest.approx(case[name], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kernel", "taps", "edges"),
     [
@@ -117,6 +118,7 @@ def wrong_share(shared: Path, case: str, *sets: str, pipeline: str = "forward") 
     return float(100 * (lit != (masks["cls"] == 1))[judged].mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["dir_basic", "dir_camera_in_shadow", "dir_cascades", "spot_basic"])
 def test_hard_shadows_are_the_ray_cast_ones(gl: Any, shared: Path, case: str) -> None:
     assert wrong_share(shared, case) <= 0.02

@@ -123,6 +123,7 @@ def test_one_flat_caster_is_exact(look: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(vsm.visibility[floor], pcf.visibility[floor], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_type_is_the_whole_change(session: rg.Session) -> None:
     retyped = rg.load("shadow-pcf", size=(96, 64), sets=["shadows.type=shadow_vsm"])
     shipped = rg.load("shadow-vsm", size=(96, 64))
