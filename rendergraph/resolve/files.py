@@ -191,7 +191,11 @@ class Files:
         """What a type takes, None where there is no such type."""
         sub = self.sub_pipeline(value)
         if sub is not None:
-            return TypeNames(frozenset(entries(sub, "parameters")), frozenset(entries(sub, "inputs")), {})
+            inputs = entries(sub, "inputs")
+            may_lack = ((name, value.get("optional")) for name, value in inputs.items())
+            optional = frozenset(name for name, flag in may_lack if flag is not None and flag.data is True)
+            outputs = frozenset(entries(sub, "outputs"))
+            return TypeNames(frozenset(entries(sub, "parameters")), frozenset(inputs), {}, optional, outputs)
         text = self.type_name(value)
         if text not in self._names:
             self._names[text] = self._node_names(text)
@@ -212,7 +216,10 @@ class Files:
         except InputError:
             return None  # `link` says what is wrong with it
         groups = cls.groups()
-        return TypeNames(frozenset(cls.parameters()), frozenset(cls.inputs()) | frozenset(groups), groups)
+        inputs = cls.inputs()
+        optional = frozenset(name for name, port in inputs.items() if port.optional)
+        taken = frozenset(inputs) | frozenset(groups)
+        return TypeNames(frozenset(cls.parameters()), taken, groups, optional, frozenset(cls.outputs()))
 
     def missing(self, value: Value) -> Problem | None:
         """What is wrong with a `type` that is a path and leads to no sub-pipeline."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Set
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rendergraph.document import Value
@@ -13,11 +13,13 @@ from rendergraph.read import entries, word
 
 @dataclass(frozen=True)
 class TypeNames:
-    """What a node type takes, as far as merging asks."""
+    """What a node type takes and makes, as far as merging asks; `optional` are inputs it can do without."""
 
     params: frozenset[str]
     inputs: frozenset[str]
     groups: dict[str, tuple[str, ...]]
+    optional: frozenset[str]
+    outputs: frozenset[str]
 
 
 NamesOf = Callable[[Value], TypeNames | None]
@@ -55,13 +57,15 @@ def diff(old: Any, new: Any) -> Any:
 def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Value, list[Problem]]:
     """A pipeline with a patch applied, and what was dropped on the way.
 
-    A node that gets another type loses the inherited parameters and inputs that the new type lacks, with a note; those
-    that the patch itself writes or removes are its own affair.
+    A node that gets another type loses the inherited parameters and inputs that the new type lacks, and optional inputs
+    of others lose their inherited links to outputs that it lacks, with a note; what the patch itself writes or removes
+    is its own affair.
     """
     notes: list[Problem] = []
     old_nodes, new_nodes = entries(target, "nodes"), entries(patch, "nodes")
     kept = dict(old_nodes)
     disconnected: dict[str, dict[str, Value]] = {}
+    fed: list[tuple[str, Value, Value, frozenset[str]]] = []
     for name, change in new_nodes.items():
         node = old_nodes.get(name)
         if node is None:
@@ -70,6 +74,7 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
         retyped = new_type is not None and new_type.data is not None and _differ(node.get("type"), new_type)
         if retyped and new_type is not None and (names := names_of(new_type)):
             kept[name] = _drop(name, node, change, new_type, names, notes)
+            fed.append((name, node, new_type, names.outputs))
         elif not retyped and (names := names_of(node.get("type") or node)) and names.groups:
             inputs = change.get("inputs")
             disconnected[name] = {
@@ -77,6 +82,13 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
                 for key, link in (inputs.items() if inputs is not None else ())
                 if link.data is None and any(key in members for members in names.groups.values())
             }
+    for name, node, new_type, outputs in fed:
+        before = names_of(node.get("type") or node)
+        lost = before.outputs - outputs if before is not None else frozenset[str]()
+        for other, key, port in _unlinked(name, lost, kept, new_nodes, names_of):
+            text = f"node '{name}' is now '{word(new_type) or 'the new type'}', which has no output '{port}' of "
+            text += f"'{word(node, 'type')}'; '{other}.{key}' does without"
+            notes.append(_note(new_type, text))
     if "nodes" in (target.data if isinstance(target.data, dict) else {}):
         nodes = target.get("nodes")
         assert nodes is not None
@@ -115,6 +127,42 @@ def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNam
             word_for = part.removesuffix("s") if len(lost) == 1 else part
             listed = ", ".join(f"'{key}'" for key in lost)
             text = f"node '{name}' is now '{new}', which has no {word_for} {listed} of '{old}'; dropped"
-            problem = new_type.problem("RG150", text)
-            notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
+            notes.append(_note(new_type, text))
     return node.with_data(parts)
+
+
+def _note(new_type: Value, text: str) -> Problem:
+    return replace(new_type.problem("RG150", text), severity="warning")
+
+
+def _unlinked(
+    name: str, lost: Set[str], nodes: dict[str, Value], patch: Mapping[str, Value], names_of: NamesOf
+) -> Iterator[tuple[str, str, str]]:
+    """Take inherited links to a node's lost outputs out of the optional inputs of others.
+
+    Yields:
+        The other node, its input and the output, of each link that is gone.
+    """
+    for other, node in list(nodes.items()) if lost else ():
+        change = patch.get(other)
+        own = _mapping(change.get("inputs") or change) if change is not None else {}
+        for key, link in entries(node, "inputs").items():
+            parts = link.data if isinstance(link.data, list) else [link]
+            left = [part for part in parts if _port_of(name, key, part) not in lost]
+            if key in own or len(left) == len(parts):
+                continue
+            names = names_of((change.get("type") if change is not None else None) or node.get("type") or node)
+            inputs = nodes[other].get("inputs")
+            if names is None or key not in names.optional or inputs is None:
+                continue
+            rest = {name: value for name, value in _mapping(inputs).items() if name != key}
+            rest |= {key: link.with_data(left)} if left else {}
+            nodes[other] = nodes[other].with_data({**_mapping(nodes[other]), "inputs": inputs.with_data(rest)})
+            for port in sorted({str(_port_of(name, key, part)) for part in parts} & lost):
+                yield other, key, port
+
+
+def _port_of(node: str, key: str, link: Value) -> str | None:
+    """The port of a node that a link leads to, None where it leads to another node."""
+    source, _, port = str(link.data).partition("@")[0].partition(".")
+    return (port or key) if source == node else None

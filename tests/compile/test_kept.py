@@ -208,9 +208,9 @@ def test_kept_memory_is_freed_with_its_executable(bench: Any) -> None:
     session = bench.session
     session.render(bench.pipeline(TEXT, Table, Show, shaders=SHADERS))
     with session.device.current():
-        memory = session.active.memory
+        memory = session.cache.active.memory
         names = [texture.glo for texture in memory.physicals]
-        session._forget_executables()
+        session.cache._forget()
         assert not any(session.device.raw.glIsTexture(name) for name in names)
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import rendergraph as rg
 from rendergraph.catalog import Catalog
 from rendergraph.document import Source, Value, from_plain, parse
 from rendergraph.errors import InputError, UsageError
@@ -200,6 +201,50 @@ def test_types_are_set_first(folder: Path, toy_catalog: Catalog) -> None:
 def test_the_same_type_again_drops_nothing(folder: Path, toy_catalog: Catalog) -> None:
     spec = resolve(folder / "forward.yaml", catalog=toy_catalog, sets=["shadows.type=shadow_pcf"])
     assert nodes_of(spec)["shadows"]["params"] == {"taps": 2, "bias": 2}
+
+
+PLANAR = """from rendergraph.api import Depth, Input, Node, Output, ShadowMap, Visibility
+class Planar(Node):
+    \"\"\"Shadows in image space alone.\"\"\"
+    shadow_map = Input(ShadowMap, kind="texture2d_array", size="any", optional=True, doc="Depth from lights.")
+    depth = Input(Depth, doc="Depth.")
+    visibility = Output(Visibility, kind="texture2d_array", layers=1, lights=lambda node, facts: (0,), doc="Lit.")
+"""
+
+
+def planar(tmp_path: Path, *sets: str, **options: Any) -> rg.Pipeline:
+    (tmp_path / "planar.py").write_text(PLANAR)
+    return rg.load("deferred", sets=["shadows.type=planar", *sets], plugins=[tmp_path / "planar.py"], **options)
+
+
+def test_retyping_leaves_out_optional_links_that_the_new_type_cannot_feed(tmp_path: Path) -> None:
+    pipeline = planar(tmp_path)
+    light = nodes_of(pipeline.resolve().spec)["light"]["inputs"]
+    assert "blended_lookup" not in light
+    assert light["visibility"] == "shadows.visibility"
+    assert (
+        "warning: RG150 node 'shadows' is now 'planar', which has no output 'lookup' of 'shadow_pcf'; "
+        "'light.blended_lookup' does without"
+    ) in [str(note).partition(": ")[2] for note in pipeline.resolve().spec.notes]
+    assert not pipeline.link().graph["light"].inputs.get("blended_lookup")
+
+
+def test_a_link_that_is_written_beside_the_new_type_is_refused(tmp_path: Path) -> None:
+    pipeline = planar(tmp_path, "light.blended_lookup=shadows.lookup")
+    with pytest.raises(InputError, match=r"RG112 node 'shadows' .*\(planar\) has no output 'lookup'"):
+        _ = pipeline.link().graph
+
+
+def test_of_a_list_the_links_that_the_new_type_feeds_stay(tmp_path: Path) -> None:
+    (tmp_path / "two.yaml").write_text(
+        "extends: forward\nnodes:\n  more: {type: shadow_pcf, inputs: {shadow_map: sun.shadow_map}}\n"
+        "  pre: {type: depth_prepass}\n  shadows: {inputs: {depth: pre.depth}}\n"
+        "  light: {inputs: {lookup: [shadows.lookup, more.lookup]}}\n"
+    )
+    (tmp_path / "planar.py").write_text(PLANAR)
+    plugins = [tmp_path / "planar.py"]
+    spec = rg.load(tmp_path / "two.yaml", sets=["shadows.type=planar"], plugins=plugins).resolve().spec
+    assert nodes_of(spec)["light"]["inputs"]["lookup"] == ["more.lookup"]
 
 
 def test_retyping_to_a_sub_pipeline(folder: Path, toy_catalog: Catalog) -> None:
