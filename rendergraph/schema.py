@@ -18,7 +18,8 @@ from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.glsl.source import about
 from rendergraph.keys import Schema, as_markdown, file_schema
 from rendergraph.keys import schema as schema_of
-from rendergraph.read import NODE, PIPELINE
+from rendergraph.read import NODE, PIPELINE, entries, read, word
+from rendergraph.resolve import PipelineSpec, resolve
 from rendergraph.resources import shipped_pipelines
 from rendergraph.settings import Roots
 from rendergraph.textures import Signature
@@ -33,26 +34,49 @@ _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A par
 _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
 
-def schema(catalog: Catalog, inherited: Mapping[str, str] = {}) -> Schema:
+def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Schema:
     """A draft-07 schema, which is what editors read.
 
     A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
 
     Args:
         catalog: the types there are.
-        inherited: of a file that extends another: that one's nodes, by id, with their types.
+        bases: what files extend, as it is written in them, with the types of its nodes by their ids.
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
     types |= {found.name: found.cls for found in catalog.usable()[0]}
     rules = {name: _rules_of(name, cls, catalog.extensions) for name, cls in types.items() if cls is not None}
     found = file_schema(PIPELINE)
-    nodes = found["properties"]["nodes"]
-    nodes["additionalProperties"] = {"$ref": "#/definitions/node"}
-    if inherited:
-        nodes["properties"] = {id: _inherited(word, rules.get(word, {})) for id, word in inherited.items()}
+    found["properties"]["nodes"]["additionalProperties"] = {"$ref": "#/definitions/node"}
     found["definitions"] = {"node": _node(types, rules)}
+    for base, nodes in bases.items():
+        known = {id: {"$ref": f"#/definitions/inherited_{name}"} for id, name in nodes.items() if name in rules}
+        found["definitions"] |= {f"inherited_{name}": _inherited(rules[name]) for name in {*nodes.values()} & {*rules}}
+        condition = {"properties": {"extends": {"const": base}}, "required": ["extends"]}
+        then = {"properties": {"nodes": {"properties": known}}}
+        found.setdefault("allOf", []).append({"if": condition, "then": then})
     marked: Schema = as_markdown(found)
     return marked
+
+
+def shipped_bases(catalog: Catalog) -> dict[str, dict[str, str]]:
+    """The types of the nodes of every shipped pipeline, by name and id."""
+    return {name: _types_in(resolve(name, catalog=catalog)) for name in shipped_pipelines()}
+
+
+def base_of(file: Path, catalog: Catalog) -> dict[str, dict[str, str]]:
+    """The types of the nodes of what a pipeline file extends, under the name it has there; nothing where it is whole.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    base = word(read(file, keep_going=True).root, "extends")
+    return {} if base is None else {base: _types_in(resolve(file, catalog=catalog))}
+
+
+def _types_in(spec: PipelineSpec) -> dict[str, str]:
+    found = {id: word(node, "type") for id, node in entries(spec.tree, "nodes").items()}
+    return {id: name for id, name in found.items() if name is not None}
 
 
 def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -> Schema:
@@ -74,13 +98,9 @@ def _node(types: Mapping[str, type[Node] | None], rules: Mapping[str, Schema]) -
     return found
 
 
-def _inherited(type_name: str, then: Schema) -> Schema:
-    """A node of the file that is extended: of that type as long as nothing else is said."""
-    same = {"if": {"not": {"required": ["type"]}}, "then": then}
-    return {
-        "description": f"`{type_name}`, unless `type` says otherwise.",
-        "allOf": [{"$ref": "#/definitions/node"}, same],
-    }
+def _inherited(then: Schema) -> Schema:
+    """A node of the file that is extended: of a type as long as nothing else is said."""
+    return {"if": {"not": {"required": ["type"]}}, "then": then}
 
 
 def _rules_of(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
@@ -230,7 +250,8 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
     try:
         if roots.check(file).stat().st_size > _MOST_BYTES:
             return None
-        then = _rules(json.loads(file.read_text(encoding="utf-8")))
+        written = json.loads(file.read_text(encoding="utf-8"))
+        then = _rules(written)
     except (OSError, ValueError, TypeError, KeyError, InputError):  # not there, or not ours
         return None
     now = _rules(schema(catalog))
@@ -239,6 +260,8 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
         return None
     rest = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
     words = [word for plugin in plugins for word in ("--plugin", str(plugin))]
+    if _bases_in(written) - {*shipped_pipelines()}:  # it was written for a file that extends another
+        words.append(shown_file(pipeline))
     way_out = (
         f"`{shlex.join(['rendergraph', 'schema', *words, '-o', shown_file(os.path.normpath(file))])}` writes it anew"
     )
@@ -262,3 +285,8 @@ def _rules(found: Any) -> dict[str, Any]:
     rules = {entry["if"]["properties"]["type"]["const"]: entry["then"] for entry in node["allOf"]}
     about = {entry["const"]: entry for entry in node["properties"]["type"]["anyOf"] if "const" in entry}
     return {name: [rules.get(name), entry] for name, entry in about.items()}
+
+
+def _bases_in(found: Any) -> set[str]:
+    """What files may extend, by a schema, so that it knows the nodes of that."""
+    return {entry["if"]["properties"]["extends"]["const"] for entry in found.get("allOf", ())}

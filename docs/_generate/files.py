@@ -1,4 +1,4 @@
-"""Every key of a pipeline and a scene file, from the tables that `explain` prints, and the limits on files."""
+"""Every key of the files we read, from the tables that `explain` prints, and the limits on files."""
 
 from __future__ import annotations
 
@@ -20,13 +20,16 @@ from rendergraph.textures import MOST_SIDE
 
 from .markdown import code, prose, table
 
+FILES = {"pipeline": "The file", "scene": "The file", "sweep": "", "settings": "", "header": "The header itself"}
+"""What the first table of a kind of file is called; nothing where there is but one."""
+
 HEADS = ("key", "value", "default", "")
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """A part of a page for each kind of file."""
-    yield "scene-keys.md", _sections(file_keys("scene"), "The file")
-    yield "pipeline-keys.md", _sections(file_keys("pipeline"), "The file")
+    for kind, top in FILES.items():
+        yield f"{kind}-keys.md", _sections(file_keys(kind), top)
     yield "limits.md", _limits()
 
 
@@ -39,7 +42,7 @@ def _sections(keys: list[dict[str, Any]], top: str) -> str:
             if row["section"] == section
         ]
         title = f"`{section}`" if section else top
-        parts.append(f"### {title}\n\n{table(HEADS, rows)}")
+        parts.append((f"### {title}\n\n" if title else "") + table(HEADS, rows))
     return "\n".join(parts)
 
 

@@ -5,32 +5,60 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
 from rendergraph.cli.output import warn
 from rendergraph.cli.words import click
+from rendergraph.errors import InputError, Problem, suggestion
+
+if TYPE_CHECKING:
+    from rendergraph.keys import Schema
 
 
 @click.command("schema")
+@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|FILE]")
 @options.plugin_option
 @click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
-def command(plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
-    """Print the JSON Schema of pipeline files.
+def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
+    """Print the JSON Schema of pipeline files, or of scenes or sweeps.
 
-    It knows all installed nodes; editors complete and check pipelines with it. Of a type that fails it has the name
-    alone, and says so.
+    That of pipelines knows all installed nodes; editors complete and check pipelines with it, also those that extend a
+    shipped one. FILE is a pipeline that extends another file: its schema knows the nodes of that, too. Of a type that
+    fails it has the name alone, and says so.
 
     \b
     Examples:
       rendergraph schema -o rendergraph.schema.json
+      rendergraph schema scene -o scene.schema.json
+      rendergraph schema mine.yaml -o rendergraph.schema.json
     """
-    from rendergraph.catalog import Catalog
-    from rendergraph.schema import schema
+    found = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
+    options.put(json.dumps(found, indent=2, ensure_ascii=False), output, as_json=as_json)
 
+
+def _of_table(what: str) -> Schema:
+    from rendergraph.cli.explain import table_of
+    from rendergraph.keys import as_markdown, file_schema
+
+    found: Schema = as_markdown(file_schema(table_of(what)))
+    return found
+
+
+def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
+    from rendergraph.catalog import Catalog
+    from rendergraph.schema import base_of, schema, shipped_bases
+
+    if what != "pipeline" and not Path(what).suffix:
+        text = f"there is no schema of '{what}'{suggestion(what, ('pipeline', 'scene', 'sweep'))}"
+        raise InputError(Problem("RG511", text))
     catalog = Catalog.discover(plugins)
     warn(catalog.notes)
-    text = json.dumps(schema(catalog), indent=2, ensure_ascii=False)
+    bases = shipped_bases(catalog)
+    if what != "pipeline":
+        bases |= base_of(Path(what), catalog)
+    found = schema(catalog, bases)
     warn([replace(problem, severity="warning") for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)
-    options.put(text, output, as_json=as_json)
+    return found

@@ -175,10 +175,11 @@ def schema(takes: Takes) -> Schema:
     if isinstance(takes, Table):
         return _table(takes)
     values = schema(takes.of)
+    refused = {"not": {"enum": list(takes.refused)}} if takes.refused else {}
     return {
         "type": "object",
-        "propertyNames": {"pattern": regular(takes.naming.pattern)},
-        "additionalProperties": nullable(values) if takes.null else values,
+        "propertyNames": {"pattern": regular(takes.naming.pattern), **refused},
+        "additionalProperties": nullable(values) if takes.null and isinstance(takes.of, Form) else values,
         **({"minProperties": takes.least} if takes.least else {}),
     }
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
 
-from rendergraph.catalog import Catalog, NodeType, header
+from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Facts, Input, Output, TextureInfo
 from rendergraph.errors import InputError
 from rendergraph.schema import schema
@@ -345,13 +344,3 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
 )
 def test_wrong_compute_shaders(tmp_path: Path, text: str, message: str) -> None:
     assert mistakes(tmp_path, text, "effect.comp")[0].startswith(message)
-
-
-def test_the_reference_lists_every_key() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "reference" / "shader-nodes.md").read_text(encoding="utf-8")
-    parts = re.split(r"^### ", page.partition("## Where they are found")[0], flags=re.MULTILINE)
-    tables = [[key.name for key in keys] for _, keys in header.HEADER.sections()]
-    for part, keys in zip(parts, tables, strict=True):
-        text = part.partition("## The header")[2] or part
-        firsts = re.findall(r"^\| (`[^|]*`) \|", text, re.MULTILINE)
-        assert sorted(re.findall(r"`(\w+)`", " ".join(firsts))) == sorted(keys)

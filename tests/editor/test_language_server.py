@@ -235,6 +235,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plugins = ["--plugin", str(folder / "fog.py"), "--plugin", str(folder / "dim.frag")]
     assert main(["schema", "-o", str(folder / "rendergraph.schema.json")]) == 0
     assert main(["schema", "-o", str(folder / "plugins.schema.json"), *plugins]) == 0
+    assert main(["schema", "scene", "-o", str(folder / "scene.schema.json")]) == 0
     return folder
 
 
@@ -307,6 +308,72 @@ def test_choices_and_shipped_names_are_offered(editor: Editor, desk: Path) -> No
     assert editor.offers(desk, changed("shadow_study", "|")).keys() == {*shipped_scenes(), "null"}
     first = PIPELINE.partition("\n")[0]
     assert editor.offers(desk, f"{first}\nextends: |\n").keys() == {*shipped_pipelines(), "null"}
+
+
+EXTENDS = """\
+# yaml-language-server: $schema=./rendergraph.schema.json
+extends: forward
+nodes:
+  light:
+    params:
+      ambient: 0.1
+  display: {params: {exposure: 1}}
+"""
+
+
+def test_a_file_that_extends_is_completed_and_checked_by_the_types_of_its_base(editor: Editor, desk: Path) -> None:
+    light, display = (Catalog.discover().get(name).cls for name in ("forward_lighting", "tonemap"))
+    assert editor.marks(desk, EXTENDS) == []
+    offers = editor.offers(desk, EXTENDS.replace("ambient: 0.1", "|"))
+    assert offers.keys() == set(light.parameters())
+    offers = editor.offers(desk, EXTENDS.replace("exposure: 1", "exposure: 1, cu|"))
+    assert offers.keys() == set(display.parameters()) - {"exposure"}
+    ((line, message),) = editor.marks(desk, EXTENDS.replace("exposure: 1", "exposure: 99"))
+    assert (line, message) == (7, "Value is above the maximum of 32.")
+    ((line, message),) = editor.marks(desk, EXTENDS.replace("ambient:", "ambiant:"))
+    assert (line, message) == (6, "'forward_lighting' has no such param.")
+    retyped = EXTENDS.replace("params: {exposure: 1}", "type: gbuffer, params: {exposure: 1}")
+    ((line, message),) = editor.marks(desk, retyped)
+    assert (line, message) == (7, "'gbuffer' has no such param.")
+    assert editor.hover(desk, EXTENDS.replace("exposure", "|exposure")).startswith("Stops added")
+
+
+def test_so_is_one_that_extends_a_file_of_ones_own(editor: Editor, desk: Path) -> None:
+    (desk / "base.yaml").write_text("extends: forward\nnodes: {light: {params: {ambient: 0}}}\n")
+    text = EXTENDS.replace("extends: forward", "extends: ./base.yaml").replace("exposure: 1", "exposure: 99")
+    assert editor.marks(desk, text) == []
+    (desk / "mine.yaml").write_text(text)
+    assert main(["schema", str(desk / "mine.yaml"), "-o", str(desk / "mine.schema.json")]) == 0
+    ((line, message),) = editor.marks(desk, text.replace("rendergraph.schema", "mine.schema"))
+    assert (line, message) == (7, "Value is above the maximum of 32.")
+
+
+SCENE = """\
+# yaml-language-server: $schema=./scene.schema.json
+scene: 1
+objects:
+  ball:
+    shape: sphere
+    radius: 2
+materials: {red: {roughness: 0.5}}
+"""
+
+
+@pytest.mark.parametrize("file", shipped_scenes().values(), ids=lambda file: file.stem)
+def test_no_shipped_scene_is_underlined(editor: Editor, desk: Path, file: Path) -> None:
+    assert editor.marks(desk, SCENE.partition("\n")[0] + "\n" + file.read_text(encoding="utf-8")) == []
+
+
+def test_scenes_are_completed_and_checked(editor: Editor, desk: Path) -> None:
+    assert editor.marks(desk, SCENE) == []
+    offers = editor.offers(desk, SCENE.replace("radius: 2", "|"))
+    assert {"radius", "segments", "rings", "material", "at"} <= offers.keys()
+    assert "tube" not in offers
+    ((line, message),) = editor.marks(desk, SCENE.replace("roughness: 0.5", "roughness: 2"))
+    assert (line, message) == (7, "Value is above the maximum of 1.")
+    ((line, message),) = editor.marks(desk, SCENE.replace("radius: 2", "tube: 2"))
+    assert (line, message) == (6, "Property tube is not allowed.")
+    assert editor.hover(desk, SCENE.replace("radius", "|radius")).startswith("Radius.\n\nDefault 0.5 m.")
 
 
 # --- hover -----------------------------------------------------------------------------------------------------------

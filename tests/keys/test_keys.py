@@ -1,0 +1,267 @@
+"""The grammar of the files we read: what tables say, and that the schema made of them says the same."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rendergraph.cli.explain import FILES, table_of
+from rendergraph.document import Source, Value, from_plain, parse
+from rendergraph.errors import InputError
+from rendergraph.keys import Codes, Form, Key, Later, Names, Naming, Table, Walk, as_markdown, file_schema, plain
+from rendergraph.keys import schema as schema_of
+from rendergraph.keys.forms import (
+    ANYTHING,
+    FLAG,
+    TEXT,
+    choice,
+    color,
+    either,
+    listed,
+    number,
+    row,
+    scale,
+    vector,
+    version,
+    whole,
+)
+from rendergraph.resources import shipped_scenes
+
+CODES = Codes("UNKNOWN", "WRONG", "NAME", "FILE")
+LAMP = Table(
+    "lamp '{}'",
+    (
+        Key("power", number(0, above=True), "How bright.", 1.0, "W"),
+        Key("kind", choice("round", "square", "long"), "Its shape.", required=True, example="kind: round"),
+        Key("color", color(1, alpha=True), "Its colour."),
+        Key("size", scale(), "Its size."),
+    ),
+)
+BOX = Table(
+    "box '{}'",
+    (Key("at", vector(), "Where."), Key("shape", choice("cube", "ball"), "Which."), Key("file", TEXT, "Or its file.")),
+    {
+        "shape": {"cube": (Key("side", number(), "Edge."),), "ball": (Key("radius", number(), "Radius."),)},
+        "file": (Key("page", whole(1, 9), "Which."),),
+    },
+)
+ROOM: Table = Table(
+    "a room",
+    (
+        Key("room", version(1), "Version.", code="VERSION"),
+        Key("lamps", Names(LAMP, Naming(re.compile(r"[a-z]+\Z"), "small letters make one"), "lamp"), "Lamps."),
+        Key("boxes", Names(BOX, refused={"self": "a box cannot be called 'self'"}), "Boxes."),
+        Key("tags", listed(TEXT, "tags", 1, 3), "Words.", example="tags: [old]"),
+        Key("lists", Names(listed(ANYTHING, "values"), null=False, least=1), "Lists."),
+        Key("inner", Later(TEXT, lambda: ROOM), "Another room, or its file."),
+        Key("open", FLAG, "Whether."),
+    ),
+    refused={"door": "a room has no door, say open: true"},
+    code="TOP",
+)
+
+
+def walked(text: str) -> tuple[Value | None, Walk]:
+    document = parse(text, keep_going=True)
+    walk = Walk(CODES, document.problems)
+    return walk.root(document.root, ROOM, "`lamps`"), walk
+
+
+def told(text: str) -> list[str]:
+    return [f"{p.place.line}:{p.place.column} {p.code} {p.text}" for p in walked(text)[1].problems if p.place]
+
+
+def test_what_is_right_stays_and_means_something() -> None:
+    text = """
+room: 1
+lamps: {a: {kind: round, power: 2, color: [1, 0, 0], size: 2}, b: {kind: long, size: [1, 2, 3], color: null}}
+boxes: {c: {shape: cube, side: 3}, d: {file: x.obj, page: 2, at: [0, 0, 1]}}
+inner: {room: 1, inner: there.yaml}
+lists: {x: [1, null]}
+"""
+    root, walk = walked(text)
+    assert not walk.problems
+    assert root is not None
+    assert plain(root, ROOM) == {
+        "room": 1,
+        "lamps": {
+            "a": {"kind": "round", "power": 2.0, "color": (1.0, 0.0, 0.0, 1.0), "size": (2.0, 2.0, 2.0)},
+            "b": {"kind": "long", "size": (1.0, 2.0, 3.0)},
+        },
+        "boxes": {"c": {"shape": "cube", "side": 3.0}, "d": {"file": "x.obj", "page": 2, "at": (0.0, 0.0, 1.0)}},
+        "inner": {"room": 1, "inner": "there.yaml"},
+        "lists": {"x": [1, None]},
+    }
+
+
+WRONG = {
+    "- 1": "1:1 FILE a room is a mapping with `lamps`, this is a list",
+    "rooms: 1": "1:1 TOP a room has no key 'rooms'; did you mean 'room'?",
+    "door: 1": "1:1 TOP a room has no door, say open: true",
+    "room: 2": "1:7 VERSION 'room' takes 1, the version of the format that this program reads, this is 2",
+    "room: true": "1:7 VERSION 'room' takes 1, the version of the format that this program reads, this is true",
+    "open: yes": "1:7 WRONG 'open' takes true or false, this is 'yes'",
+    "lamps: 3": "1:8 WRONG 'lamps' takes a mapping, this is 3",
+    "lamps: {A: {kind: long}}": "1:9 NAME 'A' is no lamp; small letters make one",
+    "lamps: {a: 3}": "1:12 WRONG 'a' takes a mapping, this is 3",
+    "lamps: {a: }": "1:9 WRONG lamp 'a' needs 'kind'; add kind: round",
+    "lamps: {a: {kind: null}}": "1:9 WRONG lamp 'a' needs 'kind'; add kind: round",
+    "lamps: {a: {kind: log}}": "1:19 WRONG 'kind' takes one of round, square, long, as in kind: round, this is 'log'; did you mean 'long'?",
+    "lamps: {a: {kind: long, pwr: 1}}": "1:25 UNKNOWN lamp 'a' has no key 'pwr'; did you mean 'power'?",
+    "lamps: {a: {kind: long, power: 0}}": "1:32 WRONG 'power' takes a number above 0, this is 0",
+    "lamps: {a: {kind: long, color: [1, 2, 0]}}": "1:32 WRONG 'color' takes 3 or 4 numbers from 0 to 1, this is [1, 2, 0]",
+    "lamps: {a: {kind: long, size: [1, 2]}}": "1:31 WRONG 'size' takes one number or 3 numbers, this is [1, 2]",
+    "boxes: {a: {}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
+    "boxes: {a: {shape: cube, file: x}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
+    "boxes: {a: {shape: cube, radius: 1}}": "1:26 UNKNOWN box 'a' has no key 'radius'; there is at, file, shape, side",
+    "boxes: {self: {shape: cube}}": "1:9 NAME a box cannot be called 'self'",
+    "boxes: {a: {shape: cube, at: [1, .nan, 1]}}": "1:30 WRONG 'at' takes 3 numbers, this is [1, nan, 1]",
+    "tags: []": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is []",
+    "tags: [a, b, c, d]": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is ['a', 'b', 'c', 'd']",
+    "tags: [' ']": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is [' ']",
+    "lists: {}": "1:8 WRONG 'lists' takes a mapping, this is a mapping",
+    "lists: {x: null}": "1:12 WRONG 'x' takes a list of values, this is null",
+    "inner: {tags: 1}": "1:15 WRONG 'tags' takes a list of tags, as in tags: [old], this is 1",
+    "inner: 3": "1:8 WRONG 'inner' takes text, this is 3",
+    "tags: [old, very old, and so on]\n? a key, which is none\n": "2:3 TOP 'a key, which is none' reads as a key: text with a "
+    "comma stands in quotes within {…}",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_mistake_is_told_at_its_place(text: str) -> None:
+    assert told(text) == [WRONG[text]]
+
+
+def test_what_is_left_out_is_remembered() -> None:
+    root, walk = walked("lamps: {a: {kind: lng, power: 1}, B: {}}\ntags: 1\nopen: *nowhere\n")
+    assert root is not None
+    assert root.plain() == {"lamps": {"a": {"power": 1}}}
+    assert walk.dropped == {("lamps", "a", "kind"), ("lamps", "B"), ("tags",), ("open",)}
+    assert [problem.code for problem in walk.problems] == ["RG006", "WRONG", "NAME", "WRONG"]
+
+
+def test_nobody_reads_a_thousand_mistakes() -> None:
+    with pytest.raises(InputError) as caught:
+        walked("".join(f"k{number}: 1\n" for number in range(1000)))
+    assert len(caught.value.problems) == 100
+
+
+@pytest.mark.parametrize(
+    ("form", "words"),
+    [
+        (number(), "a number"),
+        (number(0), "a number from 0 up"),
+        (number(high=5), "a number up to 5"),
+        (number(0.5, 1e6), "a number from 0.5 to 1000000"),
+        (number(0, 90, above=True), "a number above 0, up to 90"),
+        (whole(1), "a whole number from 1 up"),
+        (either(whole(1, 3), TEXT, FLAG), "a whole number from 1 to 3, text, or true or false"),
+        (row(TEXT, FLAG), "a list of text, true or false"),
+    ],
+)
+def test_limits_in_words(form: Form, words: str) -> None:
+    assert form.wanted == words
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_every_key_of_every_file_is_documented_and_has_a_legal_default(kind: str) -> None:
+    for _, keys in table_of(kind).sections():
+        for key in keys:
+            assert key.doc.endswith((".", ")")), key.name
+            if key.default is not None:
+                default = list(key.default) if isinstance(key.default, tuple) else key.default
+                assert isinstance(key.takes, Form)
+                assert key.takes.fits(from_plain(default, Source("here"))), key.name
+
+
+# --- the schema says the same ----------------------------------------------------------------------------------------
+
+
+@cache
+def compiled(what: str) -> Callable[[Any], Any]:
+    fastjsonschema = pytest.importorskip("fastjsonschema")
+    made = as_markdown(file_schema(ROOM if what == "room" else table_of(what)))
+    found: Callable[[Any], Any] = fastjsonschema.compile(json.loads(json.dumps(made)))
+    return found
+
+
+def accepts(validate: Callable[[Any], Any], data: Any) -> bool:
+    import fastjsonschema
+
+    try:
+        validate(json.loads(json.dumps(data)))
+    except fastjsonschema.JsonSchemaException:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("text", [text for text in WRONG if ".nan" not in text and "door" not in text])
+def test_what_the_walk_refuses_the_schema_refuses(text: str) -> None:
+    assert not accepts(compiled("room"), parse(text, keep_going=True).value)
+
+
+SWEEP = """
+sweep: 1
+pipeline: forward
+scene: spheres
+size: [48, 27]
+frames: 2
+reference: ./truth.png
+set: {light.ambient: 0.1, light.lookup: null}
+axes: {shadows.taps: [1, 3], light.shading: [pbr, phong]}
+"""
+
+
+def files(kind: str) -> list[str]:
+    if kind == "sweep":
+        study = (Path(__file__).parents[2] / "docs/guide/compare.md").read_text(encoding="utf-8")
+        return [SWEEP, study.partition("# study.yaml\n")[2].partition("```")[0]]
+    return [file.read_text(encoding="utf-8") for file in shipped_scenes().values()]
+
+
+def mutants(value: Any) -> list[Any]:
+    """The same with one thing in it changed, for each thing."""
+    found: list[Any] = ["no such word", [], {"nobody": 1}, -3]
+    if isinstance(value, dict):
+        found += [{**value, key: part} for key, child in value.items() for part in mutants(child)]
+        found += [{key: child for key, child in value.items() if key != left} for left in value]
+        found += [{**value, "no_such_key": 1}]
+    elif isinstance(value, list):
+        found += [[*value[:at], part, *value[at + 1 :]] for at, child in enumerate(value) for part in mutants(child)]
+        found += [value[:-1], [*value, 1]]
+    return found
+
+
+@pytest.mark.parametrize("kind", ["scene", "sweep"])
+def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str) -> None:
+    table, validate, checked = table_of(kind), compiled(kind), 0
+    for text in files(kind):
+        data = parse(text).value
+        assert accepts(validate, data)
+        found = mutants(data)
+        for mutant in found[:: len(found) // 100 + 1]:
+            walk = Walk(CODES)
+            walk.root(from_plain(mutant, Source("mutant")), table, "keys")
+            checked += 1
+            if walk.problems:
+                assert not accepts(validate, mutant), (mutant, walk.problems)
+    assert checked > 100
+
+
+def test_a_schema_says_what_it_is_made_of() -> None:
+    made = schema_of(LAMP)
+    assert made["properties"]["power"] == {
+        "type": ["number", "null"],
+        "exclusiveMinimum": 0,
+        "description": "How bright.\n\nDefault 1.0 W.",
+        "default": 1.0,
+    }
+    assert made["required"] == ["kind"]
+    assert made["properties"]["kind"]["enum"] == ["round", "square", "long"]
