@@ -204,8 +204,12 @@ class Pipeline:
         from rendergraph.session.gpu import opened
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
-        with opened(session, device) as gpu:
-            yield from stages.draw(expanded, gpu)
+
+        def drawn() -> Iterator[Frame]:
+            with opened(session, device) as gpu:
+                yield from stages.draw(expanded, gpu)
+
+        return drawn()
 
     def _repr_html_(self) -> str:
         from rendergraph.views import svg

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import rendergraph.allocate
 import rendergraph.expand
 import rendergraph.link
-import rendergraph.program
 import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
@@ -122,9 +121,11 @@ def check(linked: Linked) -> Planned:
     Raises:
         InputError: with all mistakes found.
     """
+    from rendergraph.program import check_texts
+
     planned = plan(expand(linked))
     types = {node.id: node.type for node in linked.graph.nodes}
-    rendergraph.program.check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
+    check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
     return planned
 
 
