@@ -21,7 +21,7 @@ _WHERE = {"Axis": "axes", "compare": "pictures", "Sweep": "product", "check_swee
 def __getattr__(name: str) -> Any:
     # Looked up on first use: reading an axis off the command line needs neither GL nor NumPy.
     if name in __all__:
-        import importlib
+        import importlib  # see above
 
         return getattr(importlib.import_module(f"rendergraph.compare.{_WHERE.get(name, 'values')}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

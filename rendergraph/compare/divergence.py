@@ -95,7 +95,7 @@ def _amount(a: Pixels, b: Pixels) -> tuple[float | None, float]:
 
 def _causes(graph: Graph, node: str, difference: GraphDiff) -> tuple[str, ...]:
     """Nodes that differ in structure among a pass and everything it reads."""
-    import networkx as nx
+    import networkx as nx  # needed for a difference alone, and slow to import
 
     known: Mapping[str, object] = difference.changed()
     leading = {node, *nx.ancestors(graph.dag, node)}

@@ -36,7 +36,7 @@ def read_picture(path: Path, size: tuple[int, int], name: str) -> tuple[Pixels, 
     Raises:
         InputError: it cannot be read, has layers, or another size.
     """
-    from rendergraph.images import read
+    from rendergraph.images import read  # a sweep is checked without OpenImageIO
 
     pixels = read(path)
     if pixels.ndim != 3:

@@ -70,7 +70,7 @@ def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping
     Raises:
         RenderError: the disk does not take it.
     """
-    from rendergraph.images import PictureInfo, Saved, save_outputs
+    from rendergraph.images import PictureInfo, Saved, save_outputs  # a sweep is checked without OpenImageIO
 
     try:
         run.folder.mkdir(exist_ok=True)
@@ -112,7 +112,7 @@ def settle(
 
 
 def _describe(run: Run, record: Mapping[str, Any]) -> None:
-    from rendergraph.images.files import staged
+    from rendergraph.images.files import staged  # a sweep is checked without OpenImageIO
 
     resolved = run.planned.linked.spec.to_yaml(origins=False)
     document = {**record, "resolved": resolved, "metrics": metrics.description()}
@@ -151,7 +151,7 @@ def is_kept(run: Run, record: Mapping[str, Any]) -> bool:
 
 def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
     """A result as it was kept."""
-    from rendergraph.images import read
+    from rendergraph.images import read  # a sweep is checked without OpenImageIO
 
     linked, plan = run.planned.linked, run.planned.plan
     return Result(

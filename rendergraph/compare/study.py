@@ -65,7 +65,7 @@ def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[L
 
 def begin(out: Path, study: Mapping[str, Any]) -> None:
     """Write down what is studied in a folder; to be called before the first picture goes there."""
-    from rendergraph.images.files import staged
+    from rendergraph.images.files import staged  # a sweep is checked without OpenImageIO
 
     with staged([out / STUDY]) as (part,):
         part.write_text(json.dumps(study, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -195,7 +195,7 @@ class Comparison:
 
 def machine() -> dict[str, str]:
     """The computer and the versions, in words."""
-    from importlib.metadata import version
+    from importlib.metadata import version  # takes longer than a check, and only reports ask
 
     names = ("rendergraph", "moderngl", "numpy", "OpenImageIO")
     return {
