@@ -10,7 +10,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from rendergraph.document import Document, Limits, Value, load, parse
+from rendergraph.document import Document, Value, YamlLimits, load, parse
 from rendergraph.errors import InputError
 from rendergraph.keys import Codes, Key, Later, Names, Naming, Table, Walk
 from rendergraph.keys.forms import ANYTHING, FLAG, NUMBER, TEXT, either, listed, row, shipped, version, whole
@@ -94,7 +94,7 @@ _HOLDS = "`nodes` and `outputs`"
 def read(
     path: Path | None,
     text: str | None = None,
-    limits: Limits = Limits(),
+    limits: YamlLimits = YamlLimits(),
     *,
     name: str | None = None,
     keep_going: bool = False,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rendergraph.document import Limits
+from rendergraph.document import YamlLimits
 from rendergraph.errors import InputError
 from rendergraph.read import checked, entries, read, word
 
@@ -69,7 +69,7 @@ def test_an_empty_patch_is_none() -> None:
 
 def test_limits_reach_the_yaml() -> None:
     with pytest.raises(InputError, match="--limit yaml-depth=N"):
-        read(None, TEXT, Limits(depth=2))
+        read(None, TEXT, YamlLimits(depth=2))
 
 
 def test_nothing_to_read() -> None:

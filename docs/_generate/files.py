@@ -62,7 +62,10 @@ def _default(row: dict[str, Any]) -> str:
 
 
 def _limits() -> str:
-    rows = [*_documented("a YAML file", "yaml", document.Limits), *_documented("a scene", "scene", files.Limits)]
+    rows = [
+        *_documented("a YAML file", "yaml", document.YamlLimits),
+        *_documented("a scene", "scene", files.SceneLimits),
+    ]
     rows += [
         ("an image", "channels of an EXR", image_header.MOST_CHANNELS, ""),
         ("a pipeline", "nodes, those of sub-pipelines included", flatten.MOST_NODES, ""),

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from rendergraph.authoring.new import KINDS, NewNode, new_node
 from rendergraph.authoring.report import Report
-from rendergraph.authoring.supervise import Limits, check_node
+from rendergraph.authoring.supervise import CheckLimits, check_node
 
-__all__ = ["KINDS", "Limits", "NewNode", "Report", "check_node", "new_node"]
+__all__ = ["KINDS", "CheckLimits", "NewNode", "Report", "check_node", "new_node"]

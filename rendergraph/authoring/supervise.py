@@ -34,7 +34,7 @@ _OVERHEAD = 20.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class CheckLimits:
     """What a check may take.
 
     Attributes:
@@ -49,7 +49,7 @@ class Limits:
 
 
 def check_node(
-    file: Path, *, plugins: Sequence[Path] = (), scene: str | None = None, limits: Limits = Limits()
+    file: Path, *, plugins: Sequence[Path] = (), scene: str | None = None, limits: CheckLimits = CheckLimits()
 ) -> Report:
     """Examine the node of a file in a child process.
 
@@ -83,7 +83,7 @@ class _Child:
     """One running check."""
 
     asked: dict[str, Any]
-    limits: Limits
+    limits: CheckLimits
     stage: str = "start"
     what: str = ""
     _last: deque[str] = field(default_factory=lambda: deque(maxlen=5))

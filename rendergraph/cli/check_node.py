@@ -39,14 +39,14 @@ def command(
       rendergraph check-node vignette.py
       rendergraph check-node grain.frag --json
     """
-    from rendergraph.authoring import Limits, check_node
+    from rendergraph.authoring import CheckLimits, check_node
 
     given = dict(limits)
     for name in given:
         if name not in _LIMITS:
             raise UsageError(Problem("RG500", f"there is no limit '{name}'{suggestion(name, _LIMITS)}"))
-    default = Limits()
-    allowed = Limits(
+    default = CheckLimits()
+    allowed = CheckLimits(
         given.get("import-seconds", default.import_seconds),
         given.get("pass-seconds", default.pass_seconds),
         given["memory"] << 20 if "memory" in given else default.memory,

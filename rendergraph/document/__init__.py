@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rendergraph.document.events import Limits, build, over_limit
+from rendergraph.document.events import YamlLimits, build, over_limit
 from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import look
 
 
-def load(path: Path, *, limits: Limits = Limits(), keep_going: bool = False, name: str | None = None) -> Document:
+def load(
+    path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = False, name: str | None = None
+) -> Document:
     """The values of a YAML file.
 
     Args:
@@ -41,7 +43,12 @@ def load(path: Path, *, limits: Limits = Limits(), keep_going: bool = False, nam
 
 
 def parse(
-    text: str, file: str = "<text>", *, path: Path | None = None, limits: Limits = Limits(), keep_going: bool = False
+    text: str,
+    file: str = "<text>",
+    *,
+    path: Path | None = None,
+    limits: YamlLimits = YamlLimits(),
+    keep_going: bool = False,
 ) -> Document:
     """The values of a YAML text.
 
@@ -87,9 +94,9 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
 __all__ = [
     "BROKEN",
     "Document",
-    "Limits",
     "Source",
     "Value",
+    "YamlLimits",
     "from_plain",
     "kind_of",
     "load",

@@ -12,7 +12,7 @@ from rendergraph.errors import InputError, Place, Problem
 
 
 @dataclass(frozen=True)
-class Limits:
+class YamlLimits:
     """Budgets of one YAML file; each is a small multiple of what a person writes.
 
     Attributes:
@@ -39,14 +39,14 @@ _UNITS = {
 
 
 def over_limit(what: str, limit: int) -> str:
-    """What to say about a text that passes one of its `Limits`."""
+    """What to say about a text that passes one of its `YamlLimits`."""
     return f"the text {_UNITS[what].format(f'more than {limit:,}')}; --limit yaml-{what}=N allows more"
 
 
 class _Builder:
     """Values from parse events; holds what several events share."""
 
-    def __init__(self, source: Source, limits: Limits) -> None:
+    def __init__(self, source: Source, limits: YamlLimits) -> None:
         self.source = source
         self.limits = limits
         self.problems: list[Problem] = []
@@ -148,7 +148,7 @@ class _Builder:
             return BROKEN
 
 
-def build(text: str, source: Source, limits: Limits, keep_going: bool) -> Document:
+def build(text: str, source: Source, limits: YamlLimits, keep_going: bool) -> Document:
     """The values of a text.
 
     Args:

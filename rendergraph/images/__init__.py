@@ -6,7 +6,7 @@ into something an eye can read, and `save_outputs` says what of a frame goes int
 
 from rendergraph.images.decode import decode, read, read_metadata
 from rendergraph.images.encode import EXTENSIONS, write
-from rendergraph.images.pixels import Limits
+from rendergraph.images.pixels import ImageLimits
 from rendergraph.images.saving import (
     PictureInfo,
     Saved,
@@ -22,7 +22,7 @@ from rendergraph.images.view import from_srgb, to_srgb, viewable
 
 __all__ = [
     "EXTENSIONS",
-    "Limits",
+    "ImageLimits",
     "PictureInfo",
     "Saved",
     "channel_names",

@@ -19,7 +19,7 @@ import numpy as np
 
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
-from rendergraph.images.pixels import Limits, Pixels, as_rgba, finite, name_of
+from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, finite, name_of
 from rendergraph.images.plugin_image import decode_by_plugin
 from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, kind_of
 from rendergraph.scene.model import ImageSource
@@ -35,7 +35,7 @@ def decode(
     *,
     srgb: bool,
     warn: Callable[[Problem], None] | None = None,
-    limits: Limits = Limits(),
+    limits: ImageLimits = ImageLimits(),
 ) -> Pixels:
     """A scene's image, ready to be uploaded.
 
@@ -78,7 +78,7 @@ def read(path: Path | str) -> Pixels:
     Raises:
         InputError: missing, of another kind, broken, or beyond a limit.
     """
-    with _opened(ImageSource(Path(path)), Limits()) as image:
+    with _opened(ImageSource(Path(path)), ImageLimits()) as image:
         names = list(image.spec.channelnames)
         pixels = image.read(range(len(names)), None)
     order = sorted(range(len(names)), key=lambda i: _channel_order(names[i]))
@@ -96,7 +96,7 @@ def read_metadata(path: Path | str) -> dict[str, str]:
     Raises:
         InputError: missing, not an image, or broken.
     """
-    with _opened(ImageSource(Path(path)), Limits()) as image:
+    with _opened(ImageSource(Path(path)), ImageLimits()) as image:
         found = [(entry.name, entry.value) for entry in image.spec.extra_attribs]
     return {name[len(PREFIX) :]: text for name, text in found if name.startswith(PREFIX) and isinstance(text, str)}
 
@@ -112,7 +112,7 @@ class _Image:
     size: int
     handle: oiio.ImageInput
     spec: oiio.ImageSpec
-    limits: Limits
+    limits: ImageLimits
 
     def read(self, channels: range, kind: str | None) -> Pixels:
         """Decoded pixels of these channels, as `kind` or as the file holds them."""
@@ -129,7 +129,7 @@ class _Image:
 
 
 @contextlib.contextmanager
-def _opened(source: ImageSource, limits: Limits) -> Iterator[_Image]:
+def _opened(source: ImageSource, limits: ImageLimits) -> Iterator[_Image]:
     import OpenImageIO as oiio  # loaded with the first picture read
 
     start, size = _beginning(source)
@@ -297,7 +297,7 @@ def _color_channels(image: _Image) -> range:
     return range(first, first + len(wanted))
 
 
-def _in_display_window(image: _Image, pixels: Pixels, limits: Limits) -> Pixels:
+def _in_display_window(image: _Image, pixels: Pixels, limits: ImageLimits) -> Pixels:
     """An EXR may hold a part of its picture, or more than it."""
     spec = image.spec
     window = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)

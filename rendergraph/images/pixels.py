@@ -17,7 +17,7 @@ Pixels: TypeAlias = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
-class Limits:
+class ImageLimits:
     """What an image may claim.
 
     Attributes:

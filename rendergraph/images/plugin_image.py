@@ -9,7 +9,7 @@ import numpy as np
 from rendergraph.declare import Added
 from rendergraph.declare.extension import ImageLoader
 from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.images.pixels import Limits, Pixels, as_rgba, finite
+from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, finite
 from rendergraph.scene.model import ImageSource
 
 
@@ -19,7 +19,7 @@ def decode_by_plugin(
     *,
     srgb: bool,
     warn: Callable[[Problem], None] | None,
-    limits: Limits,
+    limits: ImageLimits,
 ) -> Pixels:
     """A scene's image of a kind that a plugin reads, as `decode` gives it.
 
@@ -45,7 +45,7 @@ def decode_by_plugin(
     return as_rgba(finite(source, light, warn))
 
 
-def _mistake(pixels: object, limits: Limits) -> str:
+def _mistake(pixels: object, limits: ImageLimits) -> str:
     if not isinstance(pixels, np.ndarray):
         return f"{type(pixels).__name__}, not an array"
     if pixels.ndim not in (2, 3) or not all(pixels.shape) or (pixels.ndim == 3 and pixels.shape[2] > 4):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Document, Limits, Source, Value, from_plain
+from rendergraph.document import Document, Source, Value, YamlLimits, from_plain
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import Walk, plain
 from rendergraph.read import CODES, SIZE, checked, entries, read, word
@@ -31,7 +31,7 @@ def resolve(
     scene: str | Path | None = None,
     size: tuple[int, int] | None = None,
     asset_roots: Sequence[Path] = (),
-    limits: Limits = Limits(),
+    limits: YamlLimits = YamlLimits(),
 ) -> PipelineSpec:
     """A pipeline with everything applied that decides what it is.
 
@@ -101,7 +101,7 @@ def _parts(tree: Value) -> dict[str, Value]:
     return dict(tree.data) if isinstance(tree.data, dict) else {}
 
 
-def _entry(source: str | Path | Document, limits: Limits) -> Document:
+def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
     if isinstance(source, Document):
         return checked(source, keep_going=True)
     if isinstance(source, str) and is_bare(source):
@@ -123,7 +123,7 @@ def _home(document: Document, files: Files) -> tuple[Path, Roots]:
     return home, Roots.around(home / "x", files.asset_roots)
 
 
-def _patch(patch: Path | Mapping[str, Any], files: Files, limits: Limits) -> Value:
+def _patch(patch: Path | Mapping[str, Any], files: Files, limits: YamlLimits) -> Value:
     if isinstance(patch, Mapping):
         document = Document(from_plain(patch, source := Source("patch")), source)
         document = checked(document, keep_going=True, patch=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Document, Limits, Source, Value, shown
+from rendergraph.document import Document, Source, Value, YamlLimits, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.read import checked, entries, read, word
@@ -23,7 +23,7 @@ _MOST_EXTENDED = 32
 class Files:
     """Reads and merges files, each once; collects what is wrong with them."""
 
-    def __init__(self, catalog: Catalog, asset_roots: Sequence[Path], limits: Limits) -> None:
+    def __init__(self, catalog: Catalog, asset_roots: Sequence[Path], limits: YamlLimits) -> None:
         self.plugins = Plugins(catalog, self.say)
         self.asset_roots = [Path(root) for root in asset_roots]
         self.limits = limits

@@ -28,7 +28,7 @@ _MOST_WARNINGS = 50
 
 
 @dataclass(frozen=True)
-class Limits:
+class SceneLimits:
     """How much a scene may ask for.
 
     Attributes:
@@ -93,7 +93,7 @@ class Reading:
 
     path: Path
     check_path: CheckPath
-    limits: Limits = Limits()
+    limits: SceneLimits = SceneLimits()
     extensions: Extensions = NO_EXTENSIONS
     _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
     _images: dict[Path, tuple[ImageSource, image_header.Header]] = field(default_factory=dict)

@@ -8,7 +8,7 @@ from pathlib import Path
 from rendergraph.declare import NO_EXTENSIONS, Extensions
 from rendergraph.document import shown
 from rendergraph.errors import Place, Problem
-from rendergraph.scene.files import CheckPath, Limits, Reading, inside
+from rendergraph.scene.files import CheckPath, Reading, SceneLimits, inside
 from rendergraph.scene.meshes import MESHES, read_mesh
 from rendergraph.scene.model import Scene
 
@@ -19,7 +19,7 @@ def load(
     path: Path,
     *,
     check_path: CheckPath | None = None,
-    limits: Limits = Limits(),
+    limits: SceneLimits = SceneLimits(),
     extensions: Extensions = NO_EXTENSIONS,
 ) -> Scene:
     """The scene in a file, checked whole; the extension says what it is.

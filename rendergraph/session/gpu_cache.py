@@ -10,7 +10,7 @@ from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
 from rendergraph.errors import Problem
 from rendergraph.gl.device import Device
 from rendergraph.gl.memory import check_memory
-from rendergraph.images import Limits, decode
+from rendergraph.images import ImageLimits, decode
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, Scene
 from rendergraph.session.executables import ExecutableCache, key_of
@@ -53,7 +53,7 @@ class GpuCache:
             return self._scene[1]
         self._forget()
         allowed = linked.selection.allowed("scene")
-        limits = Limits(**{own: allowed[name] for name, own in _IMAGE_LIMITS.items() if name in allowed})
+        limits = ImageLimits(**{own: allowed[name] for name, own in _IMAGE_LIMITS.items() if name in allowed})
         warnings: list[Problem] = []
 
         def decoded(source: ImageSource, srgb: bool) -> npt.NDArray[Any]:

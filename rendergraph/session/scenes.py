@@ -9,7 +9,7 @@ from weakref import WeakValueDictionary
 
 from rendergraph import stamps
 from rendergraph.scene.animate import complete
-from rendergraph.scene.files import Limits, Reading
+from rendergraph.scene.files import Reading, SceneLimits
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Environment, Scene
 from rendergraph.session.values import Resolved
@@ -24,7 +24,7 @@ def scene_of(resolved: Resolved) -> Scene:
         InputError: a file of it is missing or wrong.
     """
     selection, spec, extensions = resolved.selection, resolved.spec, resolved.catalog.extensions
-    limits = Limits(**selection.allowed("scene"))
+    limits = SceneLimits(**selection.allowed("scene"))
     roots = spec.roots.folders if spec.scene is not None else ()
     key = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits, selection.plugins)
     found = _IN_USE.get(key)

@@ -60,8 +60,8 @@ class Selection:
 
 def _limit_names() -> dict[str, dict[str, str]]:
     """What each kind of file has limits of: the name on the command line to the field."""
-    from rendergraph.document import Limits as YamlLimits
-    from rendergraph.scene.files import Limits as SceneLimits
+    from rendergraph.document import YamlLimits
+    from rendergraph.scene.files import SceneLimits
 
     names = {
         kind: {f"{kind}-{entry.name.replace('_', '-')}": entry.name for entry in fields(limits)}

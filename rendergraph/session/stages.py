@@ -17,7 +17,7 @@ import rendergraph.link
 import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
-from rendergraph.document import Limits
+from rendergraph.document import YamlLimits
 from rendergraph.errors import InputError, Problem
 from rendergraph.scene.animate import complete
 from rendergraph.scene.cameras import light_facts
@@ -52,7 +52,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         scene=selection.scene,
         size=selection.size,
         asset_roots=selection.asset_roots,
-        limits=Limits(**selection.allowed("yaml")),
+        limits=YamlLimits(**selection.allowed("yaml")),
         catalog=catalog,
     )
     return Resolved(selection, catalog, spec)

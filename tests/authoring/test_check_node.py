@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from rendergraph.authoring import KINDS, Limits, check_node, new_node
+from rendergraph.authoring import KINDS, CheckLimits, check_node, new_node
 from rendergraph.cli.app import main
 from rendergraph.errors import InputError, RendergraphError
 from rendergraph.resources import folder
@@ -39,7 +39,7 @@ uniform float gain;
 out vec4 brighter;
 void main() { brighter = gain * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0); }
 """
-QUICK = Limits(import_seconds=2, pass_seconds=3, memory=500 << 20)
+QUICK = CheckLimits(import_seconds=2, pass_seconds=3, memory=500 << 20)
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Check:
     """`check(python, shader)`: `glow.py` and `glow.frag` of these texts, checked under tight limits."""
     monkeypatch.chdir(tmp_path)
 
-    def run(python: str | None = GOOD, shader: str = SHADER, limits: Limits = QUICK) -> Answer:
+    def run(python: str | None = GOOD, shader: str = SHADER, limits: CheckLimits = QUICK) -> Answer:
         if python is not None:
             (tmp_path / "glow.py").write_text(python)
         (tmp_path / "glow.frag").write_text(shader)
@@ -437,7 +437,7 @@ def test_pages_of_what_ends_a_check_tell_the_truth(tmp_path: Path, monkeypatch: 
     for file in sorted(folder("rendergraph.errors").glob("RG45[0-3]-*.yaml")):
         page = yaml.safe_load(file.read_text(encoding="utf-8"))
         Path("blur.py").write_text(page["wrong"])
-        limits = Limits(import_seconds=1) if page["code"] == "RG452" else Limits()
+        limits = CheckLimits(import_seconds=1) if page["code"] == "RG452" else CheckLimits()
         with pytest.raises(InputError) as caught:
             check_node(Path("blur.py"), limits=limits)
         said = str(caught.value.problems[0]).replace("longer than 1 s", "longer than 10 s")

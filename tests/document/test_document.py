@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rendergraph.document import Document, Limits, load, parse
+from rendergraph.document import Document, YamlLimits, load, parse
 from rendergraph.document import events as events_module
 from rendergraph.errors import InputError, Place, Problem
 
@@ -207,8 +207,8 @@ def test_what_is_large_and_legal_is_read() -> None:
 
 def test_limits_are_named_with_their_option() -> None:
     with pytest.raises(InputError, match=r"RG007 the text has more than 3 values, .* --limit yaml-nodes=N allows more"):
-        parse("[1, 2, 3]", limits=Limits(nodes=3))
-    assert parse("[1, 2]", limits=Limits(nodes=3)).value == [1, 2]
+        parse("[1, 2, 3]", limits=YamlLimits(nodes=3))
+    assert parse("[1, 2]", limits=YamlLimits(nodes=3)).value == [1, 2]
 
 
 # --- any text --------------------------------------------------------------------------------------------------------

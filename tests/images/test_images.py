@@ -22,7 +22,7 @@ import pytest
 
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.images import (
-    Limits,
+    ImageLimits,
     PictureInfo,
     Saved,
     check_target,
@@ -566,9 +566,9 @@ def test_threads_decode_together_and_stderr_comes_back(tmp_path: Path, capfd: py
 
 def test_limits_can_be_set(tmp_path: Path) -> None:
     write(tmp_path / "a.png", np.zeros((20, 30, 3), np.uint8))
-    decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=Limits(side=30))
+    decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=ImageLimits(side=30))
     with pytest.raises(InputError, match="RG353 the image is 30×20 pixels; the limit is 29 a side"):
-        decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=Limits(side=29))
+        decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=ImageLimits(side=29))
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 
 from rendergraph.errors import InputError
 from rendergraph.resources import shipped_scenes
-from rendergraph.scene.files import Limits
+from rendergraph.scene.files import SceneLimits
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
 
@@ -214,7 +214,7 @@ def test_overrides_name_nodes_of_the_file(folder: Path) -> None:
 def test_shapes_beyond_the_limit(tmp_path: Path) -> None:
     text = "scene: 1\nobjects: {a: {shape: sphere, segments: 2048, rings: 1024}}\n"
     with pytest.raises(InputError, match=r"a\.yaml:2:14: RG307 shapes have 2,100,225 vertices"):
-        read(tmp_path, text, limits=Limits(vertices=1_000_000))
+        read(tmp_path, text, limits=SceneLimits(vertices=1_000_000))
 
 
 def test_check_path_is_asked_for_every_file(folder: Path) -> None:
