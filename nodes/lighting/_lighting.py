@@ -7,11 +7,14 @@ from typing import Any, Literal
 from rendergraph.api import (
     PREMULTIPLIED,
     Depth,
+    Facts,
     Input,
     Node,
     Occlusion,
+    Output,
     Part,
     Port,
+    Radiance,
     ShadowLookup,
     State,
     Steps,
@@ -113,28 +116,52 @@ class SurfaceLighting(Lighting):
         return self.blended_lookup if steps.connected(self.blended_lookup) else self.lookup
 
 
+def background_texel(node: GeometryLighting, facts: Facts) -> tuple[float, ...]:
+    """What a picture of radiance holds where nothing is: the node's background, covered by nothing."""
+    rgb = node.background if isinstance(node.background, tuple) else (node.background,) * 3
+    return *rgb, 0.0
+
+
 class GeometryLighting(SurfaceLighting):
-    """What every node that lights while the geometry is drawn takes beside its parameters."""
+    """Base of the nodes that light while the geometry is drawn.
+
+    `record` draws what is opaque by `light_opaque`, as often as the technique takes, and ends with `blend_after`.
+    """
 
     view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
     depth = Input(Depth, use="depth_test", optional=True, doc="Depth of a pre-pass, tested and not written.")
+    radiance = Output(
+        Radiance,
+        format="rgba16f",
+        clear=background_texel,
+        doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",
+    )
+    surface_depth = Output(
+        Depth, format="depth32f", clear=1.0, doc="Depth of the nearest opaque surface, where no pre-pass is connected."
+    )
 
     background: Color = structural(default=0.0, min=0, doc="Radiance where nothing is, a number or RGB.")
 
-    @property
-    def background_rgb(self) -> tuple[float, float, float]:
-        """The background as RGB."""
-        if isinstance(self.background, tuple):
-            return self.background
-        return self.background, self.background, self.background
+    def targets(self, steps: Steps) -> dict[str, Port]:
+        """What is drawn to: the picture, and its depth where no pre-pass has that."""
+        depth = {} if steps.connected(self.depth) else {"surface_depth": self.surface_depth}
+        return {"radiance": self.radiance, **depth}
 
-    def opaque_reads(self, steps: Steps) -> dict[str, Any]:
-        """What opaque surfaces are lit with; an unconnected `lookup` too, since naming nothing means everything."""
-        more = [port for port in (self.depth, self.visibility, self.occlusion) if steps.connected(port)]
-        return {port.name: port for port in (self.lookup, *more)}
+    def light_opaque(self, steps: Steps, fragment: str, **options: Any) -> None:
+        """Draw opaque surfaces, lit with what is connected.
 
-    def blend_after(self, steps: Steps, out: dict[str, Port], **shaders: Any) -> None:
-        """Surfaces with alpha blending, over the opaque ones that were drawn to `out`."""
+        Args:
+            steps: what records it.
+            fragment: the shader of fragments.
+            options: what else `steps.geometry` takes.
+        """
+        connected = [port for port in (self.depth, self.visibility, self.occlusion) if steps.connected(port)]
+        reads: dict[str, Any] = {port.name: port for port in connected}
+        # `lookup` in any case: a step that names nothing would read everything.
+        steps.geometry(fragment, out=self.targets(steps), objects="opaque", lookup=self.lookup, **reads, **options)
+
+    def blend_after(self, steps: Steps, **shaders: Any) -> None:
+        """Surfaces with alpha blending, over the opaque ones that have been drawn."""
         if self.blended:
             depth = self.depth if steps.connected(self.depth) else None
-            self.blend(steps, out, self.shadows_on_blended(steps), depth, **shaders)
+            self.blend(steps, self.targets(steps), self.shadows_on_blended(steps), depth, **shaders)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from rendergraph.api import Depth, Output, Port, Radiance, State, Steps, define
+from rendergraph.api import State, Steps, define
 
 from ._lighting import GeometryLighting
 
@@ -21,39 +21,20 @@ class ForwardLighting(GeometryLighting):
     interpolated (Gouraud 1971), or once a face with the face's normal (flat). Textures and shadows stay per fragment.
     """
 
-    radiance = Output(
-        Radiance,
-        format="rgba16f",
-        clear=lambda node, facts: (*node.background_rgb, 0.0),
-        doc="Scene-linear radiance; alpha is coverage, 1 where an opaque surface is and 0 where nothing is.",
-    )
-    surface_depth = Output(
-        Depth, format="depth32f", clear=1.0, doc="Depth of the nearest opaque surface, where no pre-pass is connected."
-    )
-
     evaluate: Literal["fragment", "vertex", "face"] = define(default="fragment", doc="How often light is computed.")
 
     def record(self, steps: Steps) -> None:
         """One pass over what is opaque, one over what is blended."""
-        vertex, geometry, fragment = {
-            "fragment": ("<geometry.vert>", None, "forward_lighting.frag"),
-            "vertex": ("forward_lighting.vert", None, "forward_interpolated.frag"),
-            "face": ("forward_face.vert", "forward_lighting.geom", "forward_interpolated.frag"),
+        shaders = {
+            "fragment": {"fragment": "forward_lighting.frag"},
+            "vertex": {"fragment": "forward_interpolated.frag", "vertex": "forward_lighting.vert"},
+            "face": {
+                "fragment": "forward_interpolated.frag",
+                "vertex": "forward_face.vert",
+                "geometry": "forward_lighting.geom",
+            },
         }[self.evaluate]
-        out: dict[str, Port] = {"radiance": self.radiance}
-        nearer = None
-        if not steps.connected(self.depth):
-            out["surface_depth"] = self.surface_depth
-        elif geometry is not None:
-            # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
-            nearer = (0.0, -8.0)
-        steps.geometry(
-            fragment,
-            vertex=vertex,
-            geometry=geometry,
-            out=out,
-            objects="opaque",
-            state=State(polygon_offset=nearer),
-            **self.opaque_reads(steps),
-        )
-        self.blend_after(steps, out, fragment=fragment, vertex=vertex, geometry=geometry)
+        # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
+        nearer = (0.0, -8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
+        self.light_opaque(steps, **shaders, state=State(polygon_offset=nearer))
+        self.blend_after(steps, **shaders)

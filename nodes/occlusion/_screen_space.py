@@ -31,14 +31,14 @@ def reduced_size(node: Any, facts: Facts) -> tuple[int, int]:
 class ScreenSpaceOcclusion(Node):
     """Base of the techniques that see no more of the scene than depth and normals of the picture.
 
-    `record` calls `see` first, then makes an occlusion at the reduced size, and gives it to `finish`.
+    `record` calls `gather_surfaces` first, then makes an occlusion at the reduced size, and gives it to `upsample`.
     """
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
     normal = Input(Normal, doc="Unit normal, world space.")
     occlusion = Output(Occlusion, format="r16", size="depth", doc="1 open, 0 closed; 1 where nothing is.")
     surfaces = Internal(format="rgba32f", size=reduced_size, view="depth")
-    rough = Internal(format="r16", size=reduced_size)
+    unfiltered = Internal(format="r16", size=reduced_size)
 
     radius: float = param(default=0.5, unit="m", min=1e-6, max=1e6, doc="Nothing farther away than this occludes.")
     scale: float = structural(
@@ -55,7 +55,7 @@ class ScreenSpaceOcclusion(Node):
         """The macro that says whether `surfaces` is smaller than the picture."""
         return {} if steps.desc(self.surfaces).size == self.screen(steps) else {"REDUCED": 1}
 
-    def see(self, steps: Steps) -> None:
+    def gather_surfaces(self, steps: Steps) -> None:
         """Bring normals and distances into `surfaces`."""
         size = steps.desc(self.surfaces).size
         steps.fullscreen(
@@ -71,7 +71,7 @@ class ScreenSpaceOcclusion(Node):
         """Where the last pass at reduced size goes: `occlusion` itself where nothing is reduced, else `small`."""
         return small if self.sizes(steps) else self.occlusion
 
-    def finish(self, steps: Steps, source: Port) -> None:
+    def upsample(self, steps: Steps, source: Port) -> None:
         """Bring a reduced occlusion to full size."""
         if source is not self.occlusion:
             steps.fullscreen(

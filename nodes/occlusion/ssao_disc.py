@@ -18,22 +18,22 @@ class SSAODisc(ScreenSpaceOcclusion):
     A face turned away is the far side of something solid: a disc behind it stands for the near side, which is not seen.
     """
 
-    together = Internal(format="r16", size=reduced_size)
+    neighbours = Internal(format="r16", size=reduced_size)
 
     samples: int = define(default=32, min=8, max=128, doc="Surfaces looked at.")
 
     def record(self, steps: Steps) -> None:
         """Surfaces, occlusion, the neighbours' mean, full size."""
         screen, sizes = self.screen(steps), self.sizes(steps)
-        self.see(steps)
-        steps.fullscreen("ssao_disc.frag", out=self.rough, surfaces=self.surfaces, screen=screen, defines=sizes)
-        target = self.target(steps, self.together)
+        self.gather_surfaces(steps)
+        steps.fullscreen("ssao_disc.frag", out=self.unfiltered, surfaces=self.surfaces, screen=screen, defines=sizes)
+        target = self.target(steps, self.neighbours)
         steps.fullscreen(
             "neighbours_mean.frag",
             out=target,
-            rough=self.rough,
+            unfiltered=self.unfiltered,
             surfaces=self.surfaces,
             screen=screen,
             defines=sizes,
         )
-        self.finish(steps, target)
+        self.upsample(steps, target)

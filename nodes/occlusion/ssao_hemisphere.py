@@ -34,11 +34,11 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
     def record(self, steps: Steps) -> None:
         """Surfaces, noise, occlusion, the blur's two axes, full size."""
         screen, sizes = self.screen(steps), self.sizes(steps)
-        self.see(steps)
+        self.gather_surfaces(steps)
         steps.fullscreen("noise.frag", out=self.noise)
         steps.fullscreen(
             "ssao_hemisphere.frag",
-            out=self.rough,
+            out=self.unfiltered,
             surfaces=self.surfaces,
             noise=self.noise,
             kernel=self.kernel,
@@ -46,7 +46,7 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
             defines=sizes,
         )
         target = self.target(steps, self.blurred)
-        for source, out, axis in ((self.rough, self.across, (1, 0)), (self.across, target, (0, 1))):
+        for source, out, axis in ((self.unfiltered, self.across, (1, 0)), (self.across, target, (0, 1))):
             steps.fullscreen(
                 "bilateral_blur.frag",
                 source=source,
@@ -56,7 +56,7 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
                 screen=screen,
                 defines=sizes,
             )
-        self.finish(steps, target)
+        self.upsample(steps, target)
 
     def update(self, frame: Frame) -> None:
         """The kernel's directions."""

@@ -1,7 +1,7 @@
 // The mean of what the 4×4 pixels around have found, where they lie on the same surface.
 #include "surfaces.glsl"
 #include "neighbours.glsl"
-uniform sampler2D rough;
+uniform sampler2D unfiltered;
 uniform sampler2D surfaces;
 uniform ivec2 screen;
 uniform float radius;  // metres
@@ -17,7 +17,7 @@ void main() {
     vec3 position = view_position(v, place_for(texel, size, screen), here.w);
     float tolerance = 0.1 * radius + depth_error(v, here.w);
     float total = 1e-3;  // of its own, should no other lie on its surface
-    float sum = total * texelFetch(rough, texel, 0).r;
+    float sum = total * texelFetch(unfiltered, texel, 0).r;
     for (int i = 0; i < 4; ++i) {
         ivec2 there = texel + 2 * ivec2(i & 1, i >> 1) - 1;
         if (there != clamp(there, ivec2(0), size - 1)) continue;
@@ -25,7 +25,7 @@ void main() {
         if (seen.w == 0.0) continue;
         vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
         float weight = same_surface(offset, here.xyz, seen.xyz, tolerance);
-        sum += weight * texelFetch(rough, there, 0).r;
+        sum += weight * texelFetch(unfiltered, there, 0).r;
         total += weight;
     }
     openness = clamp(1.0 - MOST_KEPT * sum / total, 0.0, 1.0);

@@ -7,7 +7,7 @@
 uniform sampler2D surfaces;
 uniform ivec2 screen;
 uniform float radius;  // metres
-out float rough;
+out float unfiltered;
 
 const vec2 GOLDEN = vec2(-0.73736888, 0.67549029);  // cosine and sine of the golden angle: no two arms in line
 
@@ -80,5 +80,5 @@ void main() {
           to_other.x * dFdxFine(position), v);
     share(blocked, to_other.y * dFdyFine(blocked), here, here + to_other.y * dFdyFine(here),
           to_other.y * dFdyFine(position), v);
-    rough = blocked / MOST_KEPT;
+    unfiltered = blocked / MOST_KEPT;
 }

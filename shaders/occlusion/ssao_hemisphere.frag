@@ -7,7 +7,7 @@ uniform ivec2 screen;
 uniform float radius;   // metres, of the wide hemisphere
 uniform float nearest;  // metres
 layout(std430) readonly buffer kernel { vec4 directions[]; };
-out float rough;
+out float unfiltered;
 
 const float NARROW = 0.2;    // of the radius: 1 : 5
 const float THRESHOLD = 4.0;  // in radii
@@ -29,7 +29,7 @@ void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     ivec2 size = textureSize(surfaces, 0);
     vec4 here = texelFetch(surfaces, texel, 0);
-    rough = 1.0;
+    unfiltered = 1.0;
     if (here.w <= nearest) return;
     vec3 position = view_position(v, place_for(texel, size, screen), here.w);
     vec4 random = texelFetch(noise, texel & 63, 0);
@@ -56,5 +56,5 @@ void main() {
         }
         blocked += most;
     }
-    rough = 1.0 - blocked / float(SAMPLES / 4);
+    unfiltered = 1.0 - blocked / float(SAMPLES / 4);
 }

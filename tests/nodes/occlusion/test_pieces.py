@@ -79,7 +79,7 @@ class ShownOcclusion(SSAOHemisphere):
     """The same with its scratch textures to look at."""
 
     surfaces = Output(AnyTexel, format="rgba32f", size=reduced_size, view="depth", doc="Surfaces.")  # type: ignore[assignment]
-    rough = Output(AnyTexel, format="r16", size=reduced_size, doc="Before the blur.")  # type: ignore[assignment]
+    unfiltered = Output(AnyTexel, format="r16", size=reduced_size, doc="Before the blur.")  # type: ignore[assignment]
     blurred = Output(AnyTexel, format="r16", size=reduced_size, doc="After it.")  # type: ignore[assignment]
     noise = Output(AnyTexel, format="rgba16_snorm", size=(64, 64), doc="Noise.")  # type: ignore[assignment]
 
@@ -107,7 +107,7 @@ nodes:
     inputs: {{depth: g.depth, normal: g.normal}}
     params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, samples: {SAMPLES}}}
   disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}}}}}
-outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, rough: ao.rough, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
+outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, unfiltered: ao.unfiltered, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
 """)
         pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
         frame = session.render(pipeline)
@@ -160,11 +160,11 @@ def blur_by_hand(values: Floats, surfaces: Floats, where: Floats, axis: int) -> 
 @pytest.mark.parametrize(("size", "scale"), [((48, 36), 1), ((81, 61), 0.5)])
 def test_the_blur_is_a_mean_over_the_same_surface(show: Show, size: tuple[int, int], scale: float) -> None:
     frame, camera = show(size, scale)
-    surfaces, rough = flipped(frame, "surfaces"), flipped(frame, "rough")[..., 0]
-    where = positions(surfaces[..., 3], *places((rough.shape[1], rough.shape[0]), size), camera)
-    expected = blur_by_hand(blur_by_hand(rough, surfaces, where, 1), surfaces, where, 0)
+    surfaces, unfiltered = flipped(frame, "surfaces"), flipped(frame, "unfiltered")[..., 0]
+    where = positions(surfaces[..., 3], *places((unfiltered.shape[1], unfiltered.shape[0]), size), camera)
+    expected = blur_by_hand(blur_by_hand(unfiltered, surfaces, where, 1), surfaces, where, 0)
     found = flipped(frame, "occlusion" if scale == 1 else "blurred")[..., 0]
-    assert np.abs(found - rough).max() > 0.1
+    assert np.abs(found - unfiltered).max() > 0.1
     np.testing.assert_allclose(found, expected, atol=2e-3)
 
 
@@ -240,7 +240,7 @@ def test_hemispheres_in_numpy(show: Show) -> None:
             most = np.maximum(most, counts * np.maximum(1 - (behind / (4 * RADIUS)) ** 2, 0))
         blocked += most
     expected = np.where(distance > 0, 1 - blocked / (SAMPLES // 4), 1)
-    found = flipped(frame, "rough")[..., 0]
+    found = flipped(frame, "unfiltered")[..., 0]
     assert found.std() > 0.1
     assert np.mean(np.abs(found - expected) > 1e-3) < 0.01
 
