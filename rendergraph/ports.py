@@ -122,7 +122,7 @@ class Input(Port):
 
 
 @dataclass(frozen=True, eq=False)
-class Made(Port):
+class WrittenPort(Port):
     """A texture or buffer that the node makes: the shared part of `Output`, `InOut`, `Internal` and `History`.
 
     Attributes:
@@ -162,7 +162,7 @@ class Made(Port):
 
 
 @dataclass(frozen=True, eq=False)
-class Output(Made):
+class Output(WrittenPort):
     """Something made for others.
 
     Attributes:
@@ -176,18 +176,18 @@ class Output(Made):
 
 
 @dataclass(frozen=True, eq=False)
-class InOut(Made):
+class InOut(WrittenPort):
     """A texture somebody else made, continued: each write is a new version, and readers of the old one run before.
 
     Attributes:
-        optional: not connected, the node makes the texture itself from the `Made` fields.
+        optional: not connected, the node makes the texture itself from the `WrittenPort` fields.
     """
 
     optional: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Internal(Made):
+class Internal(WrittenPort):
     """A scratch texture or buffer of the node's own, aliased like any other.
 
     Attributes:
@@ -198,7 +198,7 @@ class Internal(Made):
 
 
 @dataclass(frozen=True, eq=False)
-class History(Made):
+class History(WrittenPort):
     """A texture of the node's own that outlives the frame: write `self.x`, read last frame's `self.x.previous`."""
 
     @property
@@ -248,4 +248,4 @@ class Function(Port):
         return tuple(read.port.name if isinstance(read, Part) else read for read in self.reads)
 
 
-PORT_TYPES = (Port, Input, Made, Output, InOut, Internal, History, Views, Function)
+PORT_TYPES = (Port, Input, WrittenPort, Output, InOut, Internal, History, Views, Function)

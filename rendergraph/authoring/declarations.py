@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rendergraph.catalog import NodeType
 from rendergraph.catalog.types import shared_includes
-from rendergraph.declare import Function, Input, Made, Node, Views
+from rendergraph.declare import Function, Input, Node, Views, WrittenPort
 from rendergraph.errors import Mistake
 from rendergraph.glsl import expand, strip_comments
 from rendergraph.glsl.source import read_text
@@ -27,7 +27,8 @@ def docs(cls: type[Node]) -> Iterator[Mistake]:
     found = {
         name: port.doc
         for name, port in cls.ports().items()
-        if isinstance(port, Input | Made | Function | Views) and (port.doc or name in {*cls.inputs(), *cls.outputs()})
+        if isinstance(port, Input | WrittenPort | Function | Views)
+        and (port.doc or name in {*cls.inputs(), *cls.outputs()})
     }
     found |= {name: parameter.doc for name, parameter in cls.parameters().items()}
     for name, doc in found.items():

@@ -11,7 +11,7 @@ from typing import Any
 from rendergraph.catalog.header import Header
 from rendergraph.catalog.parameter import HeaderParameter
 from rendergraph.catalog.rules import number_rule, size_rule, word_rule
-from rendergraph.declare import Extensions, Input, Made, Node, Output, Port
+from rendergraph.declare import Extensions, Input, Node, Output, Port, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.glsl import SourceText, strip_comments
@@ -112,7 +112,7 @@ class Entries:
         for found in self.globals.declared:
             self._undescribed(found)
         self._references()
-        if not any(isinstance(port, Made) for port in self.ports.values()) and not self.problems:
+        if not any(isinstance(port, WrittenPort) for port in self.ports.values()) and not self.problems:
             self.say("RG441", "the shader writes nothing; declare what it makes, as in out vec4 color;", None)
 
     def _undescribed(self, found: Global) -> None:
@@ -357,7 +357,7 @@ class Entries:
             text = f"shader node '{self.file.name}' lacks {'; '.join(missing)}; its header can say them"
             yield Problem("RG445", text, Place(self.shown, 1, 1), severity="warning")
         match = re.search(r"\bdiscard\b", self.text)
-        outputs = [port for port in self.ports.values() if isinstance(port, Made)]
+        outputs = [port for port in self.ports.values() if isinstance(port, WrittenPort)]
         if match and any(port.clear is None for port in outputs):
             text = "a discarded fragment leaves in the output what its memory held; give it `clear` in the header"
             place, line = self.place(match.start())

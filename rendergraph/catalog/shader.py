@@ -25,11 +25,12 @@ from rendergraph.resources import folder
 from rendergraph.textures import SEMANTICS, SIGNATURES
 
 _KEPT = 256
-_MADE: dict[tuple[object, ...], _Made] = {}  # so that a file is one class in all pipelines, which then share its passes
+_MADE: dict[tuple[object, ...], _ShaderType] = {}
+"""Types made so far: a file is one class in all pipelines, which then share its passes."""
 
 
 @dataclass(frozen=True)
-class _Made:
+class _ShaderType:
     cls: type[Node]
     warnings: tuple[Problem, ...]
     text: str
@@ -69,7 +70,7 @@ def _plugged(header: Header, extensions: Extensions) -> list[Any]:
     return list(extensions.semantics()) if foreign else []
 
 
-def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, extensions: Extensions) -> _Made:
+def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, extensions: Extensions) -> _ShaderType:
     entries = Entries(file, shown, raw, header, source, extensions)
     entries.collect()
     if entries.problems:
@@ -89,4 +90,4 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
         raise InputError([mistake.problem("RG490", where, entries.place_of(mistake.subject)) for mistake in mistakes])
     lines = [line.rstrip() for line in source.lines if line.strip()]
     text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", raw, re.DOTALL | re.MULTILINE)[:1], *lines])
-    return _Made(cls, tuple(entries.warnings(cls)), text)
+    return _ShaderType(cls, tuple(entries.warnings(cls)), text)

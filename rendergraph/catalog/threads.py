@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph.catalog.entries import Entries
 from rendergraph.catalog.rules import number_rule
-from rendergraph.declare import Input, Made, Node, Port
+from rendergraph.declare import Input, Node, Port, WrittenPort
 from rendergraph.steps import Steps
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def compute(entries: Entries) -> Record:
         text = "a compute shader says how many threads a group has: layout(local_size_x = 8, local_size_y = 8) in;"
         entries.say("RG443", text, None)
     threads = _threads(entries)
-    outputs = [name for name, port in entries.ports.items() if isinstance(port, Made)]
+    outputs = [name for name, port in entries.ports.items() if isinstance(port, WrittenPort)]
 
     def record(self: Node, steps: Steps) -> None:
         wanted = (*threads(self, steps), 1, 1)[:3]
@@ -73,10 +73,10 @@ def _threads(entries: Entries) -> Threads:
         return _counted(said)
     if said is not None and str(said.data).startswith("$"):
         return _counted(said)
-    textures = [name for name, port in entries.ports.items() if isinstance(port, Made) and port.kind != "buffer"]
+    textures = [name for name, port in entries.ports.items() if isinstance(port, WrittenPort) and port.kind != "buffer"]
     name = str(said.data) if said is not None else (textures[0] if textures else "")
     port = entries.ports.get(name)
-    if not isinstance(port, Input | Made) or port.kind == "buffer":
+    if not isinstance(port, Input | WrittenPort) or port.kind == "buffer":
         if said is not None:
             entries.problems.append(said.problem("RG443", f"'threads' names no texture of this node: '{name}'"))
         else:

@@ -15,7 +15,6 @@ from rendergraph.ports import (
     InOut,
     Input,
     Internal,
-    Made,
     Output,
     Part,
     Port,
@@ -23,6 +22,7 @@ from rendergraph.ports import (
     SizeRule,
     Texel,
     Views,
+    WrittenPort,
 )
 
 __all__ = [
@@ -41,7 +41,6 @@ __all__ = [
     "Input",
     "Internal",
     "LightFacts",
-    "Made",
     "MeshData",
     "Node",
     "Output",
@@ -54,6 +53,7 @@ __all__ = [
     "Texel",
     "TextureInfo",
     "Views",
+    "WrittenPort",
     "declaration_mistakes",
     "define",
     "extension_mistakes",

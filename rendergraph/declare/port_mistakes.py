@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from rendergraph.annotations import mistakes_of, quoted
 from rendergraph.declare.node import Node
 from rendergraph.errors import Mistake, suggestion
-from rendergraph.ports import Function, History, InOut, Input, Internal, Made, Output, Port, Views
+from rendergraph.ports import Function, History, InOut, Input, Internal, Output, Port, Views, WrittenPort
 from rendergraph.textures import Semantic, Signature
 
 
@@ -25,7 +25,7 @@ def _alone(name: str, port: Port) -> Iterator[str]:
         wanted, example = (Signature, "ShadowLookup") if port.kind == "function" else (Semantic, "Radiance")
         if not isinstance(port.semantic, wanted):
             yield f"port '{name}': semantic is {quoted(port.semantic)}, not a {wanted.__name__} such as {example}"
-    elif isinstance(port, Made):
+    elif isinstance(port, WrittenPort):
         if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
             yield f"port '{name}' has neither a semantic nor `like`"
         if port.kind != "buffer":
@@ -43,8 +43,8 @@ def _alone(name: str, port: Port) -> Iterator[str]:
 def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
     """Rules that name other ports of the node."""
     inputs, viewed = (Input, InOut), (Input, InOut, Views)
-    made = isinstance(port, Made)
-    size = (port.size[0] if isinstance(port.size, tuple) else port.size) if isinstance(port, Made) else None
+    made = isinstance(port, WrittenPort)
+    size = (port.size[0] if isinstance(port.size, tuple) else port.size) if isinstance(port, WrittenPort) else None
     needs = port.needs if isinstance(port, Output | Function) else ()
     reads = port.read_names if isinstance(port, Function) else ()
     named: list[tuple[str, object, tuple[type[Port], ...], str]] = [
@@ -53,7 +53,7 @@ def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
         ("is lights", getattr(port, "lights", None) if made else None, viewed, "no input and no table of views"),
         ("has the size of", size, inputs, "no input"),
         *(("needs", target, inputs, "no input") for target in needs),
-        *(("reads", target, (Input, Made), "no texture and no buffer") for target in reads),
+        *(("reads", target, (Input, WrittenPort), "no texture and no buffer") for target in reads),
     ]
     for rule, target, kinds, otherwise in named:
         if isinstance(target, str) and target not in ports:

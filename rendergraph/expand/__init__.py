@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from rendergraph.expand.ending import ended
+from rendergraph.expand.keeping import check_kept
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
-from rendergraph.expand.numbering import Numbering
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import record_all
+from rendergraph.expand.versions import versioned
 from rendergraph.link import Endpoint, Graph
 
 __all__ = [
@@ -37,5 +39,7 @@ def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expans
     """
     outputs = dict(graph.outputs if wanted is None else wanted)
     order = graph.reading_order()
-    recorders, idle = record_all(graph, order, outputs)
-    return Numbering(graph, recorders, idle, outputs).expansion()
+    recorded, idle = record_all(graph, order, outputs)
+    expansion = ended(graph, versioned(graph, recorded, idle), outputs)
+    check_kept(expansion.steps, expansion.resources)
+    return expansion

@@ -2,62 +2,70 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from rendergraph.declare import Made
+from rendergraph.declare import WrittenPort
 from rendergraph.errors import InputError, Mistake, Problem
-from rendergraph.link import Endpoint
+from rendergraph.expand.model import Expansion
+from rendergraph.expand.versions import Versioned
+from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write
 
-if TYPE_CHECKING:
-    from rendergraph.expand.numbering import Numbering
 
+def ended(graph: Graph, found: Versioned, wanted: Mapping[str, Endpoint]) -> Expansion:
+    """The steps with copies of what somebody continues, and resources in the roles that they have in the end.
 
-def wanted_resources(numbering: Numbering) -> dict[str, str]:
-    """Output or tap to the resource that shows it.
+    Args:
+        graph: the graph.
+        found: its steps and resources.
+        wanted: name to port for everything that must exist at the end of the frame.
 
     Raises:
-        InputError: nothing draws it (RG204).
+        InputError: nothing draws something that is wanted (RG204).
     """
-    wanted: dict[str, str] = {}
-    for name, port in numbering.wanted.items():
-        end = numbering.behind(port)
-        if end not in numbering.at_end or end.node in numbering.idle:
-            reason = numbering.idle.get(end.node, "it makes no texture")
+    steps, resources = list(found.steps), dict(found.resources)
+    shown: dict[str, str] = {}
+    for name, port in wanted.items():
+        end = found.behind(port)
+        if end not in found.at_end or end.node in found.idle:
+            reason = found.idle.get(end.node, "it makes no texture")
             text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
-            raise InputError(Problem("RG204", text, numbering.graph[end.node].place, mistake=Mistake(str(end), text)))
-        resource, version = numbering.at_end[end]
-        last = version == numbering.version[resource]
-        wanted[name] = resource if last else _keep(numbering, name, end, resource, version)
-    return wanted
+            raise InputError(Problem("RG204", text, graph[end.node].place, mistake=Mistake(str(end), text)))
+        resource, version = found.at_end[end]
+        shown[name] = resource
+        if version == found.newest[resource]:
+            continue
+        shown[name] = f"{end} kept"  # what a tap in the middle of a chain shows is copied
+        if shown[name] not in resources:
+            resources[shown[name]] = replace(resources[resource], id=shown[name], role="output")
+            steps.append(_copy(name, end, resource, version, steps))
+    _mark_roles(graph, found, shown, steps, resources)
+    return Expansion(tuple(steps), resources, shown, found.idle, found.views)
 
 
-def _keep(numbering: Numbering, name: str, end: Endpoint, resource: str, version: int) -> str:
-    """A copy of a version that somebody continues: what a tap in the middle of a chain shows."""
-    kept = f"{end} kept"
-    if kept not in numbering.resources:
-        index = 1 + max(step.index for step in numbering.steps if step.node == end.node)
-        numbering.resources[kept] = replace(numbering.resources[resource], id=kept, role="output")
-        read, write = Read("source", resource, version, "image"), Write("copy", kept, 1, "image")
-        label = f"copy of {end}, kept for {'tap' if '.' in name else 'output'} '{name}'"
-        numbering.steps.append(Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label))
-    return kept
+def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Step]) -> Step:
+    """The step that copies one version of a resource before the next is written."""
+    index = 1 + max(step.index for step in steps if step.node == end.node)
+    read, write = Read("source", resource, version, "image"), Write("copy", f"{end} kept", 1, "image")
+    label = f"copy of {end}, kept for {'tap' if '.' in name else 'output'} '{name}'"
+    return Step(end.node, index, "copy", reads=(read,), writes=(write,), label=label)
 
 
-def mark_roles(numbering: Numbering, wanted: dict[str, str]) -> None:
+def _mark_roles(
+    graph: Graph, found: Versioned, shown: Mapping[str, str], steps: list[Step], resources: dict[str, Resource]
+) -> None:
     """Outputs and what outlives the frame are never shared."""
-    resources, graph = numbering.resources, numbering.graph
-    previous = {read.resource for step in numbering.steps for read in step.all_reads if read.previous}
+    previous = {read.resource for step in steps for read in step.all_reads if read.previous}
     for end in graph.textures:
         if str(end) in previous and str(end) not in resources:  # its node is idle: it stays as it first was
             port, info = graph[end.node].node.ports()[end.port], graph.textures[end]
-            assert isinstance(port, Made)
+            assert isinstance(port, WrittenPort)
             assert info.desc is not None
             first = port.first or 0.0
             resources[str(end)] = Resource(str(end), info.desc, "history", first, info.view, info.lights)
-    for name in set(wanted.values()) | previous:
+    for name in set(shown.values()) | previous:
         resource = resources[name]
         role: Role = "history" if name in previous else "output"
         role = resource.role if resource.role in ("history", "kept") else role
-        resources[name] = replace(resource, role=role, first=numbering.firsts.get(name, resource.first))
+        resources[name] = replace(resource, role=role, first=found.firsts.get(name, resource.first))

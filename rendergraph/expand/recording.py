@@ -11,11 +11,11 @@ from rendergraph.errors import InputError, Misuse, Problem, node_named
 from rendergraph.expand.model import is_empty
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.steps import Request, Steps
+from rendergraph.steps import StepRequest, Steps
 from rendergraph.textures import BufferDesc, TextureDesc
 
 
-class Recorder:
+class Recording:
     """The `steps.Recorder` of one node: keeps requests, answers what is known.
 
     Attributes:
@@ -29,7 +29,7 @@ class Recorder:
         self.graph = graph
         self.node = node
         self.used_ports = used
-        self.requests: list[Request] = []
+        self.requests: list[StepRequest] = []
         self.unfilled: list[str] = []
         self.links = {
             name: tuple(end for end in ends if not is_empty(graph.textures.get(now(end))))
@@ -63,7 +63,7 @@ class Recorder:
         """What the choice of a parameter needs."""
         return needs(self.node.choices[parameter]) if parameter in self.node.choices else ()
 
-    def add(self, request: Request) -> None:
+    def add(self, request: StepRequest) -> None:
         """Keep a request, unless it would draw nothing onto what is there already."""
         objects = request.options.get("objects")
         if request.kind == "geometry" and objects in self.graph.unfilled:
@@ -77,7 +77,7 @@ class Recorder:
         """Whether a port goes on with a texture of somebody else's."""
         return isinstance(port, InOut) and bool(self.links.get(port.name))
 
-    def reads_of(self, request: Request) -> Iterator[tuple[str, Port | Part]]:
+    def reads_of(self, request: StepRequest) -> Iterator[tuple[str, Port | Part]]:
         """Names and ports a request reads, with the default inputs filled in; of what is kept, inputs that are too."""
         if not request.default_inputs:
             yield from request.bindings.items()
@@ -121,7 +121,7 @@ def now(end: Endpoint) -> Endpoint:
 
 def record_all(
     graph: Graph, order: list[str], wanted: Mapping[str, Endpoint]
-) -> tuple[dict[str, Recorder], dict[str, str]]:
+) -> tuple[dict[str, Recording], dict[str, str]]:
     """Record every node that something wanted needs; the others are idle, with the reason.
 
     Args:
@@ -134,9 +134,9 @@ def record_all(
     """
     remembering = _remembering(graph, wanted)
     while True:
-        recorders, idle = _recorded(graph, order, wanted, remembering)
+        recordings, idle = _recorded(graph, order, wanted, remembering)
         if not remembering & idle.keys():
-            return recorders, idle
+            return recordings, idle
         remembering -= idle.keys()  # whoever does nothing does not read last frame's values either
 
 
@@ -154,7 +154,7 @@ def _remembering(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
 
 def _recorded(
     graph: Graph, order: list[str], wanted: Mapping[str, Endpoint], remembering: set[str]
-) -> tuple[dict[str, Recorder], dict[str, str]]:
+) -> tuple[dict[str, Recording], dict[str, str]]:
     """The same where it is known who reads last frame's values; those may come earlier in the order than the makers."""
     demanded: dict[str, set[str]] = {name: set() for name in order}
     for end in wanted.values():
@@ -164,7 +164,7 @@ def _recorded(
             for end in ends:
                 if end.previous:
                     demanded[end.node].add(end.port)
-    recorders: dict[str, Recorder] = {}
+    recordings: dict[str, Recording] = {}
     idle: dict[str, str] = {}
     for name in reversed(order):
         node = graph[name]
@@ -177,8 +177,8 @@ def _recorded(
             idle[name] = reason
             _pass_on(node, used, demanded)
             continue
-        recorder = Recorder(graph, node, used)
-        steps = Steps(node.node.ports(), name, node.type.name, recorder)
+        recording = Recording(graph, node, used)
+        steps = Steps(node.node.ports(), name, node.type.name, recording)
         try:
             _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # a stranger's may
         except InputError:
@@ -186,18 +186,18 @@ def _recorded(
         except (Exception, SystemExit) as error:  # whatever a stranger's node raises is a mistake in that node
             raise InputError(author_problem(node, error)) from error
         ports = node.node.ports()
-        if not recorder.requests and all(recorder.continues(ports[port]) for port in used):
+        if not recording.requests and all(recording.continues(ports[port]) for port in used):
             idle[name] = (
-                f"the scene has no {recorder.unfilled[0]} objects: there is nothing to draw"
-                if recorder.unfilled
+                f"the scene has no {recording.unfilled[0]} objects: there is nothing to draw"
+                if recording.unfilled
                 else "it recorded no step"
             )
             _pass_on(node, used, demanded)
             continue
-        recorders[name] = recorder
-        for end in recorder.demands():
+        recordings[name] = recording
+        for end in recording.demands():
             demanded[end.node].add(end.port)
-    return {name: recorders[name] for name in order if name in recorders}, idle
+    return {name: recordings[name] for name in order if name in recordings}, idle
 
 
 def _pass_on(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:

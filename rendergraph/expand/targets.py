@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from rendergraph.declare import Part
-from rendergraph.steps import Read, Request, Resource, State, Write
+from rendergraph.steps import Read, Resource, State, StepRequest, Write
 from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
 
 
-def parts_written(request: Request, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
+def parts_written(request: StepRequest, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
     """Mips and layers a request leaves something in: a clear means the whole texture, a mip chain all but mip 0."""
     mips = desc.mips if isinstance(desc, TextureDesc) else 1
     if request.kind == "mipmaps":
@@ -24,7 +24,7 @@ def overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
     return one[0] == other[0] and (one[1] == other[1] or None in (one[1], other[1]))
 
 
-def feedback(request: Request, write: Write, reads: Iterable[Read]) -> str | None:
+def feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> str | None:
     """What a step samples it must not write: drivers give old texels, new ones, or some of each."""
     state = request.options.get("state")
     if write.use == "depth" and state is not None and state.depth_write is False:
@@ -78,7 +78,7 @@ def misfit(resources: Mapping[str, Resource], writes: Sequence[Write], reads: It
     return None
 
 
-def onto_nothing(request: Request, writes: Iterable[Write]) -> str | None:
+def onto_nothing(request: StepRequest, writes: Iterable[Write]) -> str | None:
     """Which target a draw blends onto, or tests against, before anything is in it."""
     state = request.options.get("state")
     if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):

@@ -6,14 +6,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import InOut, Input, LightFacts, Made, TextureInfo
+from rendergraph.declare import InOut, Input, LightFacts, TextureInfo, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
-from rendergraph.link.names import Bound, Link, Names, Wrong, line_of
+from rendergraph.link.names import Draft, Link, Names, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.link.unknown import stand_in, unknown_type
@@ -106,11 +106,11 @@ class _Linker:
         types = self._types()
         names = Names(self.spec, types)
         nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
-        for bound in nodes.values():
-            self._connect(bound, names)
+        for draft in nodes.values():
+            self._connect(draft, names)
         outputs = self._outputs(names)
         knots = cycles(nodes)
-        used = {end.source for bound in nodes.values() for links in bound.links.values() for end in links}
+        used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         infer = Infer(nodes, self.spec.size, self.lights, used | {found.source for found in outputs.values()})
         textures: dict[Endpoint, TextureInfo] = {}
         if knots:
@@ -121,7 +121,7 @@ class _Linker:
             textures = self._textures(nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
             self._shown(nodes, outputs, infer)
-        members = {name: _member(bound, infer) for name, bound in nodes.items()}
+        members = {name: _member(draft, infer) for name, draft in nodes.items()}
         self.problems += infer.problems if not knots else ()
         problems = [*self.spec.problems, *self.problems]
         if problems and not self.sketching:
@@ -164,7 +164,7 @@ class _Linker:
                     raise InputError(_in_order([*self.spec.problems, *self.problems])) from None
         return found
 
-    def _bind(self, spec: NodeSpec, node_type: NodeType) -> Bound:
+    def _bind(self, spec: NodeSpec, node_type: NodeType) -> Draft:
         node, problems = instance(spec, node_type)
         choices, wrong = choice_files(spec, node_type, node, self.catalog.extensions)
         self.missing += wrong if self.spec.missing else ()
@@ -172,72 +172,72 @@ class _Linker:
             self._say(problem)
         ports = node_type.cls.ports()
         inputs = {name: port for name, port in ports.items() if isinstance(port, Input | InOut)}
-        return Bound(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
+        return Draft(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
 
     # Links ------------------------------------------------------------------------------------------------------------
 
-    def _connect(self, bound: Bound, names: Names) -> None:
-        cls = bound.type.cls
-        inputs, groups = bound.inputs, cls.groups()
-        for name, value in bound.spec.inputs.items():
+    def _connect(self, draft: Draft, names: Names) -> None:
+        cls = draft.type.cls
+        inputs, groups = draft.inputs, cls.groups()
+        for name, value in draft.spec.inputs.items():
             if name in inputs:
-                self._input(bound, names, name, inputs[name], value)
+                self._input(draft, names, name, inputs[name], value)
             elif name in groups:
-                self._group(bound, names, name, groups[name], value)
+                self._group(draft, names, name, groups[name], value)
             else:
                 known = [*inputs, *groups]
                 hint = suggestion(name, known) if known else "; it takes none"
                 if name in cls.parameters():
                     hint = f"; '{name}' is a param, move it to `params`"
-                text = f"node type '{bound.type.name}' has no input '{name}'{hint}"
+                text = f"node type '{draft.type.name}' has no input '{name}'{hint}"
                 self._say(value.problem("RG111", text, key=True))
         for name, port in inputs.items():
             if (
-                not bound.links[name]
+                not draft.links[name]
                 and not port.optional
-                and name not in bound.failed
-                and not self._dropped(bound, name)
+                and name not in draft.failed
+                and not self._dropped(draft, name)
             ):
-                text = f"input '{name}' of {node_named(bound.spec.id, bound.type.name)} is not connected"
-                self._say(bound.spec.value.problem("RG114", text + self._source_for(bound, port), key=True))
+                text = f"input '{name}' of {node_named(draft.spec.id, draft.type.name)} is not connected"
+                self._say(draft.spec.value.problem("RG114", text + self._source_for(draft, port), key=True))
 
-    def _dropped(self, bound: Bound, name: str) -> bool:
+    def _dropped(self, draft: Draft, name: str) -> bool:
         """Whether a link was left out for a mistake that has been said."""
-        path = ("nodes", bound.spec.id.removeprefix(bound.spec.scope), "inputs")
+        path = ("nodes", draft.spec.id.removeprefix(draft.spec.scope), "inputs")
         return path in self.spec.dropped or (*path, name) in self.spec.dropped
 
-    def _input(self, bound: Bound, names: Names, name: str, port: Input | InOut, value: Value) -> None:
+    def _input(self, draft: Draft, names: Names, name: str, port: Input | InOut, value: Value) -> None:
         if isinstance(value.data, list):
             if not (isinstance(port, Input) and port.many):
-                text = f"'{bound.spec.id}.{name}' takes one link, not a list; write one as in node.port"
+                text = f"'{draft.spec.id}.{name}' takes one link, not a list; write one as in node.port"
                 self._say(value.problem("RG115", text))
-                bound.failed.add(name)
+                draft.failed.add(name)
                 return
             for part in value.data:
-                self._follow(bound, names, name, part, name)
+                self._follow(draft, names, name, part, name)
         elif value.data is not None:
-            self._follow(bound, names, name, value, name)
+            self._follow(draft, names, name, value, name)
 
-    def _follow(self, bound: Bound, names: Names, name: str, value: Value, wanted: str) -> None:
+    def _follow(self, draft: Draft, names: Names, name: str, value: Value, wanted: str) -> None:
         try:
-            found = names.follow(bound.spec.scope, value, wanted)
+            found = names.follow(draft.spec.scope, value, wanted)
         except Wrong as wrong:
-            bound.failed.add(name)
+            draft.failed.add(name)
             if wrong.problem is not None:
                 self._say(wrong.problem)
         else:
             if found is not None:
-                bound.links[name].append(found)
+                draft.links[name].append(found)
 
-    def _group(self, bound: Bound, names: Names, group: str, members: Sequence[str], value: Value) -> None:
+    def _group(self, draft: Draft, names: Names, group: str, members: Sequence[str], value: Value) -> None:
         """Connect every member that is not connected on its own to the port of its name."""
-        missing = [name for name in members if name not in bound.spec.inputs]
+        missing = [name for name in members if name not in draft.spec.inputs]
         if value.data is None:
             return
         node, _, previous = str(value.data).partition("@")
-        scope = bound.spec.scope
+        scope = draft.spec.scope
         if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
-            text = f"'{bound.spec.id}.{group}' is a group, it takes a node's id and no port"
+            text = f"'{draft.spec.id}.{group}' is a group, it takes a node's id and no port"
             self._say(value.problem("RG113", text))
         elif not names.is_known(scope, node):
             self._say(names.no_node(scope, node, value))
@@ -246,23 +246,23 @@ class _Linker:
             lacking = []
             for name in missing:
                 if name in offered:
-                    self._follow(bound, names, name, value, name)
+                    self._follow(draft, names, name, value, name)
                 elif offered:
-                    optional = bound.inputs[name].optional
+                    optional = draft.inputs[name].optional
                     lacking += [] if optional else [name]
             if lacking:
                 listed = ", ".join(f"'{name}'" for name in lacking)
-                text = f"'{bound.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
+                text = f"'{draft.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
                 self._say(value.problem("RG112", f"{text}; link {listed} beside the group"))
             if offered and not lacking:
                 return
-        bound.failed.update(missing)
+        draft.failed.update(missing)
 
-    def _source_for(self, bound: Bound, port: Input | InOut) -> str:
+    def _source_for(self, draft: Draft, port: Input | InOut) -> str:
         """A port that the file already has and that would fit."""
         wanted = port.semantic
         for other in self.spec.nodes.values():
-            if other.scope != bound.spec.scope or other.id == bound.spec.id or other.type not in self.catalog:
+            if other.scope != draft.spec.scope or other.id == draft.spec.id or other.type not in self.catalog:
                 continue
             try:
                 outputs = self.catalog.get(other.type).cls.outputs()
@@ -290,7 +290,7 @@ class _Linker:
 
     # Textures ---------------------------------------------------------------------------------------------------------
 
-    def _textures(self, nodes: Mapping[str, Bound], infer: Infer) -> dict[Endpoint, TextureInfo]:
+    def _textures(self, nodes: Mapping[str, Draft], infer: Infer) -> dict[Endpoint, TextureInfo]:
         textures: dict[Endpoint, TextureInfo] = {}
         for name in _upstream_first(nodes):
             for end in made_ports(nodes[name]):
@@ -299,19 +299,19 @@ class _Linker:
                     textures[end] = info
         return textures
 
-    def _crossings(self, nodes: Mapping[str, Bound], infer: Infer) -> None:
+    def _crossings(self, nodes: Mapping[str, Draft], infer: Infer) -> None:
         """Links into sub-pipelines against what those declare; a wrong one is cut, so that nothing inside complains."""
-        for bound in nodes.values():
-            for name, links in bound.links.items():
+        for draft in nodes.values():
+            for name, links in draft.links.items():
                 for found in [found for found in links if found.declared]:
                     info = infer.info(found.source)
                     problem = self._crossing(nodes, found, info.semantic.name) if info is not None else None
                     if problem is not None:
                         self._say(problem)
                         links.remove(found)
-                        bound.failed.add(name)
+                        draft.failed.add(name)
 
-    def _crossing(self, nodes: Mapping[str, Bound], found: Link, carried: str) -> Problem | None:
+    def _crossing(self, nodes: Mapping[str, Draft], found: Link, carried: str) -> Problem | None:
         for crossing in found.declared:
             if crossing.semantic is not None and "any" not in (crossing.semantic, carried):
                 if crossing.semantic == carried:
@@ -323,7 +323,7 @@ class _Linker:
                 return crossing.given.problem("RG110", text)
         return None
 
-    def _shown(self, nodes: Mapping[str, Bound], outputs: Mapping[str, Link], infer: Infer) -> None:
+    def _shown(self, nodes: Mapping[str, Draft], outputs: Mapping[str, Link], infer: Infer) -> None:
         for name, found in outputs.items():
             info = infer.info(found.source)
             if found.source.previous:
@@ -351,7 +351,7 @@ class _Linker:
         return found
 
 
-def _upstream_first(nodes: Mapping[str, Bound]) -> list[str]:
+def _upstream_first(nodes: Mapping[str, Draft]) -> list[str]:
     """Ids so that a node comes after what it reads in the same frame: rules then hardly ever ask further up."""
     done: dict[str, None] = {}
     for first in nodes:
@@ -371,12 +371,13 @@ def _upstream_first(nodes: Mapping[str, Bound]) -> list[str]:
     return list(done)
 
 
-def _member(bound: Bound, infer: Infer) -> GraphNode:
-    spec, ports = bound.spec, bound.ports
-    links = {name: tuple(found.source for found in ends) for name, ends in bound.links.items() if ends}
+def _member(draft: Draft, infer: Infer) -> GraphNode:
+    spec, ports = draft.spec, draft.ports
+    links = {name: tuple(found.source for found in ends) for name, ends in draft.links.items() if ends}
     samplers = {name: infer.sampler(Endpoint(spec.id, name)) for name in links if isinstance(ports[name], Input)}
-    clears = {name: infer.clear(Endpoint(spec.id, name)) for name, port in ports.items() if isinstance(port, Made)}
-    return GraphNode(spec.id, bound.type, bound.node, links, spec.place, bound.choices, samplers, clears)
+    written = [name for name, port in ports.items() if isinstance(port, WrittenPort)]
+    clears = {name: infer.clear(Endpoint(spec.id, name)) for name in written}
+    return GraphNode(spec.id, draft.type, draft.node, links, spec.place, draft.choices, samplers, clears)
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from rendergraph.catalog import Catalog
-from rendergraph.declare import Function, InOut, Input, Made, Node, Output, Port, TextureInfo, Views
+from rendergraph.declare import Function, InOut, Input, Node, Output, Port, TextureInfo, Views, WrittenPort
 from rendergraph.errors import InputError, Problem
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.infer import Infer
-from rendergraph.link.names import Bound, Link, line_of
+from rendergraph.link.names import Draft, Link, line_of
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, Semantic, Signature
 
 Accepts = Callable[[type[Node]], bool]
@@ -19,7 +19,7 @@ Accepts = Callable[[type[Node]], bool]
 class Checker:
     """Checks links of one graph; collects problems."""
 
-    def __init__(self, nodes: Mapping[str, Bound], infer: Infer, catalog: Catalog) -> None:
+    def __init__(self, nodes: Mapping[str, Draft], infer: Infer, catalog: Catalog) -> None:
         self.nodes = nodes
         self.infer = infer
         self.catalog = catalog
@@ -27,19 +27,19 @@ class Checker:
 
     def check(self) -> list[Problem]:
         """Everything that is wrong with the links."""
-        for bound in self.nodes.values():
+        for draft in self.nodes.values():
             before = len(self.problems)
-            for name, links in bound.links.items():
-                port = bound.inputs[name]
+            for name, links in draft.links.items():
+                port = draft.inputs[name]
                 for link in links:
-                    self._link(bound, port, link)
+                    self._link(draft, port, link)
             if len(self.problems) == before:
-                self._sizes(bound)
+                self._sizes(draft)
         return self.problems
 
     # One link ---------------------------------------------------------------------------------------------------------
 
-    def _link(self, bound: Bound, port: Input | InOut, link: Link) -> None:
+    def _link(self, draft: Draft, port: Input | InOut, link: Link) -> None:
         info = self.infer.info(link.source)
         if info is None:
             return
@@ -49,27 +49,27 @@ class Checker:
             taken = given  # type: ignore[assignment]
         if link.source.previous and (isinstance(port, InOut) or given in ("function", "view", "buffer")):
             what = "continues a texture of this frame" if isinstance(port, InOut) else f"takes a {given}"
-            text = f"'{bound.spec.id}.{port.name}' {what}, which has no last frame's value; leave '@previous' out"
+            text = f"'{draft.spec.id}.{port.name}' {what}, which has no last frame's value; leave '@previous' out"
             self.problems.append(link.value.problem("RG127", text))
         elif link.source.previous and getattr(source, "kept", False):
             text = f"'{link.source}' means last frame's value, but it is kept: one value in all frames"
             self.problems.append(link.value.problem("RG127", f"{text}; leave '@previous' out"))
         elif given != taken:
-            self._say(bound, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port))
+            self._say(draft, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port))
         elif isinstance(port.semantic, Signature):
-            self._signature(bound, port, link, source, port.semantic)
-        elif (taken != "view" and not self._semantic(bound, port, link, info)) or info.desc is None:
+            self._signature(draft, port, link, source, port.semantic)
+        elif (taken != "view" and not self._semantic(draft, port, link, info)) or info.desc is None:
             return
         elif isinstance(port, Input):
-            self._samples(bound, port, link, info)
-            self._format(bound, port, link, info)
+            self._samples(draft, port, link, info)
+            self._format(draft, port, link, info)
 
-    def _signature(self, bound: Bound, port: Input | InOut, link: Link, source: Port, wanted: Signature) -> None:
+    def _signature(self, draft: Draft, port: Input | InOut, link: Link, source: Port, wanted: Signature) -> None:
         if isinstance(source, Function) and source.signature.name != wanted.name:
             carried = f"provides {source.signature.name}()"
-            self._say(bound, port, link, "RG210", f"calls {wanted.name}()", carried, None)
+            self._say(draft, port, link, "RG210", f"calls {wanted.name}()", carried, None)
 
-    def _semantic(self, bound: Bound, port: Input | InOut, link: Link, info: TextureInfo) -> bool:
+    def _semantic(self, draft: Draft, port: Input | InOut, link: Link, info: TextureInfo) -> bool:
         carried = info.semantic
         wanted = port.semantic
         if not isinstance(wanted, Semantic) or "any" in (wanted.name, carried.name):
@@ -82,22 +82,22 @@ class Checker:
             code, takes, carries = "RG203", f"{wanted.encoding} {wanted.name}", f"{carried.encoding} {carried.name}"
         else:
             return True
-        self._say(bound, port, link, code, f"takes {takes}", f"carries {carries}", self._by_semantic(carried, wanted))
+        self._say(draft, port, link, code, f"takes {takes}", f"carries {carries}", self._by_semantic(carried, wanted))
         return False
 
-    def _samples(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
+    def _samples(self, draft: Draft, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         samples = info.desc.samples
         if port.samples == "single" and samples > 1:
             carries = f"has {samples} samples a texel"
-            self._say(bound, port, link, "RG214", "takes one sample a texel", carries, self._resolving(info))
+            self._say(draft, port, link, "RG214", "takes one sample a texel", carries, self._resolving(info))
         elif port.samples == "multi" and samples == 1:
-            self._say(bound, port, link, "RG214", "takes several samples a texel", "has one", None)
+            self._say(draft, port, link, "RG214", "takes several samples a texel", "has one", None)
 
-    def _format(self, bound: Bound, port: Input, link: Link, info: TextureInfo) -> None:
+    def _format(self, draft: Draft, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         texel = FORMATS[info.desc.format]
-        smooth = self.infer.sampler(Endpoint(bound.spec.id, port.name)).filter
+        smooth = self.infer.sampler(Endpoint(draft.spec.id, port.name)).filter
         takes = ""
         if port.use == "depth_test" and not texel.is_depth:
             takes = "is attached as depth"
@@ -108,18 +108,18 @@ class Checker:
         elif smooth != "nearest" and not port.compare and texel.family in ("uint", "int"):
             takes = "is filtered, so no whole numbers"
         if takes:
-            self._say(bound, port, link, "RG215", takes, f"has the format {info.desc.format}", None)
+            self._say(draft, port, link, "RG215", takes, f"has the format {info.desc.format}", None)
 
     def _say(
-        self, bound: Bound, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
+        self, draft: Draft, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
     ) -> None:
-        text = f"'{bound.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
+        text = f"'{draft.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
         way = self._neighbour(port, link) or self._converters(hint)
         if not way and code == "RG201":
-            way = self._elsewhere(bound, port)
+            way = self._elsewhere(draft, port)
         self.problems.append(link.value.problem(code, text + way))
 
-    def _elsewhere(self, bound: Bound, port: Port) -> str:
+    def _elsewhere(self, draft: Draft, port: Port) -> str:
         """Ports of other nodes that would fit."""
         if not isinstance(port, Input) or isinstance(port.semantic, Signature):
             return ""
@@ -127,7 +127,7 @@ class Checker:
             f"'{node}.{name}'"
             for node, other in self.nodes.items()
             for name, made in other.type.cls.outputs().items()
-            if other is not bound
+            if other is not draft
             and (info := self.infer.info(Endpoint(node, name))) is not None
             and kind_of(made, info) == port.kind
             and _means(port, info.semantic)
@@ -155,34 +155,34 @@ class Checker:
 
     # The passes -------------------------------------------------------------------------------------------------------
 
-    def _sizes(self, bound: Bound) -> None:
+    def _sizes(self, draft: Draft) -> None:
         """Inputs of size `same` against what the node draws."""
         made: dict[tuple[int, int], str] = {}
-        for name, port in bound.ports.items():
+        for name, port in draft.ports.items():
             if isinstance(port, Output | InOut):
                 needs = port.needs if isinstance(port, Output) else ()
-                info = self.infer.info(Endpoint(bound.spec.id, name)) if all(map(bound.links.get, needs)) else None
+                info = self.infer.info(Endpoint(draft.spec.id, name)) if all(map(draft.links.get, needs)) else None
                 if info is not None and info.desc is not None:
                     made.setdefault(info.desc.size, name)
         if not made:
             return
-        default = bound.type.cls.record is Node.record
+        default = draft.type.cls.record is Node.record
         if default and len(made) > 1:
             (a, one), (b, other) = list(made.items())[:2]
-            ends = f"'{bound.spec.id}.{one}' is {_size(a)} and '{bound.spec.id}.{other}' {_size(b)}"
+            ends = f"'{draft.spec.id}.{one}' is {_size(a)} and '{draft.spec.id}.{other}' {_size(b)}"
             text = f"{ends}: one pass draws all its targets in one size"
-            self.problems.append(bound.spec.value.problem("RG216", text, key=True))
+            self.problems.append(draft.spec.value.problem("RG216", text, key=True))
             return
-        for name, links in bound.links.items():
-            port = bound.inputs[name]
+        for name, links in draft.links.items():
+            port = draft.inputs[name]
             for link in links if isinstance(port, Input) and port.size == "same" else ():
                 info = self.infer.info(link.source)
                 if info is None or info.desc is None or info.desc.size in made:
                     continue
                 (size, target), *_ = made.items()
-                takes = f"takes the size of '{bound.spec.id}.{target}', {_size(size)}"
+                takes = f"takes the size of '{draft.spec.id}.{target}', {_size(size)}"
                 carries = f"is {_size(info.desc.size)}"
-                self._say(bound, port, link, "RG216", takes, carries, self._resizing(info))
+                self._say(draft, port, link, "RG216", takes, carries, self._resizing(info))
 
     # Ways out ---------------------------------------------------------------------------------------------------------
 
@@ -242,7 +242,7 @@ def kind_of(port: Port, info: TextureInfo) -> str:
         return "view"
     if info.desc is not None:
         return info.desc.kind
-    return port.kind if isinstance(port, Made) else ""
+    return port.kind if isinstance(port, WrittenPort) else ""
 
 
 def _only_input(cls: type[Node]) -> list[Input]:
@@ -251,7 +251,7 @@ def _only_input(cls: type[Node]) -> list[Input]:
     return [port for port in needed if isinstance(port, Input)] if len(needed) == 1 else []
 
 
-def _outputs(cls: type[Node]) -> Iterator[Made]:
+def _outputs(cls: type[Node]) -> Iterator[WrittenPort]:
     return (port for port in cls.outputs().values() if isinstance(port, Output))
 
 
@@ -264,7 +264,7 @@ def _means(port: Any, semantic: Semantic, *, any_too: bool = False) -> bool:
     return own.name == semantic.name and own.space == semantic.space and own.encoding == semantic.encoding
 
 
-def _continues(out: Made, port: Input, info: TextureInfo) -> bool:
+def _continues(out: WrittenPort, port: Input, info: TextureInfo) -> bool:
     return out.like == port.name or (out.semantic is not None and _means(out, info.semantic, any_too=True))
 
 

@@ -20,18 +20,18 @@ from rendergraph.declare import (
     Input,
     Internal,
     LightFacts,
-    Made,
     Node,
     Port,
     Texel,
     TextureInfo,
     Views,
+    WrittenPort,
 )
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
 from rendergraph.errors import Mistake, Problem, SceneError, node_named
 from rendergraph.link.graph import Endpoint
-from rendergraph.link.names import Bound
+from rendergraph.link.names import Draft
 from rendergraph.textures import (
     FORMATS,
     MOST_SIDE,
@@ -84,9 +84,9 @@ class _Infos(Sequence[TextureInfo]):
 class _Inputs(Mapping[str, Any]):
     """`Facts.inputs`, found out when looked at."""
 
-    def __init__(self, infer: Infer, bound: Bound) -> None:
+    def __init__(self, infer: Infer, draft: Draft) -> None:
         self._infer = infer
-        self._bound = bound
+        self._bound = draft
 
     def __getitem__(self, name: str) -> _Infos:
         links = self._bound.links[name]
@@ -105,7 +105,7 @@ class Infer:
     """Asks the rules of all nodes; keeps the answers and what is wrong with them."""
 
     def __init__(
-        self, nodes: Mapping[str, Bound], viewport: tuple[int, int], lights: Sequence[LightFacts], used: set[Endpoint]
+        self, nodes: Mapping[str, Draft], viewport: tuple[int, int], lights: Sequence[LightFacts], used: set[Endpoint]
     ) -> None:
         self.nodes = nodes
         self.viewport = viewport
@@ -156,7 +156,7 @@ class Infer:
     def clear(self, end: Endpoint) -> Texel | None:
         """What a texture or buffer first holds; None for whatever is there, and where its rule fails, which is said."""
         port = self.nodes[end.node].ports[end.port]
-        assert isinstance(port, Made)
+        assert isinstance(port, WrittenPort)
         value: Texel | None = self._checked(end, "clear", port.clear, _is_texel, "a number, up to four, or None", None)
         return value
 
@@ -173,14 +173,14 @@ class Infer:
         return otherwise
 
     def _say(self, end: Endpoint, code: str, text: str) -> None:
-        bound = self.nodes[end.node]
-        problem = bound.spec.value.problem(code, f"'{end}' ({bound.type.name}): {text}", key=True)
+        draft = self.nodes[end.node]
+        problem = draft.spec.value.problem(code, f"'{end}' ({draft.type.name}): {text}", key=True)
         self.problems.append(replace(problem, mistake=Mistake(end.port, problem.text)))
 
     def _evaluate(self, end: Endpoint) -> TextureInfo | None:
-        bound = self.nodes[end.node]
-        port = bound.ports[end.port]
-        if bound.type.missing:
+        draft = self.nodes[end.node]
+        port = draft.ports[end.port]
+        if draft.type.missing:
             return None
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
@@ -190,15 +190,15 @@ class Infer:
                 self._say(end, "RG209", f"the rule for its count gives {shown(count, 60)}, not a whole number from 0")
                 return None
             return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port), views=count)
-        if isinstance(port, InOut) and bound.links.get(port.name):
-            return self.info(bound.links[port.name][0].source)
-        return self._made(end, bound, port) if isinstance(port, Made) else None
+        if isinstance(port, InOut) and draft.links.get(port.name):
+            return self.info(draft.links[port.name][0].source)
+        return self._made(end, draft, port) if isinstance(port, WrittenPort) else None
 
-    def _facts_of(self, bound: Bound) -> Facts:
-        found = self._facts.get(bound.spec.id)
+    def _facts_of(self, draft: Draft) -> Facts:
+        found = self._facts.get(draft.spec.id)
         if found is None:
-            found = Facts(self.viewport, self.lights, _Inputs(self, bound))
-            self._facts[bound.spec.id] = found
+            found = Facts(self.viewport, self.lights, _Inputs(self, draft))
+            self._facts[draft.spec.id] = found
         return found
 
     def _ruled(self, end: Endpoint, what: str, rule: Any) -> Any:
@@ -211,37 +211,37 @@ class Infer:
         return self._answers[key]
 
     def _asked(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
-        bound = self.nodes[end.node]
+        draft = self.nodes[end.node]
         try:
-            return rule(bound.node, self._facts_of(bound))
+            return rule(draft.node, self._facts_of(draft))
         except _Unknown:
             raise
         except (Exception, SystemExit) as error:  # a stranger's function
-            missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in bound.inputs
+            missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in draft.inputs
             if missing and end not in self.used:
                 raise _Unknown from None  # nobody uses what lacks an input
             if missing:
                 self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
             elif isinstance(error, SceneError):
-                self._refused(bound, error)
+                self._refused(draft, error)
             else:
-                self._say(end, "RG209", f"the rule for its {what} fails: {happened(error, bound.type.cls)}")
+                self._say(end, "RG209", f"the rule for its {what} fails: {happened(error, draft.type.cls)}")
             raise _Unknown from None
 
-    def _refused(self, bound: Bound, error: SceneError) -> None:
+    def _refused(self, draft: Draft, error: SceneError) -> None:
         """A rule's own complaint, where a parameter has the name that it speaks of; several rules may have the same."""
-        value, key = bound.spec.value, True
-        for param in bound.spec.params.values():
+        value, key = draft.spec.value, True
+        for param in draft.spec.params.values():
             for part in param.data if isinstance(param.data, list) else [param]:
                 if error.subject and part.data == error.subject:
                     value, key = part, False
-        who = node_named(bound.spec.id, bound.type.name)
+        who = node_named(draft.spec.id, draft.type.name)
         problem = value.problem("RG209", f"{who}: {shown(error, 200)}", key=key)
         if problem not in self.problems:
             self.problems.append(problem)
 
-    def _made(self, end: Endpoint, bound: Bound, port: Made) -> TextureInfo | None:
-        like = self._linked(bound, port.like)
+    def _made(self, end: Endpoint, draft: Draft, port: WrittenPort) -> TextureInfo | None:
+        like = self._linked(draft, port.like)
         if port.kind == "buffer":
             size = self._ruled(end, "bytes", port.bytes)
             if not isinstance(size, int) or size < 1:
@@ -252,16 +252,16 @@ class Infer:
         if desc is None:
             return None
         semantic = port.semantic or (like.semantic if like is not None else textures.Any)
-        view, lights = self._view(end, bound, port, semantic)
+        view, lights = self._view(end, draft, port, semantic)
         if like is not None:
             view, lights = view or like.view, lights or like.lights
         return TextureInfo(desc, semantic, view, lights)
 
-    def _linked(self, bound: Bound, name: str | None) -> TextureInfo | None:
-        links = bound.links.get(name, []) if name else []
+    def _linked(self, draft: Draft, name: str | None) -> TextureInfo | None:
+        links = draft.links.get(name, []) if name else []
         return self.known(links[0].source) if links else None
 
-    def _desc(self, end: Endpoint, port: Made, like: TextureDesc | None) -> TextureDesc | None:
+    def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> TextureDesc | None:
         size = self._size(end, port, like)
         if size is None:
             return None
@@ -288,9 +288,9 @@ class Infer:
             return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
         return None
 
-    def _size(self, end: Endpoint, port: Made, like: TextureDesc | None) -> tuple[int, int] | None:
+    def _size(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> tuple[int, int] | None:
         rule: Any = 1.0 if port.size is None else port.size
-        bound = self.nodes[end.node]
+        draft = self.nodes[end.node]
         factor, base = 1.0, self.viewport
         if callable(rule):
             given = self._ruled(end, "size", rule)
@@ -302,7 +302,7 @@ class Infer:
                 return None
         elif isinstance(rule, str) or (isinstance(rule, tuple) and isinstance(rule[0], str)):
             name, factor = (rule, 1.0) if isinstance(rule, str) else (rule[0], float(rule[1]))
-            source = self._linked(bound, name)  # not connected: the viewport
+            source = self._linked(draft, name)  # not connected: the viewport
             base = source.desc.size if source is not None and source.desc is not None else base
         elif isinstance(rule, tuple):
             base = rule
@@ -326,31 +326,33 @@ class Infer:
             raise _Unknown
         return tuple(given)
 
-    def _view(self, end: Endpoint, bound: Bound, port: Made, semantic: Semantic) -> tuple[str | None, tuple[int, ...]]:
+    def _view(
+        self, end: Endpoint, draft: Draft, port: WrittenPort, semantic: Semantic
+    ) -> tuple[str | None, tuple[int, ...]]:
         """The view table it is drawn with, and the light of each layer."""
-        named: Port | None = bound.ports.get(port.view) if port.view else None
+        named: Port | None = draft.ports.get(port.view) if port.view else None
         view: str | None = None
         lights: tuple[int, ...] = ()
         if isinstance(named, Views):
-            view = str(Endpoint(bound.spec.id, named.name))
-            lights = self._view_lights(Endpoint(bound.spec.id, named.name), named)
+            view = str(Endpoint(draft.spec.id, named.name))
+            lights = self._view_lights(Endpoint(draft.spec.id, named.name), named)
         elif isinstance(named, Input | InOut):
-            view, lights = self._carried(bound, named)
-        elif isinstance(drawn := bound.ports.get("view"), Input) and drawn.kind == "view" and semantic.name in _DRAWN:
-            view, lights = self._carried(bound, drawn)
+            view, lights = self._carried(draft, named)
+        elif isinstance(drawn := draft.ports.get("view"), Input) and drawn.kind == "view" and semantic.name in _DRAWN:
+            view, lights = self._carried(draft, drawn)
         if callable(port.lights):
             lights = self._indices(end, self._ruled(end, "lights", port.lights))
         elif port.lights:
-            table: Port | None = bound.ports.get(port.lights)
+            table: Port | None = draft.ports.get(port.lights)
             if isinstance(table, Views):
-                lights = self._view_lights(Endpoint(bound.spec.id, table.name), table)
+                lights = self._view_lights(Endpoint(draft.spec.id, table.name), table)
             else:
-                source = self._linked(bound, port.lights)
+                source = self._linked(draft, port.lights)
                 lights = source.lights if source is not None else ()
         return view, lights
 
-    def _carried(self, bound: Bound, port: Input | InOut) -> tuple[str | None, tuple[int, ...]]:
-        source = self._linked(bound, port.name)
+    def _carried(self, draft: Draft, port: Input | InOut) -> tuple[str | None, tuple[int, ...]]:
+        source = self._linked(draft, port.name)
         if source is not None:
             return source.view, source.lights
         return (CAMERA if port.kind == "view" else None), ()
@@ -361,11 +363,11 @@ def _is_texel(value: object) -> bool:
     return len(numbers) <= 4 and all(isinstance(number, int | float) for number in numbers)
 
 
-def made_ports(bound: Bound) -> Iterator[Endpoint]:
+def made_ports(draft: Draft) -> Iterator[Endpoint]:
     """Everything of a node that carries something."""
-    for name, port in bound.ports.items():
-        if isinstance(port, Made | Function | Views):
-            yield Endpoint(bound.spec.id, name)
+    for name, port in draft.ports.items():
+        if isinstance(port, WrittenPort | Function | Views):
+            yield Endpoint(draft.spec.id, name)
 
 
 __all__ = ["CAMERA", "History", "Infer", "Internal", "made_ports"]

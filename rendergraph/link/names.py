@@ -50,7 +50,7 @@ class Link:
 
 
 @dataclass(eq=False)
-class Bound:
+class Draft:
     """A node with its type, while it is being linked.
 
     Attributes:

@@ -9,15 +9,15 @@ from graphlib import CycleError, TopologicalSorter
 from rendergraph.declare import InOut
 from rendergraph.errors import Problem
 from rendergraph.link.graph import Endpoint
-from rendergraph.link.names import Bound, Link, line_of
+from rendergraph.link.names import Draft, Link, line_of
 
 
-def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
+def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
     """One problem for each knot of nodes that need each other in the same frame."""
     links = {
-        (link.source.node, bound.spec.id): (name, link)
-        for bound in nodes.values()
-        for name, ends in bound.links.items()
+        (link.source.node, draft.spec.id): (name, link)
+        for draft in nodes.values()
+        for name, ends in draft.links.items()
         for link in ends
         if not link.source.previous
     }
@@ -48,18 +48,18 @@ def cycles(nodes: Mapping[str, Bound]) -> list[Problem]:
     return found
 
 
-def sources(nodes: Mapping[str, Bound]) -> dict[str, set[str]]:
+def sources(nodes: Mapping[str, Draft]) -> dict[str, set[str]]:
     """The nodes that each one reads in the same frame."""
     return {
-        name: {link.source.node for links in bound.links.values() for link in links if not link.source.previous}
-        for name, bound in nodes.items()
+        name: {link.source.node for links in draft.links.values() for link in links if not link.source.previous}
+        for name, draft in nodes.items()
     }
 
 
-def needs(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Problem]:
+def needs(nodes: Mapping[str, Draft], outputs: Mapping[str, Link]) -> list[Problem]:
     """Ports that are used although an input they need is not connected."""
     problems = []
-    users = [link for bound in nodes.values() for links in bound.links.values() for link in links]
+    users = [link for draft in nodes.values() for links in draft.links.values() for link in links]
     for link in [*users, *outputs.values()]:
         source = nodes[link.source.node]
         wanted: Iterable[str] = getattr(source.ports[link.source.port], "needs", ())
@@ -71,56 +71,56 @@ def needs(nodes: Mapping[str, Bound], outputs: Mapping[str, Link]) -> list[Probl
     return problems
 
 
-def versions(nodes: Mapping[str, Bound]) -> list[Problem]:
+def versions(nodes: Mapping[str, Draft]) -> list[Problem]:
     """Mistakes about `InOut`s: each version has one writer, and its readers come before that.
 
     An output may show a version that somebody continues: it is kept as it was.
     """
-    writers: dict[Endpoint, tuple[Bound, Link]] = {}
+    writers: dict[Endpoint, tuple[Draft, Link]] = {}
     problems: list[Problem] = []
-    for bound in nodes.values():
-        for name, port in bound.ports.items():
-            for link in bound.links.get(name, ()) if isinstance(port, InOut) else ():
+    for draft in nodes.values():
+        for name, port in draft.ports.items():
+            for link in draft.links.get(name, ()) if isinstance(port, InOut) else ():
                 if link.source.previous:
                     continue
                 if link.source in writers:
                     other = writers[link.source]
                     where = line_of(other[1].value.place, link.value.place)
                     text = (
-                        f"'{bound.spec.id}.{name}' and '{other[0].spec.id}.{_port(*other)}' ({where}) both continue "
+                        f"'{draft.spec.id}.{name}' and '{other[0].spec.id}.{_port(*other)}' ({where}) both continue "
                         f"'{link.source}'; link one to the other"
                     )
                     problems.append(link.value.problem("RG126", text))
                 else:
-                    writers[link.source] = bound, link
+                    writers[link.source] = draft, link
     if writers and not problems:
         problems += _readers(nodes, writers)
     return problems
 
 
-def _port(bound: Bound, link: Link) -> str:
-    return next(name for name, links in bound.links.items() if link in links)
+def _port(draft: Draft, link: Link) -> str:
+    return next(name for name, links in draft.links.items() if link in links)
 
 
-def _readers(nodes: Mapping[str, Bound], writers: Mapping[Endpoint, tuple[Bound, Link]]) -> list[Problem]:
+def _readers(nodes: Mapping[str, Draft], writers: Mapping[Endpoint, tuple[Draft, Link]]) -> list[Problem]:
     problems = []
     before = _Ancestors(nodes)
-    for bound in nodes.values():
-        for name, links in bound.links.items():
+    for draft in nodes.values():
+        for name, links in draft.links.items():
             for link in links:
                 now = replace(link.source, previous=False)
                 if now not in writers:
                     continue
                 writer, written = writers[now]
-                if link is written or (writer is bound and not link.source.previous):
+                if link is written or (writer is draft and not link.source.previous):
                     continue
                 newer = f"'{writer.spec.id}.{_port(writer, written)}'"
                 where = line_of(written.value.place, link.value.place)
                 if link.source.previous:
                     text = f"{newer} ({where}) overwrites '{now}', last frame's value too; read {newer[:-1]}@previous'"
                     problems.append(link.value.problem("RG127", text))
-                elif writer.spec.id in before[bound.spec.id]:
-                    text = f"'{bound.spec.id}.{name}' reads '{now}', but '{bound.spec.id}' also needs {newer} ({where})"
+                elif writer.spec.id in before[draft.spec.id]:
+                    text = f"'{draft.spec.id}.{name}' reads '{now}', but '{draft.spec.id}' also needs {newer} ({where})"
                     problems.append(link.value.problem("RG128", f"{text}, which overwrites it; read {newer}"))
     return problems
 
@@ -128,7 +128,7 @@ def _readers(nodes: Mapping[str, Bound], writers: Mapping[Endpoint, tuple[Bound,
 class _Ancestors(dict[str, set[str]]):
     """Every node that a node needs in the same frame, found out when asked."""
 
-    def __init__(self, nodes: Mapping[str, Bound]) -> None:
+    def __init__(self, nodes: Mapping[str, Draft]) -> None:
         super().__init__()
         self._sources = sources(nodes)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Frame, FrameScene, ViewMatrices
 from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, UniformValue, Use, Write
-from rendergraph.steps.recorder import Recorder, Request, Steps, Target
+from rendergraph.steps.recorder import Recorder, StepRequest, Steps, Target
 from rendergraph.steps.state import (
     ADD,
     ALPHA,
@@ -37,7 +37,6 @@ __all__ = [
     "FunctionBinding",
     "Read",
     "Recorder",
-    "Request",
     "Resource",
     "Role",
     "State",
@@ -45,6 +44,7 @@ __all__ = [
     "StencilFace",
     "StencilOp",
     "Step",
+    "StepRequest",
     "Steps",
     "Target",
     "UniformValue",

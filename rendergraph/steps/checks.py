@@ -10,7 +10,7 @@ from typing import Annotated, Any, ParamSpec, TypeAlias
 
 from rendergraph.annotations import Length, Range, hints_of, may_be, mistakes_in, quoted
 from rendergraph.errors import Misuse, nearest, suggestion
-from rendergraph.ports import Made, Part, Port
+from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
 from rendergraph.textures import BufferDesc, TextureDesc
 
@@ -112,7 +112,7 @@ def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
         part_of(ports, out, "out")  # says what it is instead
         raise AssertionError
     for name, part in found.items():
-        if not isinstance(part.port, Made):
+        if not isinstance(part.port, WrittenPort):
             kind = type(part.port).__name__.lower()
             text = f"it writes its {kind} '{part.port.name}'; only outputs, internals and history can be written"
             raise Misuse(text, "RG421")

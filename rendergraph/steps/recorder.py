@@ -36,13 +36,13 @@ class Recorder(Protocol):
         """What the choice of a parameter needs."""
         ...
 
-    def add(self, request: Request) -> None:
+    def add(self, request: StepRequest) -> None:
         """Keep a request."""
         ...
 
 
 @dataclass(frozen=True)
-class Request:
+class StepRequest:
     """What a node asked for, before its ports are mapped to resources.
 
     `caller` is the author's file and line of the call, None where the framework recorded the step by itself.
@@ -320,7 +320,7 @@ class Steps:
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
         self._recorder.add(
-            Request(
+            StepRequest(
                 kind=kind,
                 shaders=tuple((stage, file) for stage, file in shaders.items() if file is not None),
                 out=tuple(targets.items()),

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import Input, Made, Output
+from rendergraph.declare import Input, Output, WrittenPort
 from rendergraph.errors import InputError
 from rendergraph.glsl import strip_comments
 from rendergraph.glsl.globals import globals_of
@@ -155,7 +155,7 @@ def test_ports_and_parameters_of_a_plain_shader(tmp_path: Path) -> None:
 
 def test_whole_numbers_have_their_formats(tmp_path: Path) -> None:
     found = load(tmp_path, "out uvec4 ids; out int number;")
-    assert [port.format for port in found.cls.ports().values() if isinstance(port, Made)] == ["rgba32ui", "r32i"]
+    assert [port.format for port in found.cls.ports().values() if isinstance(port, WrittenPort)] == ["rgba32ui", "r32i"]
 
 
 def test_includes_count_and_shared_ones_do_not(tmp_path: Path) -> None:

@@ -2,85 +2,119 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rendergraph.declare import Function, History, InOut, Input, Internal, Made, Node, Part, Port, Views
+from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.ending import mark_roles, wanted_resources
-from rendergraph.expand.keeping import check_kept
-from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
+from rendergraph.expand.model import CAMERA, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import Recorder, is_kept, now
+from rendergraph.expand.recording import Recording, is_kept, now
 from rendergraph.expand.targets import feedback, misfit, no_image, onto_nothing, overlap, parts_written, target_size
 from rendergraph.link import Endpoint, Graph
-from rendergraph.steps import FunctionBinding, Read, Request, Resource, Role, Step, Use, Write
+from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 
-class Numbering:
-    """Second pass: resources and versions for what was recorded.
+@dataclass(frozen=True)
+class Versioned:
+    """What was recorded, with resources and versions in place of ports.
 
     Attributes:
-        version: resource id to its newest version so far.
+        steps: in the order of nodes and of recording.
+        resources: by id.
+        newest: resource id to its last version.
         at_end: port to its resource and the version it has when its node is done.
+        passed: port of an idle node to what it would continue.
         firsts: resource id to what whoever continues it says of the first frame.
-        written: resource id to the parts (mip, layer or None for all) written so far.
+        idle: nodes that recorded nothing, with the reason.
+        views: view tables by id.
     """
 
-    def __init__(
-        self, graph: Graph, recorders: dict[str, Recorder], idle: dict[str, str], wanted: dict[str, Endpoint]
-    ) -> None:
+    steps: Sequence[Step]
+    resources: Mapping[str, Resource]
+    newest: Mapping[str, int]
+    at_end: Mapping[Endpoint, tuple[str, int]]
+    passed: Mapping[Endpoint, Endpoint]
+    firsts: Mapping[str, float]
+    idle: Mapping[str, str]
+    views: Mapping[str, ViewTable]
+
+    def behind(self, end: Endpoint) -> Endpoint:
+        """The port of this frame that a link leads to; through nodes that have nothing to add to what they continue."""
+        return _behind(self.passed, end)
+
+
+def versioned(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> Versioned:
+    """Count the versions of every resource.
+
+    Args:
+        graph: the graph.
+        recordings: what each node recorded, in reading order.
+        idle: the nodes that have nothing to record, with the reason.
+
+    Raises:
+        InputError: a step was asked for that cannot be drawn.
+    """
+    return _Versions(graph, recordings, idle).found()
+
+
+class _Versions:
+    """The versions counted so far.
+
+    Attributes:
+        version: resource id to its newest version.
+        written: resource id to the parts (mip, layer or None for all) written.
+    """
+
+    def __init__(self, graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> None:
         self.graph = graph
-        self.recorders = recorders
-        self.idle = idle
-        self.wanted = wanted
+        self.recordings = recordings
+        self.idle = dict(idle)
         self.version: dict[str, int] = {}
         self.at_end: dict[Endpoint, tuple[str, int]] = {}
         self.written: dict[str, set[tuple[int, int | None]]] = {}
         self.resources: dict[str, Resource] = {}
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
-        self.passed = dict(_passed(graph, recorders))
+        self.passed = dict(_passed(graph, recordings))
         self.firsts: dict[str, float] = {}
 
-    def expansion(self) -> Expansion:
-        """Number everything that was recorded."""
-        for recorder in self.recorders.values():
-            self._node(recorder)
-        wanted = wanted_resources(self)
-        mark_roles(self, wanted)
-        check_kept(self.steps, self.resources)
-        return Expansion(tuple(self.steps), self.resources, wanted, self.idle, self.views)
+    def found(self) -> Versioned:
+        for recording in self.recordings.values():
+            self._node(recording)
+        return Versioned(
+            self.steps, self.resources, self.version, self.at_end, self.passed, self.firsts, self.idle, self.views
+        )
 
-    def _node(self, recorder: Recorder) -> None:
-        self._declare(recorder)
+    def _node(self, recording: Recording) -> None:
+        self._declare(recording)
         before = len(self.steps)
-        for request in recorder.requests:
-            self.steps.append(self._step(recorder, request, len(self.steps) - before))
+        for request in recording.requests:
+            self.steps.append(self._step(recording, request, len(self.steps) - before))
         if len(self.steps) == before and not any(
-            isinstance(port, Function | Views) and port.name in recorder.used_ports
-            for port in recorder.node.node.outputs().values()
+            isinstance(port, Function | Views) and port.name in recording.used_ports
+            for port in recording.node.node.outputs().values()
         ):
-            self.idle[recorder.node.id] = "it recorded no step"
-        for port in recorder.node.node.ports().values():
-            if isinstance(port, Made):
-                self._finish(recorder, port)
+            self.idle[recording.node.id] = "it recorded no step"
+        for port in recording.node.node.ports().values():
+            if isinstance(port, WrittenPort):
+                self._finish(recording, port)
 
-    def _declare(self, recorder: Recorder) -> None:
+    def _declare(self, recording: Recording) -> None:
         """Give every texture the node may write a resource; an `InOut` continues somebody's."""
-        node = recorder.node
+        node = recording.node
         for port in node.node.ports().values():
             end = Endpoint(node.id, port.name)
             if isinstance(port, Views):
                 info = self.graph.textures[end]
                 self.views[str(end)] = ViewTable(info.views, info.lights)
-            if not isinstance(port, Made) or is_empty(self.graph.textures.get(end)):
+            if not isinstance(port, WrittenPort) or is_empty(self.graph.textures.get(end)):
                 continue
-            if isinstance(port, InOut) and recorder.links.get(port.name):
-                self.at_end[end] = self.at_end[self.behind(recorder.links[port.name][0])]
+            if isinstance(port, InOut) and recording.links.get(port.name):
+                self.at_end[end] = self.at_end[_behind(self.passed, recording.links[port.name][0])]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -95,13 +129,6 @@ class Numbering:
             self.written[resource.id] = set()
             self.at_end[end] = (resource.id, 0)
 
-    def behind(self, end: Endpoint) -> Endpoint:
-        """The port of this frame that a link leads to; through nodes that have nothing to add to what they continue."""
-        end = now(end)
-        while end in self.passed:
-            end = self.passed[end]
-        return end
-
     def _maker(self, end: Endpoint) -> Endpoint:
         """The port that first made what a port carries, however often it is continued between."""
         end = now(end)
@@ -112,42 +139,42 @@ class Numbering:
                 return end
             end = now(continued[0])
 
-    def _finish(self, recorder: Recorder, port: Made) -> None:
-        end = Endpoint(recorder.node.id, port.name)
+    def _finish(self, recording: Recording, port: WrittenPort) -> None:
+        end = Endpoint(recording.node.id, port.name)
         if end in self.at_end:
             resource, _ = self.at_end[end]
             self.at_end[end] = (resource, self.version[resource])
 
-    def _step(self, recorder: Recorder, request: Request, index: int) -> Step:
-        node = recorder.node
+    def _step(self, recording: Recording, request: StepRequest, index: int) -> Step:
+        node = recording.node
         options = dict(request.options)
         reads: list[Read] = []
         functions: list[FunctionBinding] = []
-        for name, target in recorder.reads_of(request):
+        for name, target in recording.reads_of(request):
             port = target.port if isinstance(target, Part) else target
             if isinstance(port, Function):
-                functions += self._own_function(recorder, port)
+                functions += self._own_function(recording, port)
             elif isinstance(port, Input) and port.kind == "function":
-                functions += [f for end in recorder.links.get(port.name, ()) for f in self._function(end)]
+                functions += [f for end in recording.links.get(port.name, ()) for f in self._function(end)]
             elif not (isinstance(port, Input) and port.kind == "view"):
-                reads += self._reads(recorder, name, target if isinstance(target, Part) else Part(port))
+                reads += self._reads(recording, name, target if isinstance(target, Part) else Part(port))
         writes: list[Write] = []
         for name, part in request.out:
-            read, write = self._write(recorder, request, name, part, options.get("value"))
+            read, write = self._write(recording, request, name, part, options.get("value"))
             reads += read
             writes.append(write)
-        self._check_targets(recorder, request, writes, [*reads, *(read for f in functions for read in f.reads)])
-        view, view_index = self._view(recorder, request, options)
+        self._check_targets(recording, request, writes, [*reads, *(read for f in functions for read in f.reads)])
+        view, view_index = self._view(recording, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = target_size(self.resources, writes, reads)
         attributes = options.pop("attributes", {})
         vertices = options.get("vertices", 3)
         if isinstance(vertices, Port):
-            reads += self._reads(recorder, vertices.name, Part(vertices))
+            reads += self._reads(recording, vertices.name, Part(vertices))
             vertices = reads[-1].resource
         held: list[tuple[str, str]] = []
         for layout, port in attributes.items():
-            reads += self._reads(recorder, port.name, Part(port))
+            reads += self._reads(recording, port.name, Part(port))
             held.append((layout, reads[-1].resource))
         keep = ("state", "objects", "materials", "order", "per_light", "topology", "instances", "groups", "invocations")
         return Step(
@@ -159,7 +186,7 @@ class Numbering:
             writes=tuple(writes),
             functions=tuple(functions),
             includes=_includes(node.choices),
-            defines=(*self._defines(recorder, reads, functions), *request.defines.items()),
+            defines=(*self._defines(recording, reads, functions), *request.defines.items()),
             uniforms=(*param_uniforms(node.node), *request.uniforms.items()),
             size=size,
             samples=samples,
@@ -167,33 +194,33 @@ class Numbering:
             view_index=view_index,
             vertices=vertices,
             attributes=tuple(held),
-            label=f"{node.id}" + (f" {index}" if len(recorder.requests) > 1 else ""),
+            label=f"{node.id}" + (f" {index}" if len(recording.requests) > 1 else ""),
             type=node.type.name,
             place=node.place,
             caller=request.caller,
             **{key: options[key] for key in keep if key in options},
         )
 
-    def _own(self, recorder: Recorder, port: Port) -> str:
-        return self.at_end[Endpoint(recorder.node.id, port.name)][0]
+    def _own(self, recording: Recording, port: Port) -> str:
+        return self.at_end[Endpoint(recording.node.id, port.name)][0]
 
-    def _reads(self, recorder: Recorder, name: str, part: Part) -> list[Read]:
+    def _reads(self, recording: Recording, name: str, part: Part) -> list[Read]:
         port = part.port
         if isinstance(port, Input):
-            ends = recorder.links.get(port.name, ())
-            sampler = part.sampler or recorder.node.samplers.get(port.name, Sampler())
+            ends = recording.links.get(port.name, ())
+            sampler = part.sampler or recording.node.samplers.get(port.name, Sampler())
             return [
                 self._read(f"{name}_{number}" if port.many else name, end, part, sampler, part.use or port.use)
                 for number, end in enumerate(ends)
             ]
-        own = Endpoint(recorder.node.id, port.name, part.previous)
+        own = Endpoint(recording.node.id, port.name, part.previous)
         resource, _ = self.at_end[now(own)]
         return [self._read(name, own, part, part.sampler or Sampler(), "sample", self.version[resource])]
 
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
-        resource, at_end = self.at_end.get(self.behind(end)) or (str(self._maker(end)), 0)
+        resource, at_end = self.at_end.get(_behind(self.passed, end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port]
         if end.previous and isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
@@ -211,22 +238,22 @@ class Numbering:
         return info.desc if info.desc is not None else BufferDesc(info.bytes)
 
     def _write(
-        self, recorder: Recorder, request: Request, name: str, part: Part, value: Any
+        self, recording: Recording, request: StepRequest, name: str, part: Part, value: Any
     ) -> tuple[list[Read], Write]:
         port = part.port
-        assert isinstance(port, Made)  # `steps` has seen to that
-        end = Endpoint(recorder.node.id, port.name)
+        assert isinstance(port, WrittenPort)  # `steps` has seen to that
+        end = Endpoint(recording.node.id, port.name)
         if end not in self.at_end:
-            raise self._refused(recorder, request, "RG421", f"it writes '{port.name}', which has no layers")
+            raise self._refused(recording, request, "RG421", f"it writes '{port.name}', which has no layers")
         resource, _ = self.at_end[end]
         desc = self.resources[resource].desc
         old = self.version[resource]
         self.version[resource] = old + 1
-        continued = isinstance(port, InOut) and bool(recorder.links.get(port.name))
+        continued = isinstance(port, InOut) and bool(recording.links.get(port.name))
         parts, touched = self.written[resource], parts_written(request, part, desc)
         fresh = not continued and not any(overlap(one, other) for one in parts for other in touched)
         parts |= touched
-        clear = recorder.node.clears[port.name]
+        clear = recording.node.clears[port.name]
         if request.kind == "clear":
             load, clear = "clear", value
         elif not fresh:
@@ -243,7 +270,7 @@ class Numbering:
         read = []
         if load == "load" and (continued or old > 0):
             read = [Read(name, resource, old, "attach", mip=part.mip, layer=part.layer)]
-        if use == "buffer" and old == 0 and type(recorder.node.node).update is not Node.update:
+        if use == "buffer" and old == 0 and type(recording.node.node).update is not Node.update:
             read = [Read(name, resource, 0, "attach")]  # what `update` wrote before the frame must still be there
         if request.kind == "mipmaps":
             read = [Read(name, resource, old, "attach")]
@@ -252,46 +279,50 @@ class Numbering:
         write = Write(name, resource, old + 1, use, load, value, part.mip, part.layer)  # type: ignore[arg-type]
         return read, write
 
-    def _check_targets(self, recorder: Recorder, request: Request, writes: list[Write], reads: list[Read]) -> None:
+    def _check_targets(
+        self, recording: Recording, request: StepRequest, writes: list[Write], reads: list[Read]
+    ) -> None:
         """Refuse what no driver draws, while the author's call is known."""
         for write in writes:
             text = feedback(request, write, reads)
             if text is not None:
-                raise self._refused(recorder, request, "RG422", text)
+                raise self._refused(recording, request, "RG422", text)
         text = onto_nothing(request, writes)
         if text is not None:
-            raise self._refused(recorder, request, "RG429", text)
+            raise self._refused(recording, request, "RG429", text)
         if len(writes) > 1 or any(read.use == "depth_test" for read in reads):
             text = misfit(self.resources, writes, reads)
             if text is not None:
-                raise self._refused(recorder, request, "RG425", text)
+                raise self._refused(recording, request, "RG425", text)
         uses: tuple[Read | Write, ...] = (*writes, *reads)
         for touched in uses:
             if touched.use == "image":
                 text = no_image(request.kind, touched, self.resources.get(touched.resource))
                 if text is not None:
-                    raise self._refused(recorder, request, "RG426", text)
+                    raise self._refused(recording, request, "RG426", text)
 
-    def _refused(self, recorder: Recorder, request: Request, code: str, text: str) -> InputError:
+    def _refused(self, recording: Recording, request: StepRequest, code: str, text: str) -> InputError:
         """A request that cannot be carried out, at the line where the author made it."""
-        node = recorder.node
+        node = recording.node
         step = Step(node.id, 0, request.kind, type=node.type.name, place=node.place, caller=request.caller)
         return InputError(step.problem(code, text))
 
-    def _view(self, recorder: Recorder, request: Request, options: dict[str, Any]) -> tuple[str | None, int | None]:
+    def _view(
+        self, recording: Recording, request: StepRequest, options: dict[str, Any]
+    ) -> tuple[str | None, int | None]:
         port = options.pop("view", None)
         index = options.pop("view_index", 0)
         if request.kind not in ("geometry", "draw"):
             return None, None
         if isinstance(port, Views):
-            table = str(Endpoint(recorder.node.id, port.name))
+            table = str(Endpoint(recording.node.id, port.name))
             count = self.views[table].count
             if index is not None and index >= max(1, count):
                 text = f"view_index is {index}, but '{port.name}' has {count} views, counted from 0"
-                raise self._refused(recorder, request, "RG423", text)
+                raise self._refused(recording, request, "RG423", text)
             return table, index
         name = port.name if isinstance(port, Input) else "view"
-        ends = recorder.links.get(name, ())
+        ends = recording.links.get(name, ())
         if isinstance(port, Input) and port.kind != "view":
             return (self.graph.textures[now(ends[0])].view if ends else None) or CAMERA, index
         return (str(ends[0]) if ends else CAMERA), index
@@ -303,43 +334,43 @@ class Numbering:
                 self.resources[write.resource] = replace(resource, view=view)
 
     def _defines(
-        self, recorder: Recorder, reads: list[Read], functions: list[FunctionBinding]
+        self, recording: Recording, reads: list[Read], functions: list[FunctionBinding]
     ) -> Iterator[tuple[str, str]]:
-        node = recorder.node.node
+        node = recording.node.node
         read_names = {read.name for read in reads}
         for name, port in node.inputs().items():
             many = isinstance(port, Input) and port.many
-            called = isinstance(port, Input) and port.kind == "function" and functions and recorder.links.get(name)
+            called = isinstance(port, Input) and port.kind == "function" and functions and recording.links.get(name)
             if name in read_names or (many and f"{name}_0" in read_names) or called:
                 yield f"HAS_{name.upper()}", "1"
-        yield from define_parameters(node, recorder.node.choices)
+        yield from define_parameters(node, recording.node.choices)
 
     # Functions ------------------------------------------------------------------------------------------------------
 
-    def _own_function(self, recorder: Recorder, port: Function) -> list[FunctionBinding]:
-        return self._binding(recorder, port)
+    def _own_function(self, recording: Recording, port: Function) -> list[FunctionBinding]:
+        return self._binding(recording, port)
 
     def _function(self, end: Endpoint) -> list[FunctionBinding]:
-        recorder = self.recorders.get(end.node)
-        if recorder is None:
+        recording = self.recordings.get(end.node)
+        if recording is None:
             return []  # it has nothing to read: the consumer's function is then neutral
-        port = recorder.node.node.ports()[end.port]
+        port = recording.node.node.ports()[end.port]
         assert isinstance(port, Function)
-        return self._binding(recorder, port)
+        return self._binding(recording, port)
 
-    def _binding(self, recorder: Recorder, port: Function) -> list[FunctionBinding]:
-        node = recorder.node
+    def _binding(self, recording: Recording, port: Function) -> list[FunctionBinding]:
+        node = recording.node
         reads = []
         ports = node.node.ports()
         for name, read in zip(port.read_names, port.reads, strict=True):
             source = ports[name]
-            if isinstance(source, Input) and not recorder.links.get(name):
+            if isinstance(source, Input) and not recording.links.get(name):
                 continue
             if not isinstance(source, Input) and is_empty(self.graph.textures.get(Endpoint(node.id, name))):
                 continue
-            if isinstance(source, Internal) and not self.written[self._own(recorder, source)]:
+            if isinstance(source, Internal) and not self.written[self._own(recording, source)]:
                 continue
-            reads += self._reads(recorder, name, read if isinstance(read, Part) else Part(source))
+            reads += self._reads(recording, name, read if isinstance(read, Part) else Part(source))
         present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
         return [
             FunctionBinding(
@@ -354,13 +385,20 @@ class Numbering:
         ]
 
 
+def _behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
+    end = now(end)
+    while end in passed:
+        end = passed[end]
+    return end
+
+
 def _includes(choices: Mapping[str, Path]) -> tuple[tuple[str, Path], ...]:
     return tuple((name.upper(), file) for name, file in choices.items())
 
 
-def _passed(graph: Graph, recorders: Mapping[str, Recorder]) -> Iterator[tuple[Endpoint, Endpoint]]:
+def _passed(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple[Endpoint, Endpoint]]:
     """What an idle node would continue, by its port: without it the texture is what it was."""
     for node in graph.nodes:
-        for name, port in node.node.ports().items() if node.id not in recorders else ():
+        for name, port in node.node.ports().items() if node.id not in recordings else ():
             if isinstance(port, InOut) and node.inputs.get(name):
                 yield Endpoint(node.id, name), now(node.inputs[name][0])
