@@ -67,7 +67,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Form:
+class Matching:
     """A text that a regular expression matches from its first letter to its last."""
 
     pattern: str

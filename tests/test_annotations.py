@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import pytest
 
-from rendergraph.annotations import Form, Known, Length, Range, fits, mistakes_in, mistakes_of, right, words_for
+from rendergraph.annotations import Known, Length, Matching, Range, fits, mistakes_in, mistakes_of, right, words_for
 from rendergraph.errors import Misuse
 
 Count = Annotated[int, Range(0)]
@@ -36,7 +36,7 @@ FITS: list[tuple[Any, list[object], list[object]]] = [
     (Annotated[int, Range(1, 16)], [1, 16], [0, 17]),
     (Texel, [0, (1, 2), (0.5,) * 4], [(), (1,) * 5, "a"]),
     (Annotated[str, Known(("r8", "rg8"))], ["r8"], ["r9", 8]),
-    (Annotated[str, Form("[a-z]+")], ["ab"], ["ab\n", "A", 1]),
+    (Annotated[str, Matching("[a-z]+")], ["ab"], ["ab\n", "A", 1]),
     (Range, [Range()], [Range, 1]),
 ]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from rendergraph.annotations import Form, mistakes_of
+from rendergraph.annotations import Matching, mistakes_of
 from rendergraph.errors import Mistake
 from rendergraph.textures import Semantic
 
@@ -21,10 +21,12 @@ else:
     Metric = ImageLoader = MeshLoader = Callable
 
 Include: TypeAlias = Annotated[str | Path, "the name of an include"]
-Word: TypeAlias = Annotated[str, Form(r"[a-z][a-z0-9]*(_[a-z0-9]+)*"), "a word of small letters, digits and single '_'"]
+Word: TypeAlias = Annotated[
+    str, Matching(r"[a-z][a-z0-9]*(_[a-z0-9]+)*"), "a word of small letters, digits and single '_'"
+]
 """What becomes part of a macro."""
 Ending: TypeAlias = Annotated[
-    str, Form(r"\.[a-z0-9][a-z0-9_-]*"), "a file's ending, a dot and small letters as in '.stl'"
+    str, Matching(r"\.[a-z0-9][a-z0-9_-]*"), "a file's ending, a dot and small letters as in '.stl'"
 ]
 
 

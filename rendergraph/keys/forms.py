@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from rendergraph.annotations import Range
 from rendergraph.document import Value
 from rendergraph.errors import suggestion
 
@@ -41,44 +42,6 @@ class Form:
     moves: bool = False
 
 
-@dataclass(frozen=True)
-class _Limits:
-    """The limits of a number, as `number` takes them."""
-
-    low: float
-    high: float
-    above: bool = False
-    infinite: bool = False
-
-    def allow(self, data: object) -> bool:
-        """Whether it is a number within them."""
-        if isinstance(data, bool) or not isinstance(data, int | float):
-            return False
-        if self.infinite and data == math.inf:
-            return True
-        return self.low <= data <= self.high and not (self.above and data == self.low)
-
-    @property
-    def words(self) -> str:
-        """As they stand behind `a number`."""
-        low, high = f"{self.low:.12g}", f"{self.high:.12g}"
-        has_low, has_high = self.low > -MOST, self.high < MOST
-        if self.above:
-            return f" above {low}" + (f", up to {high}" if has_high else "")
-        if has_low:
-            return f" from {low} to {high}" if has_high else f" from {low} up"
-        return f" up to {high}" if has_high else ""
-
-    def schema(self, kind: str) -> Schema:
-        """A number of this JSON type within them."""
-        found: Schema = {"type": kind}
-        if self.low > -MOST:
-            found["exclusiveMinimum" if self.above else "minimum"] = self.low
-        if self.high < MOST and not self.infinite:
-            found["maximum"] = self.high
-        return found
-
-
 ANYTHING = Form("any value", "a value", lambda value: True, dict)
 FLAG = Form("true | false", "true or false", lambda value: isinstance(value.data, bool), lambda: {"type": "boolean"})
 TEXT = Form(
@@ -86,6 +49,9 @@ TEXT = Form(
     "text",
     lambda value: isinstance(value.data, str) and bool(value.data.strip()),
     lambda: {"type": "string", "pattern": "\\S"},
+)
+NUMBER = Form(
+    "number", "a number", lambda value: _is_number(value) and math.isfinite(value.plain()), lambda: {"type": "number"}
 )
 FILE = Form("path", "a file's name", TEXT.fits, TEXT.schema)
 
@@ -135,34 +101,30 @@ def number(low: float = -MOST, high: float = MOST, *, above: bool = False, infin
     """A number.
 
     Args:
-        low, high: limits, inclusive; infinite ones are none.
+        low, high: limits, inclusive; those that nobody reaches go without saying.
         above: `low` itself is not among them.
         infinite: `.inf` is, whatever `high` says.
     """
-    limits = _Limits(low, high, above, infinite)
+    limits = Range(low, high, above)
+
+    def fits(value: Value) -> bool:
+        return _is_number(value) and (limits.holds(value.data) or (infinite and value.data == math.inf))
+
+    words = f"a number{_words(limits)}"
     return Form(
-        "number",
-        f"a number{limits.words}",
-        lambda value: limits.allow(value.data),
-        lambda: limits.schema("number"),
-        lambda value: float(value.plain()),
-        moves=True,
+        "number", words, fits, lambda: _schema(limits, infinite), lambda value: float(value.plain()), moves=True
     )
 
 
-def whole(low: int, high: int = 2**63) -> Form:
+def whole(low: int, high: float = MOST) -> Form:
     """A whole number within limits, inclusive."""
-    limits = _Limits(low, high)
+    limits = Range(low, high)
     return Form(
         "whole number",
-        f"a whole number{limits.words}",
-        lambda value: isinstance(value.data, int) and limits.allow(value.data),
-        lambda: limits.schema("integer"),
+        f"a whole number{_words(limits)}",
+        lambda value: _is_number(value) and isinstance(value.data, int) and limits.holds(value.data),
+        lambda: {**_schema(limits), "type": "integer"},
     )
-
-
-NUMBER = number(-math.inf, math.inf)
-"""Any number."""
 
 
 # --- several values --------------------------------------------------------------------------------------------------
@@ -188,7 +150,7 @@ def row(*forms: Form) -> Form:
 
 def vector(count: int = 3, low: float = -MOST, high: float = MOST, *, above: bool = False) -> Form:
     """A list of as many numbers, each within limits as `number` has them."""
-    words = f"{count} numbers{_Limits(low, high, above).words}"
+    words = f"{count} numbers{_words(Range(low, high, above))}"
     return replace(row(*[number(low, high, above=above)] * count), shown=f"[{count} numbers]", wanted=words)
 
 
@@ -250,6 +212,26 @@ def either(*forms: Form, wanted: str = "", shown: str = "") -> Form:
         lambda value: next(filter(None, (form.hint(value) for form in forms)), ""),
         all(form.moves for form in forms),
     )
+
+
+def _is_number(value: Value) -> bool:
+    return isinstance(value.data, int | float) and not isinstance(value.data, bool)
+
+
+def _words(limits: Range) -> str:
+    """Those that do not go without saying."""
+    low, high = limits.low, limits.high
+    return str(replace(limits, low=None if low == -MOST else low, high=None if high == MOST else high))
+
+
+def _schema(limits: Range, infinite: bool = False) -> Schema:
+    """A number within limits; JSON has no infinity that would be one."""
+    found: Schema = {"type": "number"}
+    if limits.low is not None and limits.low > -MOST:
+        found["exclusiveMinimum" if limits.above else "minimum"] = limits.low
+    if limits.high is not None and limits.high < MOST and not infinite:
+        found["maximum"] = limits.high
+    return found
 
 
 def _parts(value: Value) -> Sequence[Value]:

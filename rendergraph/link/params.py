@@ -12,7 +12,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.declare import Extensions, Node, Parameter
 from rendergraph.declare.blame import happened
 from rendergraph.declare.mistakes import complaint
-from rendergraph.document import Value, kind_of, shown
+from rendergraph.document import Value, said, shown
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.glsl.source import needs, needs_place
 from rendergraph.keys import MOST_PROBLEMS
@@ -112,17 +112,8 @@ def _wrong(spec: NodeSpec, node_type: NodeType, name: str, details: list[Any]) -
     if value is None:  # a rule between parameters
         return spec.value.problem("RG104", f"node '{spec.id}': {message}", key=True)
     if detail["type"] in ("value_error", "assertion_error"):
-        text = f"'{spec.id}.{name}' is {_short(value)}, it {message}"
+        text = f"'{spec.id}.{name}' is {said(value)}, it {message}"
         return value.problem("RG104", text)
     parameter = node_type.cls.parameters()[name]
     hint = suggestion(value.data, parameter.words, most=0) if isinstance(value.data, str) else ""
-    return value.problem("RG104", f"'{spec.id}.{name}' takes {parameter.takes()}, this is {_short(value)}{hint}")
-
-
-def _short(value: Value) -> str:
-    data = value.data
-    if isinstance(data, str):
-        return f"'{shown(data, 40)}'"
-    if isinstance(data, list) and len(data) <= 8 and not any(isinstance(part.data, list | dict) for part in data):
-        return shown([part.data for part in data])
-    return kind_of(data) if isinstance(data, list | dict | bool) or data is None else shown(data)
+    return value.problem("RG104", f"'{spec.id}.{name}' takes {parameter.takes()}, this is {said(value)}{hint}")

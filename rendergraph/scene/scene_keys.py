@@ -77,7 +77,7 @@ MATERIAL = Table(
         Key("ambient", color(1), "ka of the empirical models; the base colour by default."),
         Key("diffuse", color(1), "kd of the empirical models; base (1 − metallic) by default."),
         Key("specular_phong", color(1), "ks of the empirical models; f0 by default."),
-        Key("shininess", number(0, 1e6), "Exponent n of `phong`; from the roughness by default."),
+        Key("shininess", number(0, 1_000_000), "Exponent n of `phong`; from the roughness by default."),
         *(Key(name, FILE, doc) for name, doc in TEXTURES),
     ),
 )
@@ -103,7 +103,7 @@ CAMERA = Table(
         Key("eye", vector(), "Where it is.", (0.0, 0.0, 5.0), "m"),
         Key("target", vector(), "What it looks at.", (0.0, 0.0, 0.0), "m"),
         Key("up", vector(), f"What is up in the picture; {_DIRECTION}.", (0.0, 1.0, 0.0)),
-        Key("fov_y_degrees", number(0.01, 179.0), "Vertical angle of a perspective camera.", 45.0, "°"),
+        Key("fov_y_degrees", number(0.01, 179), "Vertical angle of a perspective camera.", 45.0, "°"),
         Key("height", LENGTH, "Height of what an orthographic camera sees; makes it orthographic.", None, "m"),
         Key("frustum", vector(4), "Left, right, bottom, top at the near plane; makes it off-centre.", None, "m"),
         Key("near", LENGTH, "Near plane.", 0.05, "m"),
