@@ -94,7 +94,7 @@ def fits(value: object, annotation: Any) -> bool:
     if origin is tuple and Ellipsis not in arguments:
         return isinstance(value, tuple) and len(value) == len(arguments) and all(map(fits, value, arguments))
     if origin in (tuple, Sequence):
-        return isinstance(value, tuple | list) and all(fits(entry, arguments[0]) for entry in value)
+        return isinstance(value, tuple | list | range) and all(fits(entry, arguments[0]) for entry in value)
     if origin is Mapping:
         key, entry = arguments
         return isinstance(value, Mapping) and all(fits(k, key) and fits(v, entry) for k, v in value.items())

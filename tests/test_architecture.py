@@ -42,3 +42,43 @@ def test_everything_before_compile_works_without_gl(verb: str, tmp_path: Path) -
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+_READS = {"startswith", "endswith", "removeprefix", "removesuffix", "partition", "rpartition", "find", "index", "split"}
+_SEARCHES = {"match", "search", "fullmatch", "findall", "finditer", "sub"}
+
+
+def _is_message(node: ast.expr) -> bool:
+    """`problem.text`, `mistake.text`, `detail["msg"]`, `str(problem)`: what is said, where the value beside it knows."""
+    if isinstance(node, ast.Call):
+        named = isinstance(node.func, ast.Name) and node.func.id == "str" and bool(node.args)
+        return named and isinstance(node.args[0], ast.Name) and node.args[0].id in ("problem", "mistake")
+    if isinstance(node, ast.Subscript):
+        return isinstance(node.slice, ast.Constant) and node.slice.value == "msg"
+    holder = node.value if isinstance(node, ast.Attribute) and node.attr in ("text", "message") else None
+    return isinstance(holder, ast.Name) and holder.id in ("problem", "mistake", "error")
+
+
+def messages_read(source: str) -> list[int]:
+    """The lines of a module that look for something in a message."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Compare) and any(isinstance(way, ast.In | ast.NotIn) for way in node.ops):
+            looked = node.comparators
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _READS:
+            looked = [node.func.value]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _SEARCHES:
+            looked = list(node.args)
+        elif isinstance(node, ast.Subscript):
+            looked = [node.value]
+        else:
+            continue
+        found += [node.lineno for one in looked if _is_message(one)]
+    return found
+
+
+def test_no_code_reads_a_message() -> None:
+    """Whoever wants to know what a mistake is about asks its subject, its kind, its place or its code."""
+    assert messages_read('if "x" in problem.text: pass\nre.match("a", mistake.text)\nstr(problem).split()') == [1, 2, 3]
+    files = {str(file): messages_read(file.read_text()) for file in (ROOT / "rendergraph").rglob("*.py")}
+    assert {file: lines for file, lines in files.items() if lines} == {}

@@ -135,7 +135,10 @@ class Trial:
         self._variant = Variant("")
         if left and not any(problem.severity == "error" for problem in self.problems):
             every = ", ".join(f"{count} {kind.lower()}{'s' if count > 1 else ''}" for kind, count in left.items())
-            self.say(Problem("RG456", f"the node leaves GL objects behind: {every}", Place(self.shown)), always=True)
+            self.say(
+                Problem("RG456", f"the node leaves GL objects behind: {every}", Place(shown_file(self.type.file))),
+                always=True,
+            )
         if self.tried and not any(problem.severity == "error" for problem in self.problems):
             for name in self.type.cls.outputs().keys() - self.written:
                 text = f"output '{name}' is written in no variant; write it in `record`, or take it away"
@@ -146,11 +149,6 @@ class Trial:
         """Keep a problem of the variant that runs."""
         names = self.problems.setdefault(problem, [])
         names += self.tried if always else [self._variant.name or "default"]
-
-    @property
-    def shown(self) -> str:
-        """The node's file as messages print it."""
-        return shown_file(self.type.file)
 
     def port_place(self, name: str) -> Place:
         """Where a port or parameter is declared."""

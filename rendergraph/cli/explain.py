@@ -119,13 +119,13 @@ def table_of(kind: str) -> Table:
 
 def file_keys(kind: str) -> list[dict[str, Any]]:
     """Every key of a kind of file, section by section."""
-    from rendergraph.keys import shown
+    from rendergraph.keys import briefly
 
     return [
         {
             "section": section,
             "key": key.name,
-            "value": shown(key.takes),
+            "value": briefly(key.takes),
             "default": list(key.default) if isinstance(key.default, tuple) else key.default,
             "unit": key.unit,
             "required": key.required,

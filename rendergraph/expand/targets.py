@@ -52,7 +52,7 @@ def target_size(
     return (1, 1), 1
 
 
-def misfit(resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]) -> str | None:
+def ill_matched(resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]) -> str | None:
     """Why the attachments of one draw do not go together: size, samples, layers, or two of depth."""
     attached: list[Read | Write] = [write for write in writes if write.use in ("color", "depth")]
     attached += [read for read in reads if read.use == "depth_test"]

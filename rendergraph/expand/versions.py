@@ -12,7 +12,15 @@ from rendergraph.errors import InputError
 from rendergraph.expand.model import CAMERA, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recording, is_kept, now
-from rendergraph.expand.targets import feedback, misfit, no_image, onto_nothing, overlap, parts_written, target_size
+from rendergraph.expand.targets import (
+    feedback,
+    ill_matched,
+    no_image,
+    onto_nothing,
+    overlap,
+    parts_written,
+    target_size,
+)
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
@@ -291,7 +299,7 @@ class _Versions:
         if text is not None:
             raise self._refused(recording, request, "RG429", text)
         if len(writes) > 1 or any(read.use == "depth_test" for read in reads):
-            text = misfit(self.resources, writes, reads)
+            text = ill_matched(self.resources, writes, reads)
             if text is not None:
                 raise self._refused(recording, request, "RG425", text)
         uses: tuple[Read | Write, ...] = (*writes, *reads)

@@ -15,10 +15,10 @@ from rendergraph.keys.tables import (
     Table,
     Takes,
     as_markdown,
+    briefly,
     file_schema,
     plain,
     schema,
-    shown,
 )
 from rendergraph.keys.walk import MOST_PROBLEMS, Codes, Walk
 
@@ -35,8 +35,8 @@ __all__ = [
     "Takes",
     "Walk",
     "as_markdown",
+    "briefly",
     "file_schema",
     "plain",
     "schema",
-    "shown",
 ]

@@ -143,7 +143,7 @@ Takes: TypeAlias = "Form | Table | Names | Later"
 """What a key takes: a value, or a mapping."""
 
 
-def shown(takes: Takes) -> str:
+def briefly(takes: Takes) -> str:
     """What a key takes, in a word or two for a table."""
     if isinstance(takes, Later):
         return takes.form.shown

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, get_args, overload
+from typing import Annotated, Any, overload
 
 from rendergraph import textures
+from rendergraph.annotations import fits, quoted, words_for
 from rendergraph.declare import (
     Facts,
     Function,
@@ -29,9 +30,10 @@ from rendergraph.declare import (
 )
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
-from rendergraph.errors import Mistake, Problem, SceneError, node_named
+from rendergraph.errors import Mistake, Place, Problem, SceneError, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Draft
+from rendergraph.ports import Count
 from rendergraph.textures import (
     FORMATS,
     MOST_SIDE,
@@ -55,6 +57,7 @@ CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
 DEFAULT_FORMAT = "rgba16f"
 _SAMPLES = (1, 2, 4, 8, 16)
+_LIGHTS = Annotated[Sequence[Count], "the indices of lights"]
 
 
 class _Unknown(Exception):
@@ -146,10 +149,10 @@ class Infer:
         if end not in self._samplers:
             port = self.nodes[end.node].inputs[end.port]
             assert isinstance(port, Input)
-            known = get_args(Filter)
-            smooth = self._checked(
-                end, "filter", port.filter, known.__contains__, f"one of {', '.join(known)}", "nearest"
-            )
+            try:
+                smooth = self._fitting(end, "filter", port.filter, Filter)
+            except _Unknown:
+                smooth = "nearest"
             self._samplers[end] = Sampler(smooth, port.wrap, port.compare, port.anisotropy)
         return self._samplers[end]
 
@@ -157,25 +160,29 @@ class Infer:
         """What a texture or buffer first holds; None for whatever is there, and where its rule fails, which is said."""
         port = self.nodes[end.node].ports[end.port]
         assert isinstance(port, WrittenPort)
-        value: Texel | None = self._checked(end, "clear", port.clear, _is_texel, "a number, up to four, or None", None)
+        try:
+            value: Texel | None = self._fitting(end, "clear", port.clear, Texel | None)
+        except _Unknown:
+            return None
         return value
 
-    def _checked(
-        self, end: Endpoint, what: str, rule: Any, fits: Callable[[Any], bool], wanted: str, otherwise: Any
-    ) -> Any:
-        try:
-            value = self._ruled(end, what, rule)
-        except _Unknown:
-            return otherwise
-        if fits(value):
-            return value
-        self._say(end, "RG209", f"the rule for its {what} gives {value!r}, not {wanted}")
-        return otherwise
+    def _fitting(self, end: Endpoint, what: str, rule: Any, annotation: Any) -> Any:
+        """A constant, or what the author's function gives where that is what an annotation says.
 
-    def _say(self, end: Endpoint, code: str, text: str) -> None:
+        Raises:
+            _Unknown: it is not, which is said.
+        """
+        value = self._ruled(end, what, rule)
+        if not fits(value, annotation):
+            text = f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}"
+            self._say(end, "RG209", text)
+            raise _Unknown
+        return value
+
+    def _say(self, end: Endpoint, code: str, text: str, place: Place | None = None) -> None:
         draft = self.nodes[end.node]
         problem = draft.spec.value.problem(code, f"'{end}' ({draft.type.name}): {text}", key=True)
-        self.problems.append(replace(problem, mistake=Mistake(end.port, problem.text)))
+        self.problems.append(replace(problem, mistake=Mistake(end.port, problem.text, place=place)))
 
     def _evaluate(self, end: Endpoint) -> TextureInfo | None:
         draft = self.nodes[end.node]
@@ -185,10 +192,7 @@ class Infer:
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):
-            count = self._ruled(end, "count", port.count)
-            if not isinstance(count, int) or count < 0:
-                self._say(end, "RG209", f"the rule for its count gives {shown(count, 60)}, not a whole number from 0")
-                return None
+            count = self._fitting(end, "count", port.count, Count)
             return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port), views=count)
         if isinstance(port, InOut) and draft.links.get(port.name):
             return self.info(draft.links[port.name][0].source)
@@ -225,7 +229,8 @@ class Infer:
             elif isinstance(error, SceneError):
                 self._refused(draft, error)
             else:
-                self._say(end, "RG209", f"the rule for its {what} fails: {happened(error, draft.type.cls)}")
+                said = happened(error, draft.type.cls)
+                self._say(end, "RG209", f"the rule for its {what} fails: {said}", said.place)
             raise _Unknown from None
 
     def _refused(self, draft: Draft, error: SceneError) -> None:
@@ -318,13 +323,7 @@ class Infer:
     # Views and lights -------------------------------------------------------------------------------------------------
 
     def _view_lights(self, end: Endpoint, port: Views) -> tuple[int, ...]:
-        return self._indices(end, self._ruled(end, "lights", port.lights)) if port.lights else ()
-
-    def _indices(self, end: Endpoint, given: object) -> tuple[int, ...]:
-        if not isinstance(given, list | tuple | range) or not all(isinstance(light, int) for light in given):
-            self._say(end, "RG209", f"the rule for its lights gives {given!r}, not the indices of lights")
-            raise _Unknown
-        return tuple(given)
+        return tuple(self._fitting(end, "lights", port.lights, _LIGHTS)) if port.lights else ()
 
     def _view(
         self, end: Endpoint, draft: Draft, port: WrittenPort, semantic: Semantic
@@ -341,7 +340,7 @@ class Infer:
         elif isinstance(drawn := draft.ports.get("view"), Input) and drawn.kind == "view" and semantic.name in _DRAWN:
             view, lights = self._carried(draft, drawn)
         if callable(port.lights):
-            lights = self._indices(end, self._ruled(end, "lights", port.lights))
+            lights = tuple(self._fitting(end, "lights", port.lights, _LIGHTS))
         elif port.lights:
             table: Port | None = draft.ports.get(port.lights)
             if isinstance(table, Views):
@@ -356,11 +355,6 @@ class Infer:
         if source is not None:
             return source.view, source.lights
         return (CAMERA if port.kind == "view" else None), ()
-
-
-def _is_texel(value: object) -> bool:
-    numbers = value if isinstance(value, tuple) else () if value is None else (value,)
-    return len(numbers) <= 4 and all(isinstance(number, int | float) for number in numbers)
 
 
 def made_ports(draft: Draft) -> Iterator[Endpoint]:

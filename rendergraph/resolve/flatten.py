@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rendergraph.document import Value, shown
@@ -60,7 +61,7 @@ class Flattener:
         return tree.with_data(top)
 
     def _warn(self, problem: Problem) -> None:
-        self.files.notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
+        self.files.notes.append(replace(problem, severity="warning"))
 
     def _node(
         self,

@@ -9,6 +9,7 @@ import os
 import re
 import shlex
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
@@ -121,7 +122,7 @@ class Plugins:
             named = shlex.quote(shown_file(folder))
             self.unrun |= dict.fromkeys((file.stem for file in strange), named)
             problem = value.problem("RG152", words + f"where you trust it, say --plugin {named}")
-            self.notes.append(Problem(problem.code, problem.text, problem.place, problem.line_text, "warning"))
+            self.notes.append(replace(problem, severity="warning"))
 
 
 def is_shader(text: object) -> bool:
