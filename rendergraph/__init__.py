@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rendergraph.errors import RendergraphError
-    from rendergraph.session import Frame, Pipeline, Session, load
+    from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load
 
-__all__ = ["Frame", "Pipeline", "RendergraphError", "Session", "load"]
+__all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load"]
 __version__ = "0.1.0"
 
 

@@ -41,7 +41,7 @@ FIRST = (
 
 def pages() -> Iterator[tuple[str, str]]:
     """A page for users, and two for authors of nodes."""
-    names = [("load", rendergraph), ("Pipeline", rendergraph), ("Session", rendergraph), ("Frame", rendergraph)]
+    names = [(name, rendergraph) for name in ("load", "Pipeline", "Selection", "RenderOptions", "Session", "Frame")]
     errors = ("RendergraphError", "InputError", "RenderError", "DeviceError", "UsageError", "Problem", "Place")
     names += [(name, rendergraph.errors) for name in errors]
     yield (
@@ -49,7 +49,7 @@ def pages() -> Iterator[tuple[str, str]]:
         page(
             "Python",
             "The same words as on the command line: load, set, render. `import rendergraph as rg` gives the first "
-            "four; the exceptions are in `rendergraph.errors`.",
+            "six; the exceptions are in `rendergraph.errors`.",
             *(_entry(name, getattr(module, name)) for name, module in names),
         ),
     )

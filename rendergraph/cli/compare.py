@@ -26,14 +26,14 @@ SOFTWARE = "times on a software rasteriser: no measure of a GPU"
 
 
 @dataclass(frozen=True)
-class Limit:
+class Threshold:
     """A metric and what it may not exceed."""
 
     metric: str
     most: float
 
 
-def _limit(text: str) -> Limit:
+def _threshold(text: str) -> Threshold:
     metric, equals, value = text.partition("=")
     try:
         most = float(value)
@@ -43,23 +43,23 @@ def _limit(text: str) -> Limit:
         raise ValueError(f"'{text}' is not METRIC=NUMBER, as in flip=0.02")
     if metric in ("psnr", "ssim"):
         raise ValueError(f"{metric} falls as errors grow; limit {', '.join(_LIMITED)}")
-    return Limit(metric, most)
+    return Threshold(metric, most)
 
 
-def check_limits(limits: Sequence[Limit], extensions: Extensions) -> None:
-    """Say that a limit is of no metric; plugins are asked where we do not know it.
+def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) -> None:
+    """Say that a threshold is of no metric; plugins are asked where we do not know it.
 
     Raises:
         UsageError: nobody computes it.
     """
-    for metric in dict.fromkeys(limit.metric for limit in limits if limit.metric not in _LIMITED):
+    for metric in dict.fromkeys(one.metric for one in thresholds if one.metric not in _LIMITED):
         known = [*_LIMITED, *(added.name for added in extensions.metrics())]
         if metric not in known:
             text = f"--fail-above: there is no metric '{metric}'{suggestion(metric, known)}"
             raise UsageError([Problem("RG500", text), *extensions.problems])
 
 
-LIMIT = options.Parsed("METRIC=NUMBER", _limit)
+THRESHOLD = options.Parsed("METRIC=NUMBER", _threshold)
 reference_option = click.option(
     "--reference", metavar="FILE|PIPELINE", help="Measure against this picture or pipeline; the first by default."
 )
@@ -83,7 +83,7 @@ at_option = click.option(
     "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a report, HTML."
 )
 @click.option(
-    "--fail-above", "thresholds", multiple=True, type=LIMIT, help="Exit 4 where a metric is above: flip=0.02."
+    "--fail-above", "thresholds", multiple=True, type=THRESHOLD, help="Exit 4 where a metric is above: flip=0.02."
 )
 @options.json_option
 @options.device_option
@@ -93,7 +93,7 @@ def command(
     frames: int,
     frame: int,
     output: Path | None,
-    thresholds: tuple[Limit, ...],
+    thresholds: tuple[Threshold, ...],
     as_json: bool,
     device: int | None,
     select: options.Select,
@@ -118,7 +118,7 @@ def command(
     if output is not None:
         check_page(output)
     loaded = [_load(name, pipelines, select) for name in pipelines]
-    check_limits(thresholds, loaded[0].link().catalog.extensions)
+    check_thresholds(thresholds, loaded[0].link().catalog.extensions)
     bar = Bar("steps")
     found = compare(
         loaded, load_reference(reference, select), frames=frames, frame=frame, device=device, progress=bar.show
@@ -199,16 +199,16 @@ def check_page(output: Path) -> None:
     check_target(output)
 
 
-def exceeded(results: Sequence[Result], limits: Sequence[Limit]) -> list[str]:
-    """What is above its limit, in words; a figure that is no number is above every limit."""
+def exceeded(results: Sequence[Result], thresholds: Sequence[Threshold]) -> list[str]:
+    """What is above its threshold, in words; a figure that is no number is above every one."""
     found = []
     for result in results:
         values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse, **result.metrics.plugins}
-        for limit in limits:
-            value = values.get(limit.metric)
-            if value is None or not value <= limit.most:
+        for threshold in thresholds:
+            value = values.get(threshold.metric)
+            if value is None or not value <= threshold.most:
                 shown = "unknown" if value is None else f"{value:.6g}"
-                found.append(f"{result.name}: {limit.metric} is {shown}, above {limit.most:g}")
+                found.append(f"{result.name}: {threshold.metric} is {shown}, above {threshold.most:g}")
     return found
 
 

@@ -44,7 +44,9 @@ AXIS = options.Parsed("PATH=V,V,…", _axis)
 @options.selection_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), help="Measured frames.  [default: 5]")
 @shared.at_option
-@click.option("--fail-above", "thresholds", multiple=True, type=shared.LIMIT, help="Exit 4 where a metric is above.")
+@click.option(
+    "--fail-above", "thresholds", multiple=True, type=shared.THRESHOLD, help="Exit 4 where a metric is above."
+)
 @options.json_option
 @options.device_option
 def command(
@@ -55,7 +57,7 @@ def command(
     reference: str | None,
     frames: int | None,
     frame: int,
-    thresholds: tuple[shared.Limit, ...],
+    thresholds: tuple[shared.Threshold, ...],
     as_json: bool,
     device: int | None,
     select: options.Select,
@@ -91,7 +93,7 @@ def command(
     bar = Bar("runs")
     base = Pipeline(select(pipeline))
     extensions = base.resolve().catalog.extensions
-    shared.check_limits(thresholds, extensions)
+    shared.check_thresholds(thresholds, extensions)
     again = shared.typed([*words, "-o", str(out)])
     against = shared.load_reference(reference, select)
     try:

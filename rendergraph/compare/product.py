@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph import metrics
 from rendergraph.compare.axes import Axis, check_axes, combinations, pipelines, run_name
+from rendergraph.compare.batches import MOST_BYTES, Drawn, batches, draw, measure
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import Progress, light_error
@@ -17,7 +18,6 @@ from rendergraph.compare.reference import compared_output, on_one_stage, read_pi
 from rendergraph.compare.runs import NO_TIMES, RUN, Run, found_again, keep, key_of, restored, settle
 from rendergraph.compare.sources import file_digest
 from rendergraph.compare.study import begin, open_folder, study_of
-from rendergraph.compare.together import MOST_BYTES, Drawn, batches, draw, measure
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result
 from rendergraph.metrics import Encoding
 from rendergraph.session import stages

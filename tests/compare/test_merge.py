@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
+from rendergraph.compare.batches import batches, draw
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.merge import merge
-from rendergraph.compare.together import batches, draw
 from rendergraph.link import Graph
 from rendergraph.resources import shipped_pipelines
 

@@ -21,11 +21,11 @@ from rendergraph.compare.axes import (
     read_sweep,
     run_name,
 )
+from rendergraph.compare.batches import batches
 from rendergraph.compare.ledger import Ledger, checksum
 from rendergraph.compare.product import pareto, sweep
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.study import RESULTS, kept_runs
-from rendergraph.compare.together import batches
 from rendergraph.errors import InputError
 from rendergraph.images import read, write
 
