@@ -243,12 +243,12 @@ def test_a_plan_tells_what_is_continued_from_what_is_read_and_says_what_a_copy_i
         "nodes:\n  a: {type: wrong}\n  g: {type: glow, inputs: {radiance: a.color}}\n"
         "outputs: {before: a.color, image: g.radiance}\n"
     )
-    rows = plan_text(pipeline.plan(None)).split("lifetimes")[0].splitlines()[2:]
+    rows = plan_text(pipeline.plan()).split("lifetimes")[0].splitlines()[2:]
     cells = [re.split(r"  +", row.strip())[1:4] for row in rows if row.strip()]
     assert cells == [
         ["a", "-", "a.color"],
         ["copy of a.color, kept for output 'before'", "a.color", "a.color kept"],
         ["g", "-", "a.color (continued)"],
     ]
-    rows = plan_text(pipeline.plan([], ["a.color", "g.radiance"])).splitlines()
+    rows = plan_text(pipeline.plan(outputs=[], taps=["a.color", "g.radiance"])).splitlines()
     assert any("copy of a.color, kept for tap 'a.color'" in row for row in rows)

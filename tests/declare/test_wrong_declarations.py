@@ -123,6 +123,6 @@ def test_a_class_that_python_refuses(author: Any, body: str) -> None:
 
 def test_a_port_may_have_a_type(author: Any) -> None:
     author.node('color: Output = Output(Radiance, doc="Colour.")\ngain: float = param(default=1.0, doc="Gain.")')
-    graph = author.pipeline().check()
+    graph = author.pipeline().link().graph
     assert list(type(graph["a"].node).ports()) == ["color"]
     assert list(type(graph["a"].node).parameters()) == ["gain"]
