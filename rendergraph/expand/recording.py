@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port
 from rendergraph.declare.blame import happened
@@ -32,14 +31,14 @@ class Recording:
         self.requests: list[StepRequest] = []
         self.unfilled: list[str] = []
         self.links = {
-            name: tuple(end for end in ends if not is_empty(graph.textures.get(now(end))))
+            name: tuple(end for end in ends if not is_empty(graph.textures.get(end.now)))
             for name, ends in node.inputs.items()
         }
         self.facts = Facts(
             viewport=graph.size,
             lights=graph.lights,
             inputs={
-                name: tuple(graph.textures[now(end)] for end in ends if now(end) in graph.textures)
+                name: tuple(graph.textures[end.now] for end in ends if end.now in graph.textures)
                 for name, ends in self.links.items()
                 if ends
             },
@@ -112,11 +111,6 @@ class Recording:
 def is_kept(port: Port) -> bool:
     """Whether what a port makes outlives the frame."""
     return isinstance(port, Output | Internal) and port.kept
-
-
-def now(end: Endpoint) -> Endpoint:
-    """The port itself, also where last frame's value is meant."""
-    return replace(end, previous=False) if end.previous else end
 
 
 def record_all(
@@ -215,7 +209,7 @@ def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
     for name, port in node.node.inputs().items():
         ends = node.inputs.get(name, ())
         required = isinstance(port, Input) and not port.optional
-        if required and ends and all(is_empty(graph.textures.get(now(end))) for end in ends):
+        if required and ends and all(is_empty(graph.textures.get(end.now)) for end in ends):
             return f"{ends[0]} has no layers: there is nothing to read"
     return None
 

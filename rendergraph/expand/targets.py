@@ -56,7 +56,7 @@ def ill_matched(resources: Mapping[str, Resource], writes: Sequence[Write], read
     """Why the attachments of one draw do not go together: size, samples, layers, or two of depth."""
     attached: list[Read | Write] = [write for write in writes if write.use in ("color", "depth")]
     attached += [read for read in reads if read.use == "depth_test"]
-    first: tuple[str, Facts] | None = None
+    first: tuple[str, _Extent] | None = None
     depths = []
     for touched in attached:
         desc = resources[touched.resource].desc
@@ -64,12 +64,12 @@ def ill_matched(resources: Mapping[str, Resource], writes: Sequence[Write], read
             continue
         depths += [touched.resource] if FORMATS[desc.format].is_depth else []
         layered = touched.layer is None and desc.kind != "texture2d"
-        facts = (*desc.mip_size(touched.mip or 0), desc.samples, desc.layers if layered else 0)
+        extent = (*desc.mip_size(touched.mip or 0), desc.samples, desc.layers if layered else 0)
         name = touched.resource + ("" if touched.mip is None else f" mip {touched.mip}")
         if first is None:
-            first = name, facts
-        elif facts != first[1]:
-            return f"'{first[0]}' is {_said(first[1], facts)}, but '{name}' is {_said(facts, first[1])}; " + (
+            first = name, extent
+        elif extent != first[1]:
+            return f"'{first[0]}' is {_said(first[1], extent)}, but '{name}' is {_said(extent, first[1])}; " + (
                 "the targets of one step are alike in size, samples and layers"
             )
     depths = list(dict.fromkeys(depths))
@@ -110,10 +110,10 @@ def no_image(kind: str, touched: Read | Write, resource: Resource | None) -> str
     return f"a compute step cannot {word} '{touched.resource}', which has {what}"
 
 
-Facts = tuple[int, int, int, int]
+_Extent = tuple[int, int, int, int]  # width, height, samples, layers
 
 
-def _said(own: Facts, other: Facts) -> str:
+def _said(own: _Extent, other: _Extent) -> str:
     """What differs, in words."""
     words = []
     if own[:2] != other[:2]:

@@ -11,7 +11,7 @@ from rendergraph.declare import Function, History, InOut, Input, Internal, Node,
 from rendergraph.errors import InputError
 from rendergraph.expand.model import CAMERA, ViewTable, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import Recording, is_kept, now
+from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import (
     feedback,
     ill_matched,
@@ -109,7 +109,7 @@ class _Versions:
             self.idle[recording.node.id] = "it recorded no step"
         for port in recording.node.node.ports().values():
             if isinstance(port, WrittenPort):
-                self._finish(recording, port)
+                self._note_end(recording, port)
 
     def _declare(self, recording: Recording) -> None:
         """Give every texture the node may write a resource; an `InOut` continues somebody's."""
@@ -139,15 +139,15 @@ class _Versions:
 
     def _maker(self, end: Endpoint) -> Endpoint:
         """The port that first made what a port carries, however often it is continued between."""
-        end = now(end)
+        end = end.now
         while True:
             node = self.graph[end.node]
             continued = isinstance(node.node.ports()[end.port], InOut) and node.inputs.get(end.port)
             if not continued:
                 return end
-            end = now(continued[0])
+            end = continued[0].now
 
-    def _finish(self, recording: Recording, port: WrittenPort) -> None:
+    def _note_end(self, recording: Recording, port: WrittenPort) -> None:
         end = Endpoint(recording.node.id, port.name)
         if end in self.at_end:
             resource, _ = self.at_end[end]
@@ -222,7 +222,7 @@ class _Versions:
                 for number, end in enumerate(ends)
             ]
         own = Endpoint(recording.node.id, port.name, part.previous)
-        resource, _ = self.at_end[now(own)]
+        resource, _ = self.at_end[own.now]
         return [self._read(name, own, part, part.sampler or Sampler(), "sample", self.version[resource])]
 
     def _read(
@@ -242,7 +242,7 @@ class _Versions:
     def _desc_of(self, end: Endpoint, resource: str) -> TextureDesc | BufferDesc:
         if resource in self.resources:
             return self.resources[resource].desc
-        info = self.graph.textures[now(end)]  # last frame's value of a node further down
+        info = self.graph.textures[end.now]  # last frame's value of a node further down
         return info.desc if info.desc is not None else BufferDesc(info.bytes)
 
     def _write(
@@ -332,7 +332,7 @@ class _Versions:
         name = port.name if isinstance(port, Input) else "view"
         ends = recording.links.get(name, ())
         if isinstance(port, Input) and port.kind != "view":
-            return (self.graph.textures[now(ends[0])].view if ends else None) or CAMERA, index
+            return (self.graph.textures[ends[0].now].view if ends else None) or CAMERA, index
         return (str(ends[0]) if ends else CAMERA), index
 
     def _carry_view(self, writes: Iterable[Write], view: str | None) -> None:
@@ -394,7 +394,7 @@ class _Versions:
 
 
 def _behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
-    end = now(end)
+    end = end.now
     while end in passed:
         end = passed[end]
     return end
@@ -409,4 +409,4 @@ def _passed(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple
     for node in graph.nodes:
         for name, port in node.node.ports().items() if node.id not in recordings else ():
             if isinstance(port, InOut) and node.inputs.get(name):
-                yield Endpoint(node.id, name), now(node.inputs[name][0])
+                yield Endpoint(node.id, name), node.inputs[name][0].now

@@ -120,7 +120,7 @@ class _Linker:
             self._crossings(nodes, infer)
             textures = self._textures(nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
-            self._shown(nodes, outputs, infer)
+            self._check_outputs(nodes, outputs, infer)
         members = {name: _member(draft, infer) for name, draft in nodes.items()}
         self.problems += infer.problems if not knots else ()
         problems = [*self.spec.problems, *self.problems]
@@ -323,7 +323,7 @@ class _Linker:
                 return crossing.given.problem("RG110", text)
         return None
 
-    def _shown(self, nodes: Mapping[str, Draft], outputs: Mapping[str, Link], infer: Infer) -> None:
+    def _check_outputs(self, nodes: Mapping[str, Draft], outputs: Mapping[str, Link], infer: Infer) -> None:
         for name, found in outputs.items():
             info = infer.info(found.source)
             if found.source.previous:

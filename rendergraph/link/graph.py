@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from heapq import heappop, heappush
 from pathlib import Path
@@ -28,6 +28,11 @@ class Endpoint:
 
     def __str__(self) -> str:
         return f"{self.node}.{self.port}" + ("@previous" if self.previous else "")
+
+    @property
+    def now(self) -> Endpoint:
+        """The port itself, also where last frame's value is meant."""
+        return replace(self, previous=False) if self.previous else self
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ class Infer:
     ) -> None:
         self.nodes = nodes
         self.viewport = viewport
-        self.used = {replace(end, previous=False) for end in used}
+        self.used = {end.now for end in used}
         self.lights = tuple(lights)
         self.problems: list[Problem] = []
         self.infos: dict[Endpoint, TextureInfo | None] = {}
@@ -123,7 +123,7 @@ class Infer:
 
     def info(self, end: Endpoint) -> TextureInfo | None:
         """What a port has turned out to be, None where that cannot be said."""
-        end = replace(end, previous=False) if end.previous else end
+        end = end.now
         if end not in self.infos:
             if end in self._open:
                 self._say(end, "RG213", "its size or format depends on itself through '@previous'")

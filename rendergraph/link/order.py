@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 
 from rendergraph.declare import InOut
@@ -108,7 +107,7 @@ def _readers(nodes: Mapping[str, Draft], writers: Mapping[Endpoint, tuple[Draft,
     for draft in nodes.values():
         for name, links in draft.links.items():
             for link in links:
-                now = replace(link.source, previous=False)
+                now = link.source.now
                 if now not in writers:
                     continue
                 writer, written = writers[now]
