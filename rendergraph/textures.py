@@ -115,6 +115,7 @@ ShadowMap = Semantic("shadow_map", "Window depth seen from lights, one layer a v
 Visibility = Semantic("visibility", "1 lit, 0 shadowed, one layer a shadowed light.")
 Occlusion = Semantic("occlusion", "Ambient visibility: 1 open, 0 closed.")
 Luminance = Semantic("luminance", "Scene luminance, relative to white at 1.")
+ExposureGain = Semantic("exposure_gain", "Factor that brings scene radiance to the display's range; one texel.")
 IrradianceSH = Semantic("irradiance_sh", "L2 spherical harmonics of the environment's radiance.")
 Any = Semantic("any", "Whatever is connected.")
 View = Semantic("view", "Matrices and size that geometry is drawn with.")
@@ -132,6 +133,7 @@ SEMANTICS: tuple[Semantic, ...] = (
     Visibility,
     Occlusion,
     Luminance,
+    ExposureGain,
     IrradianceSH,
     Any,
     View,

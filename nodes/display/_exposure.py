@@ -1,12 +1,10 @@
-"""What this family shares: the semantic of an exposure, and the size of mip chains that begin at half size."""
+"""The size of mip chains that begin at half the picture's."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from rendergraph.api import Facts, Semantic
-
-ExposureGain = Semantic("exposure_gain", "Factor that brings scene radiance to the display's range; one texel.")
+from rendergraph.api import Facts
 
 
 def half_of_radiance(_node: Any, facts: Facts) -> tuple[int, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rendergraph.api import (
     ADD,
+    ExposureGain,
     Facts,
     InOut,
     Input,
@@ -17,7 +18,7 @@ from rendergraph.api import (
     structural,
 )
 
-from ._exposure import ExposureGain, half_of_radiance
+from ._exposure import half_of_radiance
 
 
 class Bloom(Node):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from rendergraph.api import Input, Internal, Luminance, Node, Output, Radiance, Steps, define, param
+from rendergraph.api import ExposureGain, Input, Internal, Luminance, Node, Output, Radiance, Steps, define, param
 
-from ._exposure import ExposureGain, half_of_radiance
+from ._exposure import half_of_radiance
 
 
 class Exposure(Node):

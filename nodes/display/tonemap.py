@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from rendergraph.api import DisplayColor, Input, Node, Output, Radiance, define, param
-
-from ._exposure import ExposureGain
+from rendergraph.api import DisplayColor, ExposureGain, Input, Node, Output, Radiance, define, param
 
 
 class Tonemap(Node):

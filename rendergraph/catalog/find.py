@@ -1,7 +1,8 @@
 """Listing the node types of packages, folders and files, without importing or parsing anything.
 
-A module is a node type, and so is a shader file. Where Python stands in a folder or beneath it, shader files are most
-likely parts of those nodes; there only those with a header are types of their own.
+A module is a node type, and so is a shader file. Where Python stands in a folder or beneath it, and in a folder
+`shaders` beside `nodes`, shader files are most likely parts of those nodes; there only those with a header are types of
+their own.
 """
 
 from __future__ import annotations
@@ -76,6 +77,10 @@ def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> I
             module = ".".join([package, *filter(None, family.split("/")), stem])
             yield stem, Listed(module, family, file, where if shaders is None else shaders / family, plugin)
         elif not has_python or _has_header(file):
+            yield stem, Listed("", family, file, where, plugin)
+    for where, family, stem, suffix in _files(shaders) if shaders is not None else ():
+        file = where / f"{stem}{suffix}"
+        if suffix in SHADERS and _has_header(file):
             yield stem, Listed("", family, file, where, plugin)
 
 

@@ -1,4 +1,17 @@
-// What is above a luminance, at full size or averaged to half.
+// What is above a luminance: a node by itself, and at half size (HALVE) the first step of `bloom`.
+/*---
+doc: |
+  The part of the picture above a luminance: `rgb max(L - threshold, 0) / L`.
+
+  What is left keeps its hue and begins at black, so nothing pops where a light crosses the threshold.
+inputs:
+  radiance: {semantic: radiance, doc: Scene-linear radiance.}
+  gain: {semantic: exposure_gain, size: any, optional: true, doc: Exposure that the threshold is measured after.}
+outputs:
+  bright: {semantic: radiance, like: radiance, doc: "What is above the threshold; scene-linear, alpha as it was."}
+params:
+  threshold: {default: 1.0, min: 0, doc: "Luminance, after `gain`, that is taken off; 1 is the display's white."}
+---*/
 #include <luminance.glsl>
 #include "halving.glsl"
 
@@ -22,7 +35,7 @@ vec4 halving_tap(ivec2 texel) {
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-#if HALVE
+#ifdef HALVE
     bright = halved(texel, textureSize(radiance, 0));
 #else
     bright = halving_tap(texel);

@@ -66,6 +66,19 @@ def test_shaders_lie_beside_the_nodes_folder(plugin: Path, tmp_path: Path) -> No
     assert found.family == "lights"
 
 
+def test_a_shader_with_a_header_there_is_a_type(plugin: Path, tmp_path: Path) -> None:
+    whole = tmp_path / "whole"
+    (whole / "shaders" / "sky").mkdir(parents=True)
+    plugin.rename(whole / "nodes")
+    text = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
+    (whole / "shaders" / "sky" / "part.frag").write_text(text)
+    (whole / "shaders" / "sky" / "haze.frag").write_text("/*---\ndoc: Haze.\n---*/\n" + text)
+    catalog = Catalog.discover([whole], installed=False)
+    assert "part" not in catalog
+    found = catalog.get("haze")
+    assert (found.family, found.is_shader, found.plugin) == ("sky", True, "whole")
+
+
 def test_one_file(plugin: Path) -> None:
     catalog = Catalog.discover([plugin / "deep" / "er" / "deeper.py"], installed=False)
     assert catalog.names() == ["deeper"]

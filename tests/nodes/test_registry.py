@@ -17,7 +17,7 @@ from rendergraph.glsl.source import needs
 from rendergraph.resources import folder, shipped_pipelines
 
 CATALOG = Catalog.discover()
-BUILTIN = sorted(path.stem for path in folder("rendergraph.nodes").rglob("*.py") if not path.stem.startswith("_"))
+BUILTIN = sorted(name for name in CATALOG.names() if CATALOG.get(name).plugin == "builtin")
 SHADERS = folder("rendergraph.shaders")
 STAGES = {".vert", ".frag", ".geom", ".comp"}
 
@@ -35,7 +35,7 @@ def shader_names(name: str) -> set[str]:
     text = module_text(name)
     found = set(re.findall(r'"(<?[\w./]+\.(?:vert|frag|geom|comp|glsl)>?)"', text))
     cls = CATALOG.get(name).cls
-    if cls.record is Node.record:
+    if CATALOG.get(name).is_shader or cls.record is Node.record:
         found.add(cls.shader or f"{name}.frag")
     return found
 

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from rendergraph.nodes.display.bloom import Bloom
-from rendergraph.nodes.display.bright_pass import BrightPass
 from rendergraph.nodes.display.exposure import Exposure
 from rendergraph.nodes.display.gaussian_blur import GaussianBlur
 from rendergraph.nodes.display.tonemap import Tonemap
@@ -57,7 +56,7 @@ uniform int width;
 out vec4 radiance;
 void main() { radiance = given[int(gl_FragCoord.y) * width + int(gl_FragCoord.x)]; }
 """
-NODES = (Picture, FloatTonemap, Tonemap, Exposure, BrightPass, GaussianBlur, Bloom)
+NODES = (Picture, FloatTonemap, Tonemap, Exposure, GaussianBlur, Bloom)
 
 
 @pytest.fixture(scope="session")
@@ -82,6 +81,7 @@ def frames(tmp_path: Path, session: rg.Session) -> Callable[..., list[rg.Frame]]
     shutil.copytree(folder("rendergraph.shaders") / "display", tmp_path / "shaders")
     (tmp_path / "shaders/picture.frag").write_text(SHOW)
     catalog = Catalog.of(*NODES, shaders=tmp_path / "shaders")
+    catalog = catalog.with_file("bright_pass", tmp_path / "shaders" / "bright_pass.frag")
 
     def run(picture: Floats | Callable[[int], Floats], text: str, **options: Any) -> list[rg.Frame]:
         moving = picture if callable(picture) else lambda _frame: picture
