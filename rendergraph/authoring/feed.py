@@ -32,7 +32,7 @@ from rendergraph.api import (
 )
 from rendergraph.authoring.variants import Variant
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.textures import FORMATS, TEXTURE_KINDS
+from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
 SIZE = (37, 23)
 """Of the picture: small, and no multiple of what work groups have."""
@@ -223,13 +223,12 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
         seen = Input(View, kind="view", doc="What is drawn with.")
         depth = Output(Depth, format="depth32f", clear=1.0, doc="The scene's depth.")
         return _node("Drawer", read=seen, made=depth, record=_draw)
-    samples = getattr(port, "samples", 1)
-    if isinstance(samples, int) and samples > 1:
-        text = "uniform sampler2DMS read;\nout vec4 made;\n"
-        text += "void main() { made = texelFetch(read, ivec2(gl_FragCoord.xy), 0); }\n"
+    if getattr(port, "samples", 1) != 1:
+        read = Input(AnyTexel, samples="any", doc="What is read.")
+        text = "uniform SAMPLER read;\nout vec4 made;\n"
+        text += "void main() { made = vec4(texelFetch(read, ivec2(gl_FragCoord.xy), 0)); }\n"
         (folder / "use_samples.frag").write_text(text, encoding="utf-8")
-        read = Input(AnyTexel, samples="multi", doc="What is read.")
-        return _node("OneSample", read=read, made=value, shader="use_samples.frag")
+        return _node("OneSample", read=read, made=value, record=_first_sample)
     if getattr(port, "kind", "") == "buffer":
         (folder / "use_buffer.frag").write_text(
             "layout(std430) readonly buffer read { uint words[]; };\nout vec4 made;\n"
@@ -242,6 +241,13 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
     return None
 
 
+def _first_sample(self: Any, steps: Steps) -> None:
+    desc = steps.desc(self.read)
+    assert isinstance(desc, TextureDesc)
+    kind = {"uint": "usampler2D", "int": "isampler2D"}.get(FORMATS[desc.format].family, "sampler2D")
+    steps.fullscreen("use_samples.frag", defines={"SAMPLER": kind + ("MS" if desc.samples > 1 else "")})
+
+
 def _draw(self: Any, steps: Steps) -> None:
     steps.geometry(None, vertex="<depth.vert>", out=self.made, view=self.read, materials="none")
 
@@ -252,7 +258,8 @@ def _call(signature: Signature) -> str:
     kinds = [argument.split()[-2] for argument in arguments.split(",") if argument.strip()]
     zeros = ", ".join(f"{kind}(0)" for kind in kinds)
     result = signature.declaration.split()[0]
-    value = "vec4(result)" if result in ("float", "int", "uint", "bool", "vec4") else "vec4(result.xxxx)"
+    column = "result[0]" if "mat" in result else "result"
+    value = "vec4(result)" if result in ("float", "int", "uint", "bool") else f"vec4({column}.xxxx)"
     return f"out vec4 made;\nvoid main() {{ {result} result = {signature.name}({zeros}); made = {value}; }}\n"
 
 

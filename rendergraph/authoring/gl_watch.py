@@ -37,9 +37,15 @@ def let_go(device: Device) -> None:
         vertex_shader="#version 450 core\nvoid main() { gl_Position = vec4(0.0); }",
         fragment_shader="#version 450 core\nvoid main() {}",
     )
+    shaping = device.ctx.program(
+        vertex_shader="#version 450 core\nvoid main() { gl_Position = vec4(0.0); }",
+        geometry_shader="#version 450 core\nlayout(points) in;\nlayout(points, max_vertices = 1) out;\nvoid main() {}",
+        fragment_shader="#version 450 core\nvoid main() {}",
+    )
     computing = device.ctx.compute_shader("#version 450 core\nlayout(local_size_x = 1) in;\nvoid main() {}")
-    for name in (drawing.glo, computing.glo, drawing.glo, 0):
+    for name in (shaping.glo, drawing.glo, computing.glo, drawing.glo, 0):
         device.raw.glUseProgram(name)
+    shaping.release()
     drawing.release()
     computing.release()
     device.ctx.gc()

@@ -59,6 +59,7 @@ class Trial:
         seen: names of uniforms that some program looked at.
         files: shader files that some step used.
         written: outputs that could be had in some variant.
+        avoided: optional inputs of a base class that the node goes without: it fails with what they are fed.
     """
 
     type: NodeType
@@ -67,6 +68,7 @@ class Trial:
     seen: set[str] = field(default_factory=set)
     files: set[Path] = field(default_factory=set)
     written: set[str] = field(default_factory=set)
+    avoided: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.problems: dict[Problem, list[str]] = {}
@@ -82,7 +84,7 @@ class Trial:
 
     def run(self, variant: Variant) -> None:
         """Link, compile and draw a variant twice, and keep what is wrong with it."""
-        self._variant = variant
+        self._variant = variant = variant.without(self.type.cls, self.avoided)
         self.tried.append(variant.name or "default")
         try:
             self._run(variant)
@@ -95,10 +97,38 @@ class Trial:
                 if rest:
                     self.run(replace(variant, outputs=rest))
                 return
+            if variant.end and all(problem.code == "RG435" for problem in error.problems):
+                self.tried.pop()  # more than this device has
+                return
+            optional = self._inherited(variant)
+            unfit = next((name for name in optional if self._goes(variant.without(self.type.cls, {name}))), None)
             for problem in error.problems:
-                self.say(self._own(problem, error))
+                own = self._own(problem, error)
+                if unfit is not None:
+                    text = f"{own.text}; tried without '{unfit}', which is inherited"
+                    own = replace(own, text=text, severity="warning")
+                self.say(own)
+            self.avoided |= set() if unfit is None else {unfit}
         else:
             self.written |= set(variant.outputs)
+
+    def _inherited(self, variant: Variant) -> list[str]:
+        """The connected optional inputs of a base class: nobody promised that the node combines them with its own."""
+        cls = self.type.cls
+        own = {name for base in cls.__mro__ if base.__module__ == cls.__module__ for name in vars(base)}
+        ports = cls.inputs().items()
+        return [name for name, port in ports if port.optional and name not in own and name not in variant.left_out]
+
+    def _goes(self, variant: Variant) -> bool:
+        """Whether a variant draws; what is found then counts."""
+        said = {problem: list(names) for problem, names in self.problems.items()}
+        try:
+            self._run(variant)
+        except RendergraphError:
+            self.problems = said
+            return False
+        self.written |= set(variant.outputs)
+        return True
 
     def _is_missing(self, output: str, error: RendergraphError) -> bool:
         """Whether an error says that the node did not write an output in this variant."""
@@ -224,7 +254,7 @@ class Trial:
     def _interface(self, step: Step, draw: Draw) -> None:
         """Remember what a program looks at; what it looks at and was not declared is refused when it is compiled."""
         program = draw.program
-        self.seen |= {name.removeprefix(prefix(self.type.name)) for name in program.uniforms}
+        self.seen |= {name.removeprefix(prefix(self.type.name)) for name in (*program.uniforms, *program.storage)}
         names = [read.name for read in step.reads] + [write.name for write in step.writes]
         self.seen |= {name for name in names if name in program.storage or f"{name}_view_block" in program.blocks}
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Set
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rendergraph.declare import InOut, Input, Node
@@ -29,6 +29,12 @@ class Variant:
     left_out: frozenset[str] = frozenset()
     outputs: tuple[str, ...] = ()
     end: bool = False
+
+    def without(self, cls: type[Node], inputs: Set[str]) -> Variant:
+        """The same with more inputs left out, and the outputs that need them."""
+        left_out = self.left_out | inputs
+        usable = _usable(cls, left_out)
+        return replace(self, left_out=left_out, outputs=tuple(name for name in self.outputs if name in usable))
 
 
 def variants(cls: type[Node]) -> list[Variant]:
@@ -58,7 +64,7 @@ def _all(cls: type[Node]) -> Iterator[Variant]:
             yield Variant(f"{name} alone", outputs=(name,))
 
 
-def _usable(cls: type[Node], left_out: frozenset[str]) -> tuple[str, ...]:
+def _usable(cls: type[Node], left_out: Set[str]) -> tuple[str, ...]:
     """The outputs that can be asked for without some inputs."""
     return tuple(name for name, port in cls.outputs().items() if not left_out & set(getattr(port, "needs", ())))
 

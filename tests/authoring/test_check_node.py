@@ -508,3 +508,104 @@ void main() { atomicAdd(bins[texelFetch(radiance, ivec2(0), 0).r > 0.5 ? 63 : 62
     (said,) = check(COUNTS).messages
     assert re.match(r"glow.py:12:5: RG454 256 of 256 bytes of 'counts' .* nobody has cleared; .*`clear=0`$", said), said
     assert check(COUNTS.replace("bytes=256", "bytes=256, clear=0")).messages == []
+
+
+IMPORTS = "from rendergraph.api import Any, Depth, Function, Input, Internal, Node, Output, Radiance, ShadowLookup, Signature\n"
+IMPORTS += "from rendergraph.api import Steps, structural\nimport rendergraph.nodes.lighting.forward_lighting as base\n"
+RIGHT = {
+    "a geometry shader before a step of the whole picture": '''
+class Glow(Node):
+    """Triangles, then a picture of them."""
+
+    drawn = Internal(Radiance, clear=0.0)
+    color = Output(Radiance, doc="Triangles.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry("white.frag", geometry="same.geom", out={"white": self.drawn}, materials="none")
+        steps.fullscreen("glow.frag", drawn=self.drawn, out=self.color)
+''',
+    "a buffer that a function reads": '''
+class Glow(Node):
+    """A shadow by a number."""
+
+    numbers = Input(Any, kind="buffer", doc="Numbers.")
+    lookup = Function(ShadowLookup, shader="numbers.glsl", reads=("numbers",), doc="Shadow of a number.")
+''',
+    "a function that gives a matrix": '''
+Turn = Signature("turned", "mat3 turned(vec3 axis)", ("axis",), "*", "mat3(1.0)", "A rotation.")
+
+
+class Glow(Node):
+    """A rotation."""
+
+    turned = Function(Turn, shader="turned.glsl", doc="Rotation about an axis.")
+''',
+    "samples": '''
+class Glow(Node):
+    """The scene's triangles with samples."""
+
+    color = Output(Radiance, samples=lambda node, facts: node.samples, clear=0.0, doc="Colour.")
+    four = Output(Any, format="r32ui", samples=4, clear=0, doc="Four samples.")
+    depth = Output(Depth, format="depth32f", samples=lambda node, facts: node.samples, clear=1.0, doc="Depth.")
+    samples: int = structural(default=4, min=1, max=32, doc="Samples a texel.")
+
+    def record(self, steps: Steps) -> None:
+        if steps.used(self.color) or steps.used(self.depth):
+            steps.geometry("white.frag", out={"white": self.color, "depth": self.depth}, materials="none")
+        if steps.used(self.four):
+            steps.clear(self.four, 1)
+''',
+    "a kept table": '''
+class Glow(Node):
+    """A table that outlives the frame."""
+
+    table = Output(Radiance, size=(4, 4), kept=True, doc="White.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("white.frag", out={"white": self.table})
+''',
+    "what is inherited through a module": '''
+class Glow(base.ForwardLighting):
+    """Forward lighting and no more."""
+''',
+}
+RIGHT_SHADERS = {
+    "white.frag": "out vec4 white;\nvoid main() { white = vec4(1.0); }\n",
+    "same.geom": "layout(triangles) in;\nlayout(triangle_strip, max_vertices = 3) out;\n"
+    "void main() { for (int i = 0; i < 3; ++i) { gl_Position = gl_in[i].gl_Position; EmitVertex(); } }\n",
+    "glow.frag": "uniform sampler2D drawn;\nout vec4 color;\nvoid main() { color = texelFetch(drawn, ivec2(0), 0); }\n",
+    "numbers.glsl": "layout(std430) readonly buffer numbers { uint words[]; };\n"
+    "float shadow(int light, vec3 position, vec3 normal) { return words[0] > 5u ? 1.0 : 0.5; }\n",
+    "turned.glsl": "mat3 turned(vec3 axis) { return mat3(axis, axis.yzx, axis.zxy); }\n",
+}
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    """`glow.py` with all shaders beside it."""
+    for name, shader in RIGHT_SHADERS.items():
+        (tmp_path / name).write_text(shader)
+    (tmp_path / "glow.py").write_text(IMPORTS + text)
+    return tmp_path / "glow.py"
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_what_is_right_is_not_complained_of(name: str, tmp_path: Path) -> None:
+    report = check_node(written(tmp_path, RIGHT[name]))
+    assert report.problems == ()
+    assert not any("=32" in variant for variant in report.variants)  # more samples than a device has
+
+
+def test_an_optional_input_of_a_base_that_does_not_go_with_the_node_is_left_out_and_said(tmp_path: Path) -> None:
+    of = 'samples=lambda node, facts: 4, doc="Four samples.")'
+    text = f'''
+class Glow(base.ForwardLighting):
+    """Forward lighting with samples."""
+
+    radiance = Output(Radiance, clear=0.0, {of}
+    surface_depth = Output(Depth, format="depth32f", clear=1.0, {of}
+'''
+    (problem,) = check_node(written(tmp_path, text)).problems
+    assert (problem.code, problem.severity) == ("RG425", "warning")
+    assert problem.text.endswith("; tried without 'depth', which is inherited")
+    broken = check_node(written(tmp_path, text.replace("clear=1.0, samples=lambda node, facts: 4", "clear=1.0")))
+    assert any(problem.severity == "error" for problem in broken.problems)
