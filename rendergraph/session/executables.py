@@ -91,16 +91,8 @@ def key_of(expanded: Expanded) -> Hashable:
 
 def _declared(cls: type[Node]) -> tuple[Any, ...]:
     """What program text takes from a class beside the steps it recorded: a module that is imported anew may differ."""
-    return tuple(
-        (
-            name,
-            type(port),
-            getattr(port, "kind", None),
-            getattr(port, "semantic", None),
-            getattr(port, "signature", None),
-        )
-        for name, port in cls.ports().items()
-    )
+    words = ("kind", "semantic", "signature")
+    return tuple((name, type(p), *(getattr(p, word, None) for word in words)) for name, p in cls.ports().items())
 
 
 def _structure(expansion: Expansion) -> tuple[Any, ...]:

@@ -9,6 +9,7 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
+from rendergraph.session import stages
 from rendergraph.session.selection import RenderKeywords, RenderOptions, Selection
 
 if TYPE_CHECKING:
@@ -115,8 +116,6 @@ class Pipeline:
         Raises:
             InputError: a file is missing or is no YAML.
         """
-        from rendergraph.session import stages
-
         return stages.resolve(self.selection, self.catalog)
 
     @_once
@@ -126,8 +125,6 @@ class Pipeline:
         Raises:
             InputError: with all mistakes of the file.
         """
-        from rendergraph.session import stages
-
         return stages.link(self.resolve())
 
     @_once
@@ -137,8 +134,6 @@ class Pipeline:
         Raises:
             InputError: with all mistakes found.
         """
-        from rendergraph.session import stages
-
         return stages.check(self.link())
 
     def expand(self, **options: Unpack[RenderKeywords]) -> Expanded:
@@ -147,8 +142,6 @@ class Pipeline:
         Raises:
             InputError: a mistake in the file, or an output or port that it does not have.
         """
-        from rendergraph.session import stages
-
         return stages.expand(self.link(), RenderOptions.of(options))
 
     def plan(self, **options: Unpack[RenderKeywords]) -> ResourcePlan:
@@ -157,8 +150,6 @@ class Pipeline:
         Raises:
             InputError: a mistake in the file, or the steps have no legal order.
         """
-        from rendergraph.session import stages
-
         return stages.plan(self.expand(**options)).plan
 
     # Drawing ---------------------------------------------------------------------------------------------------------
@@ -184,7 +175,6 @@ class Pipeline:
             RenderError: it failed while drawing.
             DeviceError: there is no usable GL device.
         """
-        from rendergraph.session import stages
         from rendergraph.session.gpu import opened
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
@@ -200,7 +190,6 @@ class Pipeline:
         **options: Unpack[RenderKeywords],
     ) -> Iterator[Frame]:
         """Draw it frame by frame; as `render`, and each frame is there before the next one is drawn."""
-        from rendergraph.session import stages
         from rendergraph.session.gpu import opened
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
