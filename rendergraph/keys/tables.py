@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeAlias
 
 from rendergraph.document import Value
@@ -60,9 +61,13 @@ class Table:
     refused: Mapping[str, str] = field(default_factory=dict)
     code: str = ""
 
+    @cached_property
+    def _own(self) -> dict[str, Key]:
+        return {key.name: key for key in self.keys}
+
     def keys_of(self, value: Value) -> dict[str, Key]:
         """The keys that a mapping may hold; where its variant is not known, those of all."""
-        found = {key.name: key for key in self.keys}
+        found = self._own
         for name, brings in self.variants.items():
             given = value.get(name)
             if given is None or given.data is None:
@@ -72,7 +77,7 @@ class Table:
             else:
                 own = brings.get(str(given.data))
                 known = list(brings.values()) if own is None else [own]
-            found |= {key.name: key for keys in known for key in keys}
+            found = found | {key.name: key for keys in known for key in keys}
         return found
 
     def sections(self, name: str = "") -> Iterator[tuple[str, tuple[Key, ...]]]:
