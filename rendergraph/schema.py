@@ -64,14 +64,18 @@ def shipped_bases(catalog: Catalog) -> dict[str, dict[str, str]]:
     return {name: _types_in(resolve(name, catalog=catalog)) for name in shipped_pipelines()}
 
 
-def base_of(file: Path, catalog: Catalog) -> dict[str, dict[str, str]]:
+def base_of(file: Path, spec: PipelineSpec) -> dict[str, dict[str, str]]:
     """The types of the nodes of what a pipeline file extends, under the name it has there; nothing where it is whole.
+
+    Args:
+        file: the file.
+        spec: what it resolves to.
 
     Raises:
         InputError: the file cannot be read.
     """
     base = word(read(file, keep_going=True).root, "extends")
-    return {} if base is None else {base: _types_in(resolve(file, catalog=catalog))}
+    return {} if base is None else {base: _types_in(spec)}
 
 
 def _types_in(spec: PipelineSpec) -> dict[str, str]:
@@ -265,7 +269,8 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
     way_out = (
         f"`{shlex.join(['rendergraph', 'schema', *words, '-o', shown_file(os.path.normpath(file))])}` writes it anew"
     )
-    if gone := [f"'{name}'" for name in then if name not in now]:  # the plugins of those are not known here
+    # The plugins of those are not known here; a shader file comes with the pipeline that names it.
+    if gone := [f"'{name}'" for name in then if name not in now and "/" not in name]:
         way_out += (
             f", with --plugin for {', '.join(gone[:3])}{f' and {len(gone) - 3} more' if len(gone) > 3 else ''} too"
         )

@@ -144,6 +144,38 @@ def test_check_says_when_the_schema_beside_the_file_is_out_of_date(
     assert warned().endswith("writes it anew, with --plugin for 'fog', 'tone' too")
 
 
+def test_a_schema_of_a_file_is_written_anew_for_that_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "base.yaml").write_text("extends: forward\nnodes: {fog: {type: ./fog.frag}}\n")
+    (tmp_path / "fog.frag").write_text("uniform float density = 0.1;\nout vec4 foggy;\n")
+    (tmp_path / "mine.yaml").write_text("# $schema=mine.json\nextends: ./base.yaml\n")
+    assert main(["schema", "mine.yaml", "-o", "mine.json"]) == 0
+    made = json.loads((tmp_path / "mine.json").read_text())
+    bases = {rule["if"]["properties"]["extends"]["const"]: rule["then"]["properties"] for rule in made["allOf"]}
+    assert bases["./base.yaml"]["nodes"]["properties"].keys() == bases["forward"]["nodes"]["properties"].keys() | {
+        "fog"
+    }
+    assert list(rules_of(made, "./fog.frag")["params"]["properties"]) == ["density"]
+    (tmp_path / "mine.json").write_text((tmp_path / "mine.json").read_text().replace("tonemap", "tone"))
+    capsys.readouterr()
+    main(["check", "mine.yaml"])
+    assert "`rendergraph schema mine.yaml -o mine.json` writes it anew, with --plugin for 'tone' too" in (
+        capsys.readouterr().err
+    )
+
+
+def test_there_is_a_schema_of_files_we_read_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for kind, key in (("scene", "objects"), ("sweep", "axes"), ("pipeline", "nodes")):
+        assert main(["schema", kind]) == 0
+        assert key in json.loads(capsys.readouterr().out)["properties"]
+    assert main(["schema", "scenes"]) == 3
+    assert "RG511 there is no schema of 'scenes'; did you mean 'scene'?" in capsys.readouterr().err
+    assert main(["schema", "missing.yaml"]) == 3
+    assert "RG011 there is no file 'missing.yaml'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["", "{}", "[1]", '{"definitions": {"node": 1}}', "no json"])
 def test_a_schema_of_somebody_else_is_left_alone(tmp_path: Path, toy_catalog: Catalog, text: str) -> None:
     file = tmp_path / "pipeline.yaml"

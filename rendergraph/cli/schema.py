@@ -25,8 +25,8 @@ def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: 
     """Print the JSON Schema of pipeline files, or of scenes or sweeps.
 
     That of pipelines knows all installed nodes; editors complete and check pipelines with it, also those that extend a
-    shipped one. FILE is a pipeline that extends another file: its schema knows the nodes of that, too. Of a type that
-    fails it has the name alone, and says so.
+    shipped one. FILE is a pipeline: its schema knows what that extends, and its shader files, too. Of a type that fails
+    it has the name alone, and says so.
 
     \b
     Examples:
@@ -48,6 +48,7 @@ def _of_table(what: str) -> Schema:
 
 def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
     from rendergraph.catalog import Catalog
+    from rendergraph.resolve import resolve
     from rendergraph.schema import base_of, schema, shipped_bases
 
     if what != "pipeline" and not Path(what).suffix:
@@ -57,7 +58,9 @@ def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
     warn(catalog.notes)
     bases = shipped_bases(catalog)
     if what != "pipeline":
-        bases |= base_of(Path(what), catalog)
+        spec = resolve(Path(what), catalog=catalog)
+        bases |= base_of(Path(what), spec)
+        catalog = spec.catalog or catalog  # with the shader files it names
     found = schema(catalog, bases)
     warn([replace(problem, severity="warning") for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)
