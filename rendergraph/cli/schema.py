@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
 def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
-    """Print the JSON Schema of pipeline files, or of scenes or sweeps.
+    """Print the JSON Schema of a kind of file.
 
-    That of pipelines knows all installed nodes; editors complete and check pipelines with it, also those that extend a
+    That of pipeline files, the usual one, knows all installed nodes; editors complete and check pipelines with it, also those that extend a
     shipped one. FILE is a pipeline: its schema knows what that extends, and its shader files, too. Of a type that fails
     it has the name alone, and says so.
 
