@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
     """Print the JSON Schema of a kind of file.
 
-    That of pipeline files, the usual one, knows all installed nodes; editors complete and check pipelines with it, also those that extend a
-    shipped one. FILE is a pipeline: its schema knows what that extends, and its shader files, too. Of a type that fails
-    it has the name alone, and says so.
+    That of pipeline files, the usual one, knows all installed nodes, and what shipped pipelines are made of, for files
+    that extend them. FILE is a pipeline: its schema knows what that extends, and its shader files, too. Of a type that
+    fails it has the name alone, and says so.
 
     \b
     Examples:
