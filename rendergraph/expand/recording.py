@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port
+from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port, Views
 from rendergraph.declare.blame import happened
 from rendergraph.errors import InputError, Misuse, Problem, node_named
 from rendergraph.expand.model import is_empty
@@ -160,12 +161,14 @@ def _recorded(
                     demanded[end.node].add(end.port)
     recordings: dict[str, Recording] = {}
     idle: dict[str, str] = {}
+    reached: set[str] = set()  # nodes that are demanded, and those that would be if what they make had layers
     for name in reversed(order):
         node = graph[name]
         used = demanded[name]
         if not used:
-            idle[name] = "nothing that is wanted reads its outputs"
+            idle[name] = _unread(graph, node, reached)
             continue
+        reached.add(name)
         reason = _nothing_to_do(graph, node, used)
         if reason:
             idle[name] = reason
@@ -194,6 +197,33 @@ def _recorded(
     return {name: recordings[name] for name in order if name in recordings}, idle
 
 
+def _unread(graph: Graph, node: GraphNode, reached: set[str]) -> str:
+    """Why nobody reads a node: nothing is linked to it that is wanted, or what would be read has no layers."""
+    for name in node.node.outputs():
+        end = Endpoint(node.id, name)
+        links = (ends for reader in graph.nodes if reader.id in reached for ends in reader.inputs.values())
+        if is_empty(graph.textures.get(end)) and any(end in ends for ends in links):
+            reached.add(node.id)
+            return f"{end} has no layers: {_no_layers(graph, node, name)}"
+    return "nothing that is wanted reads its outputs"
+
+
+def _no_layers(graph: Graph, node: GraphNode, name: str) -> str:
+    """Why a texture has no layers, as far as that shows in its declaration."""
+    ports = node.node.ports()
+    named = [getattr(ports[name], rule, None) for rule in ("like", "lights", "view")]
+    for source in named:
+        ends = node.inputs.get(source, ()) if isinstance(source, str) else ()
+        if ends and is_empty(graph.textures.get(ends[0].now)):
+            return f"{ends[0]} has none"
+    tables = [ports[source] for source in named if isinstance(source, str) and isinstance(ports.get(source), Views)]
+    if all(getattr(port, "lights", None) is None for port in (ports[name], *tables)):
+        return "there is nothing to draw"
+    kinds = Counter(light.type for light in graph.lights)
+    listed = " and ".join(f"{count} {kind}" for kind, count in kinds.items())
+    return f"it takes none of the scene's lights ({listed})" if listed else "the scene has no light"
+
+
 def _pass_on(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:
     """What an idle node would continue is demanded as it is."""
     for port in used:
@@ -205,7 +235,7 @@ def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
     """Why a node has nothing to record: what it would draw, or what it must read, has no layers."""
     made = [graph.textures.get(Endpoint(node.id, name)) for name in used]
     if made and all(is_empty(info) for info in made):
-        return f"{node.id}.{min(used)} has no layers: there is nothing to draw"
+        return f"{node.id}.{min(used)} has no layers: {_no_layers(graph, node, min(used))}"
     for name, port in node.node.inputs().items():
         ends = node.inputs.get(name, ())
         required = isinstance(port, Input) and not port.optional

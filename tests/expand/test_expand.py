@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import rendergraph as rg
 from rendergraph.api import ADD, InOut, Input, Internal, Node, Output, Radiance, State, Steps, define, param
 from rendergraph.catalog import Catalog
 from rendergraph.expand import Expansion, expand
@@ -130,3 +131,19 @@ def test_an_optional_continued_texture_that_is_not_connected_is_the_nodes_own() 
     (step,) = expanded("  g: {type: glow}", "image: g.color").steps
     assert [(w.resource, w.version, w.load, w.clear) for w in step.writes] == [("g.color", 1, "clear", 0.0)]
     assert not step.reads
+
+
+@pytest.mark.parametrize(
+    ("pipeline", "shadows"),
+    [
+        ("shadow-pcf", "shadows.visibility has no layers: it takes none of the scene's lights (18 point)"),
+        ("forward", "sun.shadow_map has no layers: there is nothing to read"),
+    ],
+)
+def test_a_node_that_finds_no_light_says_so(pipeline: str, shadows: str) -> None:
+    culled = rg.load(pipeline, scene="many_lights").plan().schedule.culled
+    assert culled["sun"] == "sun.shadow_map has no layers: it takes none of the scene's lights (18 point)"
+    assert culled["shadows"] == shadows
+    apart = [f"light.{name}=null" for name in ("visibility", "lookup", "blended_lookup")]
+    rest = rg.load(pipeline, scene="many_lights", sets=apart).plan()
+    assert rest.schedule.culled["shadows"] == "nothing that is wanted reads its outputs"
