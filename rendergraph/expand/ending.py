@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from rendergraph.declare import WrittenPort
 from rendergraph.errors import InputError, Mistake, Problem
-from rendergraph.expand.model import Expansion
-from rendergraph.expand.versions import Versioned
+from rendergraph.expand.model import Expansion, Versioned, behind
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write
 
@@ -27,7 +26,7 @@ def ended(graph: Graph, found: Versioned, wanted: Mapping[str, Endpoint]) -> Exp
     steps, resources = list(found.steps), dict(found.resources)
     shown: dict[str, str] = {}
     for name, port in wanted.items():
-        end = found.behind(port)
+        end = behind(found.passed, port)
         if end not in found.at_end or end.node in found.idle:
             reason = found.idle.get(end.node, "it makes no texture")
             text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"

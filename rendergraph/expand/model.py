@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rendergraph.declare import TextureInfo
+from rendergraph.link import Endpoint
 from rendergraph.link.infer import CAMERA
 from rendergraph.steps import Resource, Step
 
@@ -16,6 +17,31 @@ class ViewTable:
 
     count: int = 1
     lights: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Versioned:
+    """What was recorded, with resources and versions in place of ports.
+
+    Attributes:
+        steps: in the order of nodes and of recording.
+        resources: by id.
+        newest: resource id to its last version.
+        at_end: port to its resource and the version it has when its node is done.
+        passed: port of an idle node to what it would continue.
+        firsts: resource id to what whoever continues it says of the first frame.
+        idle: nodes that recorded nothing, with the reason.
+        views: view tables by id.
+    """
+
+    steps: Sequence[Step]
+    resources: Mapping[str, Resource]
+    newest: Mapping[str, int]
+    at_end: Mapping[Endpoint, tuple[str, int]]
+    passed: Mapping[Endpoint, Endpoint]
+    firsts: Mapping[str, float]
+    idle: Mapping[str, str]
+    views: Mapping[str, ViewTable]
 
 
 @dataclass(frozen=True)
@@ -37,9 +63,17 @@ class Expansion:
     views: Mapping[str, ViewTable] = field(default_factory=dict)
 
 
+def behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
+    """The port of this frame that a link leads to, where idle nodes pass on what they would continue."""
+    end = end.now
+    while end in passed:
+        end = passed[end]
+    return end
+
+
 def is_empty(info: TextureInfo | None) -> bool:
     """Whether a texture has no layers: no light casts, nothing is drawn, and readers do without."""
     return info is not None and info.desc is not None and info.desc.layers == 0
 
 
-__all__ = ["CAMERA", "Expansion", "ViewTable", "is_empty"]
+__all__ = ["CAMERA", "Expansion", "Versioned", "ViewTable", "behind", "is_empty"]

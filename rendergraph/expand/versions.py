@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, ViewTable, is_empty
+from rendergraph.expand.model import CAMERA, Versioned, ViewTable, behind, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import (
@@ -24,35 +24,6 @@ from rendergraph.expand.targets import (
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
-
-
-@dataclass(frozen=True)
-class Versioned:
-    """What was recorded, with resources and versions in place of ports.
-
-    Attributes:
-        steps: in the order of nodes and of recording.
-        resources: by id.
-        newest: resource id to its last version.
-        at_end: port to its resource and the version it has when its node is done.
-        passed: port of an idle node to what it would continue.
-        firsts: resource id to what whoever continues it says of the first frame.
-        idle: nodes that recorded nothing, with the reason.
-        views: view tables by id.
-    """
-
-    steps: Sequence[Step]
-    resources: Mapping[str, Resource]
-    newest: Mapping[str, int]
-    at_end: Mapping[Endpoint, tuple[str, int]]
-    passed: Mapping[Endpoint, Endpoint]
-    firsts: Mapping[str, float]
-    idle: Mapping[str, str]
-    views: Mapping[str, ViewTable]
-
-    def behind(self, end: Endpoint) -> Endpoint:
-        """The port of this frame that a link leads to; through nodes that have nothing to add to what they continue."""
-        return _behind(self.passed, end)
 
 
 def versioned(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> Versioned:
@@ -122,7 +93,7 @@ class _Versions:
             if not isinstance(port, WrittenPort) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recording.links.get(port.name):
-                self.at_end[end] = self.at_end[_behind(self.passed, recording.links[port.name][0])]
+                self.at_end[end] = self.at_end[behind(self.passed, recording.links[port.name][0])]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -228,7 +199,7 @@ class _Versions:
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
-        resource, at_end = self.at_end.get(_behind(self.passed, end)) or (str(self._maker(end)), 0)
+        resource, at_end = self.at_end.get(behind(self.passed, end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port]
         if end.previous and isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
@@ -391,13 +362,6 @@ class _Versions:
                 _includes(node.choices),
             )
         ]
-
-
-def _behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
-    end = end.now
-    while end in passed:
-        end = passed[end]
-    return end
 
 
 def _includes(choices: Mapping[str, Path]) -> tuple[tuple[str, Path], ...]:
