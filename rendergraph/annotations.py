@@ -166,7 +166,7 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
     """
     if fits(value, annotation):
         return
-    parts = list(_parts(annotation))
+    parts = list(parts_of(annotation))
     table = next((get_args(part) for part in parts if get_origin(part) is Mapping), None)
     if table is not None and isinstance(value, Mapping):
         for key, entry in value.items():
@@ -214,14 +214,14 @@ def right(thing: T, who: str = "") -> T:
     return thing
 
 
-def _parts(annotation: Any) -> Iterator[Any]:
-    """What a union is of, without metadata but for words of a table; of a list its entries."""
+def parts_of(annotation: Any) -> Iterator[Any]:
+    """What a union is of, without metadata but for words of a table; of a tuple its entries."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated and not any(isinstance(rule, Known) for rule in annotation.__metadata__):
-        yield from _parts(annotation.__origin__)
+        yield from parts_of(annotation.__origin__)
     elif origin in (Union, types.UnionType, tuple, Sequence):
         for part in arguments:
-            yield from _parts(part)
+            yield from parts_of(part) if part is not Ellipsis else ()
     else:
         yield annotation
 
@@ -240,7 +240,7 @@ def _entries(value: object) -> Sequence[object]:
 @cache
 def may_be(annotation: Any, wanted: type) -> bool:
     """Whether a value of an annotation, or an entry of it, may be an instance of a class."""
-    return annotation is wanted or any(may_be(part, wanted) for part in get_args(annotation))
+    return wanted in (annotation, get_origin(annotation)) or any(may_be(part, wanted) for part in get_args(annotation))
 
 
 hints_of = cache(partial(get_type_hints, include_extras=True))

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import math
 import re
-import types
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
-from rendergraph.annotations import mistakes_in
+from rendergraph.annotations import may_be, mistakes_in, parts_of
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
@@ -184,45 +183,25 @@ def _defaults(cls: type[Node]) -> Iterator[Mistake]:
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:
     """Why a parameter's type cannot become a uniform, or program text."""
-    role, kinds = parameter.role, set(_leaves(parameter.type))
+    role, kinds = parameter.role, [get_origin(part) or part for part in parts_of(parameter.type)]
     if role == "define":
         odd = [word for word in parameter.words if not re.fullmatch(r"[A-Za-z0-9_-]+", word)]
         if odd:
             return f"a define with the choice '{odd[0]}', which cannot stand in a macro's name"
-        if tuple in kinds or list in kinds:
+        if list in kinds or may_be(parameter.type, tuple):
             return "a define of several numbers; macros hold one, make it a param"
         if str in kinds and not parameter.open_name:
             return "a define of free text; list its choices as Literal[…]"
-    elif str in kinds or any(isinstance(kind, str) for kind in kinds):
+    elif str in kinds or parameter.words:
         return "a param of text, which no uniform holds; make it a define with Literal[…]"
     if type(None) in kinds:
         return f"a {role} that may be None; give it a default"
     if list in kinds:
         return f"a {role} of a list; a tuple says how many numbers there are"
-    other = [kind for kind in kinds if isinstance(kind, type) and kind not in (bool, int, float, tuple, str)]
+    other = [kind for kind in kinds if kind not in (bool, int, float, str, Literal)]
     if other:
         return f"a {role} of {getattr(other[0], '__name__', other[0])}; shaders take numbers and switches"
     return None
-
-
-def _leaves(annotation: Any) -> Iterator[Any]:
-    """The plain types of an annotation; `tuple` and `list` for what holds several; words of a Literal as they are."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin in (Union, types.UnionType):
-        for part in arguments:
-            yield from _leaves(part)
-    elif origin is Literal:
-        for value in arguments:
-            yield value if isinstance(value, str) else type(value)
-    elif origin in (tuple, list):
-        yield origin
-        for part in arguments:
-            if part is not Ellipsis:
-                yield from _leaves(part)
-    elif isinstance(origin, type):
-        yield origin
-    else:
-        yield annotation
 
 
 def _finite(value: object) -> bool:
