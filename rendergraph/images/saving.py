@@ -101,7 +101,7 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
         if known and known.family in ("uint", "int"):
             pixels = pixels.astype(np.int64)  # numbers, where 8-bit arrays are otherwise colours
         if EXTENSIONS[extension(path)] in ("png", "jpeg"):
-            jobs.append((path, viewable(pixels, info.semantic), None, "data", False))
+            jobs.append((path, viewable(pixels, info.semantic, info.encoding), None, "data", False))
             continue
         shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
         decoded = not raw and info.encoding == "display"

@@ -3,12 +3,12 @@
 | texels mean | 8-bit picture |
 |---|---|
 | `display_color` | as they are |
-| `radiance`, `albedo`, `emissive`, `luminance`: linear light | clipped to 0…1, sRGB curve |
+| `radiance`, `albedo`, `emissive`, `luminance`, a plugin's with linear encoding | clipped to 0…1, sRGB curve |
 | `normal` | −1…1 becomes 0…1, no curve |
 | `depth`, `linear_depth`, `shadow_map` | nearest black, farthest white, what nothing covers white |
 | `visibility`, `occlusion`, `material` | 0…1 as it is, no curve |
 | whole numbers | a colour each, 0 black |
-| anything else | 0…1 as it is; where values lie outside, scaled from the least to the greatest |
+| anything else | 0…1 as it is; where values lie outside, scaled so that all but a hundredth at each end fit |
 
 One channel is grey, two are red and green, a fourth is left out; layers lie in a grid, row by row. NaN is magenta.
 """
@@ -53,18 +53,19 @@ def to_bytes(unit: Pixels) -> Bytes:
     return (np.clip(values, 0.0, 1.0) * 255 + 0.5).astype(np.uint8)
 
 
-def viewable(array: Pixels, semantic: str = "any") -> Bytes:
+def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) -> Bytes:
     """A picture of a texture; the module's table says how each meaning is shown.
 
     Args:
         array: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
         semantic: what the texels mean, a name in `textures.SEMANTICS` or a plugin's own.
+        encoding: `linear` for linear light, `display` for sRGB-encoded colours, else None.
 
     Returns:
         uint8, (height, width, 1) grey or (height, width, 3).
     """
     array = array[..., np.newaxis] if array.ndim == 2 else array
-    colors = _colors(array[..., :3], semantic)
+    colors = _colors(array[..., :3], semantic, light=semantic in _LIGHT or encoding == "linear")
     if np.issubdtype(array.dtype, np.floating):
         broken = np.isnan(array[..., :3]).any(axis=-1)
         if broken.any():
@@ -75,31 +76,38 @@ def viewable(array: Pixels, semantic: str = "any") -> Bytes:
     return np.ascontiguousarray(_grid(colors) if colors.ndim == 4 else colors)
 
 
-def _colors(array: Pixels, semantic: str) -> Bytes:
+def _colors(array: Pixels, semantic: str, *, light: bool) -> Bytes:
     if np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
         return _palette(array)
     if semantic in _DEPTH:
         return to_bytes(_stretched(array, background=1.0 if semantic != "linear_depth" else math.inf))
-    if array.dtype == np.uint8 and semantic not in _LIGHT and semantic != "normal":
+    if array.dtype == np.uint8 and not light and semantic != "normal":
         return array
     values = array.astype(np.float32) / 255 if array.dtype == np.uint8 else array
-    if semantic in _LIGHT:
+    if light:
         return to_bytes(to_srgb(np.nan_to_num(values, nan=0.0, posinf=1.0)))
     if semantic == "normal":
         return to_bytes(values * np.float32(0.5) + np.float32(0.5))
     finite = values[np.isfinite(values)]
     if semantic not in _UNIT and finite.size and (finite.min() < 0 or finite.max() > 1):
-        return to_bytes(_stretched(values, background=math.inf))
+        return to_bytes(_stretched(values, background=math.inf, outside=0.01))
     return to_bytes(values)
 
 
-def _stretched(array: Pixels, background: float) -> npt.NDArray[np.float32]:
-    """Least to greatest becomes 0 to 1; texels at `background` or beyond become 1 and do not count."""
+def _stretched(array: Pixels, background: float, outside: float = 0.0) -> npt.NDArray[np.float32]:
+    """Least to greatest becomes 0 to 1; texels at `background` or beyond become 1 and do not count.
+
+    `outside` is the part of the values at each end that may lie beyond: a highlight would leave nothing of the rest.
+    """
     values = np.asarray(array, dtype=np.float32)
     covered = values[np.isfinite(values) & (values < background)]
     if not covered.size:
         return np.where(values < background, np.float32(0), np.float32(1))
     low, high = float(covered.min()), float(covered.max())
+    if beyond := int(outside * covered.size):
+        ranked = np.partition(covered, (beyond, covered.size - 1 - beyond))
+        if ranked[beyond] < ranked[-1 - beyond]:
+            low, high = float(ranked[beyond]), float(ranked[-1 - beyond])
     scaled = (values - low) / max(high - low, 1e-30)
     return np.where(values < background, scaled, np.float32(1)).astype(np.float32)
 

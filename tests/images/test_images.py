@@ -331,6 +331,22 @@ def test_colours_are_shown(semantic: str, values: list[list[float]], expected: l
     assert viewable(np.array([values], np.float32), semantic)[0].tolist() == expected
 
 
+def test_a_meaning_of_a_plugin_s_that_is_linear_light_is_shown_as_light() -> None:
+    values = np.array([[0.0, 0.2, 1.0, 900.0]], np.float32)
+    assert viewable(values, "glow", "linear").tolist() == viewable(values, "radiance").tolist()
+
+
+def test_a_few_great_values_do_not_leave_the_rest_black() -> None:
+    values = np.tile(np.linspace(0.0, 4.0, 100, dtype=np.float32), (100, 1))
+    values[50, 50] = 60000.0
+    shown = viewable(values, "heat")[..., 0]
+    assert shown[50, 50] == 255
+    assert np.abs(shown[0].astype(int) - np.linspace(0, 255, 100)).max() <= 4
+    one = np.zeros((100, 100), np.float32)
+    one[3, 4] = 7.0
+    assert viewable(one, "heat").sum() == 255
+
+
 def test_depths_are_stretched_and_the_background_is_white() -> None:
     depth = np.array([[0.9, 0.95, 1.0]], np.float32)
     assert viewable(depth, "depth")[..., 0].tolist() == [[0, 255, 255]]
