@@ -32,7 +32,7 @@ def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: 
     Examples:
       rendergraph schema -o rendergraph.schema.json
       rendergraph schema scene -o scene.schema.json
-      rendergraph schema mine.yaml -o rendergraph.schema.json
+      rendergraph schema my.yaml -o rendergraph.schema.json
     """
     found = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
     options.put(json.dumps(found, indent=2, ensure_ascii=False), output, as_json=as_json)
