@@ -34,8 +34,9 @@ class ImageLighting(SurfaceLighting):
     def surface(self, steps: Steps) -> dict[str, Any]:
         """What a shader that includes `gbuffer_surface.glsl` reads for this shading model."""
         needs = steps.needs("shading")
-        wanted = [name for name, texture in SURFACE_TEXTURES.items() if texture.is_looked_at(needs)]
-        return _connected(steps, [self.depth, *(self.inputs()[name] for name in wanted)])
+        wanted = {name for name, texture in SURFACE_TEXTURES.items() if texture.is_looked_at(needs)}
+        ports = [port for name, port in self.inputs().items() if name in wanted]
+        return _connected(steps, [self.depth, *ports])
 
     def shadows(self, steps: Steps) -> dict[str, Any]:
         """What `shadow()` is made of."""
