@@ -198,9 +198,10 @@ def mistakes_of(thing: DataclassInstance, who: str, subject: str = "") -> Iterat
     """
     hints = hints_of(type(thing))
     for entry in fields(thing):
-        if entry.init:
+        value = getattr(thing, entry.name)
+        if entry.init and value is not entry.default:
             what = f"{who}: {entry.name}" if who else entry.name
-            yield from mistakes_in(what, getattr(thing, entry.name), hints[entry.name], subject or entry.name)
+            yield from mistakes_in(what, value, hints[entry.name], subject or entry.name)
 
 
 def right(thing: T, who: str = "") -> T:
