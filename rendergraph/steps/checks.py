@@ -183,8 +183,8 @@ def objects(value: str | Sequence[str]) -> str | tuple[str, ...]:
 
 def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> dict[str, Port]:
     """Layouts of a draw step's buffers: `3f 2f in_position in_uv` to the buffer's port."""
-    if value is not None:
-        argument("attributes", value, Annotated[Mapping[Any, Any], "a mapping from layouts to buffers"])
+    mapping: Any = Annotated[Mapping[Any, Any], "a mapping from layouts to buffers"]
+    argument("attributes", value, mapping | None)
     found = {}
     for layout, port in (value or {}).items():
         example = "it reads like '3f 2f in_position in_uv'"
