@@ -16,7 +16,7 @@ from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, UsageError
 
 if TYPE_CHECKING:
-    from rendergraph.session import RenderOptions, Selection
+    from rendergraph.session import Frame, RenderOptions, Selection
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Expanded
 
@@ -116,6 +116,7 @@ def _draw(
 
     written: list[str] = []
     progress = Progress(len(expanded.options.frames))
+    frame: Frame | None = None
     for frame in stages.draw(expanded, gpu):
         files = [
             images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
@@ -129,6 +130,7 @@ def _draw(
                 emit(str(file.path))
         progress.show(len(written) // len(targets))
     progress.clear()
+    assert frame is not None  # a range of frames has one at least
     warnings.say(frame.warnings)
     return frame.as_json() | {"outputs": written}
 
