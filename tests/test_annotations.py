@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import pytest
 
 from rendergraph.annotations import Known, Length, Matching, Range, fits, mistakes_in, mistakes_of, right, words_for
 from rendergraph.errors import Misuse
 
-Count = Annotated[int, Range(0)]
-Factor = Annotated[float, Range(0, above=True)]
-Texel = Annotated[float | tuple[float, ...], Length(1, 4)]
-Side = Literal["left", "right"]
+Count: TypeAlias = Annotated[int, Range(0)]
+Factor: TypeAlias = Annotated[float, Range(0, above=True)]
+Texel: TypeAlias = Annotated[float | tuple[float, ...], Length(1, 4)]
+FormatName: TypeAlias = Annotated[str, Known(("r8", "rgba8")), "a format"]
+Perhaps: TypeAlias = Count | None
+PerhapsFormat: TypeAlias = FormatName | None
+Side: TypeAlias = Literal["left", "right"]
 
 FITS: list[tuple[Any, list[object], list[object]]] = [
     (Any, [None, object()], []),
@@ -52,15 +55,15 @@ def test_what_fits(annotation: Any, right_ones: list[object], wrong_ones: list[o
 SAID: list[tuple[object, Any, str]] = [
     ("yes", bool, "it is 'yes', not True or False"),
     (-1, Count, "it is -1, not a whole number from 0 up"),
-    (1.5, Count | None, "it is 1.5, not a whole number from 0 up or None; divide with //"),
+    (1.5, Perhaps, "it is 1.5, not a whole number from 0 up or None; divide with //"),
     (0, Factor, "it is 0, not a number above 0"),
     (300, Annotated[int, Range(0, 255)], "it is 300, not a whole number from 0 to 255"),
     ("lef", Side, "it is 'lef'; did you mean 'left'?"),
     (3, Side, "it is 3; there is left, right"),
     ("lef", Side | Callable[[], Side], "it is 'lef'; did you mean 'left'?"),
     (3, Side | Callable[[], Side], "it is 3, not one of left, right or a function"),
-    ("rgb8", Annotated[str, Known(("r8", "rgba8")), "a format"] | None, "it is 'rgb8'; did you mean 'rgba8'?"),
-    (8, Annotated[str, Known(("r8",)), "a format"] | None, "it is 8, not a format or None"),
+    ("rgb8", PerhapsFormat, "it is 'rgb8'; did you mean 'rgba8'?"),
+    (8, PerhapsFormat, "it is 8, not a format or None"),
     ("x" * 99, int, f"it is '{'x' * 56}..., not a whole number"),
     (
         {"a": {"b": 1, "c": 2.5}},
