@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, Protocol
 
+from rendergraph.errors import SceneError, suggestion
 from rendergraph.textures import Semantic, TextureDesc
+
+SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
+    "all": lambda casts, blended: True,
+    "opaque": lambda casts, blended: not blended,
+    "transparent": lambda casts, blended: blended,
+    "casters": lambda casts, blended: casts and not blended,
+}
+"""Which objects a geometry step draws, by the word it uses: of whether they cast a shadow, and are blended.
+
+Keyframes change none of this, so that it holds for all frames.
+"""
 
 
 @dataclass(frozen=True)
@@ -22,6 +34,77 @@ class LightFacts:
     name: str
     type: Literal["directional", "point", "spot"]
     casts_shadow: bool = True
+
+
+class NamedLight(Protocol):
+    """What is asked of a light to find those that cast."""
+
+    @property
+    def name(self) -> str:
+        """Unique in the scene."""
+        ...
+
+    @property
+    def type(self) -> str:
+        """`directional`, `spot` or `point`."""
+        ...
+
+    @property
+    def casts_shadow(self) -> bool:
+        """Whether it may be chosen."""
+        ...
+
+
+def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) -> tuple[int, ...]:
+    """The lights that cast, as indices into the scene's lights, in its order.
+
+    Args:
+        wanted: `auto` for the first directional, else the first spot light, and `all`, both of those that cast shadows;
+            or a light's name, or several.
+        lights: the scene's lights.
+
+    Raises:
+        SceneError: no light has that name.
+    """
+    if wanted == "auto":
+        kinds = [light.type if light.casts_shadow else None for light in lights]
+        return tuple([kinds.index(kind) for kind in ("directional", "spot") if kind in kinds][:1])
+    if wanted == "all":
+        return tuple(number for number, light in enumerate(lights) if light.casts_shadow)
+    names = [light.name for light in lights]
+    found = set()
+    for name in [wanted] if isinstance(wanted, str) else wanted:
+        if name not in names:
+            hint = suggestion(name, names, most=len(names)) or "; there is no light"
+            raise SceneError(f"the scene has no light '{name}'{hint}", name)
+        found.add(names.index(name))
+    return tuple(sorted(found))
+
+
+@dataclass(frozen=True)
+class ObjectFacts:
+    """What is known of an object that is drawn before the schedule: where it stands is not.
+
+    Attributes:
+        name: unique in the scene.
+        triangles, vertices: of its mesh.
+        casts_shadow: whether it does.
+        blended: its material is laid over what is behind it (`alpha_mode: blend`).
+        double_sided: its material shows from both sides.
+    """
+
+    name: str
+    triangles: int
+    vertices: int
+    casts_shadow: bool = True
+    blended: bool = False
+    double_sided: bool = False
+    _closed: Callable[[], bool] = field(default=bool, compare=False, repr=False)
+
+    @property
+    def closed(self) -> bool:
+        """Whether its mesh, welded where positions are equal, has two triangles at each edge that run it both ways."""
+        return self._closed()
 
 
 @dataclass(frozen=True)
@@ -58,11 +141,29 @@ class Facts:
         viewport: width and height of the picture.
         lights: the scene's lights in its order.
         inputs: what each connected input carries; a `many` input has one entry a link.
+        objects: the scene's objects that are not hidden, in its order.
     """
 
     viewport: tuple[int, int]
     lights: tuple[LightFacts, ...] = ()
     inputs: Mapping[str, tuple[TextureInfo, ...]] = field(default_factory=dict)
+    objects: tuple[ObjectFacts, ...] = ()
+
+    def casting(self, wanted: str | Sequence[str]) -> tuple[int, ...]:
+        """The lights that cast, as indices: `auto`, `all`, a light's name or several; see `casting_lights`.
+
+        Raises:
+            SceneError: no light has that name.
+        """
+        return casting_lights(wanted, self.lights)
+
+    def drawn(self, objects: str | Sequence[str]) -> tuple[ObjectFacts, ...]:
+        """The objects that a geometry step of these `objects` draws: `opaque`, …, or names."""
+        takes = SELECTIONS.get(objects) if isinstance(objects, str) else None
+        if takes is not None:
+            return tuple(one for one in self.objects if takes(one.casts_shadow, one.blended))
+        names = [objects] if isinstance(objects, str) else objects
+        return tuple(one for one in self.objects if one.name in names)
 
     def connected(self, name: str) -> bool:
         """Whether anything is linked to the input."""

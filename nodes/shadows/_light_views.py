@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from itertools import groupby
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -13,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api import SceneError, ViewMatrices, viewing
+from rendergraph.api import ViewMatrices, casting_lights, viewing
 
 Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
@@ -27,28 +26,17 @@ def layer_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[in
     """The light of each layer, as an index into the scene's lights.
 
     Args:
-        wanted: `auto`, a light's name, or several.
+        wanted: `auto`, `all`, a light's name, or several; see `casting_lights`.
         lights: the scene's lights, with `name`, `type` and `casts_shadow`, which `auto` asks for.
 
     Raises:
         SceneError: no light has that name.
     """
-    kinds = [light.type for light in lights]
-    if wanted == "auto":
-        casting = [light.type if light.casts_shadow else None for light in lights]
-        found = [casting.index(kind) for kind in ("directional", "spot") if kind in casting][:1]
-    else:
-        names = [light.name for light in lights]
-        found = sorted({_index(name, names) for name in ([wanted] if isinstance(wanted, str) else wanted)})
-    return tuple(index for index in found for _ in range(CUBE_FACES if kinds[index] == "point" else 1))
-
-
-def _index(name: str, names: list[str]) -> int:
-    if name in names:
-        return names.index(name)
-    near = get_close_matches(name, names, n=1)
-    way_out = f"did you mean '{near[0]}'?" if near else f"there is {', '.join(names) or 'no light'}"
-    raise SceneError(f"the scene has no light '{name}'; {way_out}", name)
+    return tuple(
+        index
+        for index in casting_lights(wanted, lights)
+        for _ in range(CUBE_FACES if lights[index].type == "point" else 1)
+    )
 
 
 def light_views(table: Sequence[int], scene: Any, camera: ViewMatrices, resolution: int) -> list[ViewMatrices]:

@@ -60,7 +60,7 @@ def merge(graphs: Sequence[Graph]) -> Merged:
         for name, end in graph.outputs.items()
     }
     first = graphs[0]
-    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures, unfilled=first.unfilled)
+    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures, objects=first.objects)
     return Merged(merged, names)
 
 

@@ -7,7 +7,7 @@ from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Sou
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
 from rendergraph.declare.node import DROPPED, Node
 from rendergraph.declare.parameters import Parameter, define, param, structural
-from rendergraph.facts import Facts, LightFacts, TextureInfo
+from rendergraph.facts import Facts, LightFacts, ObjectFacts, TextureInfo, casting_lights
 from rendergraph.ports import (
     PORT_TYPES,
     Function,
@@ -43,6 +43,7 @@ __all__ = [
     "LightFacts",
     "MeshData",
     "Node",
+    "ObjectFacts",
     "Output",
     "Parameter",
     "Part",
@@ -54,6 +55,7 @@ __all__ = [
     "TextureInfo",
     "Views",
     "WrittenPort",
+    "casting_lights",
     "declaration_mistakes",
     "define",
     "extension_mistakes",

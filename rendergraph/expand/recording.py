@@ -38,6 +38,7 @@ class Recording:
         self.facts = Facts(
             viewport=graph.size,
             lights=graph.lights,
+            objects=graph.objects or (),
             inputs={
                 name: tuple(graph.textures[end.now] for end in ends if end.now in graph.textures)
                 for name, ends in self.links.items()

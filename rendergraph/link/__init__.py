@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import InOut, Input, LightFacts, TextureInfo, WrittenPort
+from rendergraph.declare import Facts, InOut, Input, LightFacts, TextureInfo, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
+from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, kind_of
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
@@ -22,7 +23,10 @@ from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature
 
 
 def link(
-    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), unfilled: Collection[str] = ()
+    spec: PipelineSpec,
+    catalog: Catalog,
+    lights: Sequence[LightFacts] = (),
+    objects: Sequence[ObjectFacts] | None = None,
 ) -> Graph:
     """A checked graph.
 
@@ -30,16 +34,19 @@ def link(
         spec: the resolved pipeline.
         catalog: the node types.
         lights: the scene's lights in its order; sizes and layers may depend on them.
-        unfilled: what geometry steps may ask to draw and the scene has nothing of.
+        objects: the scene's objects that are drawn; None where there is no scene, and any may be.
 
     Raises:
         InputError: something is wrong, here or already in `spec.problems`; with all mistakes.
     """
-    return replace(_Linker(spec, catalog, lights).graph(), unfilled=frozenset(unfilled))
+    return _Linker(spec, catalog, lights, objects).graph()
 
 
 def sketch(
-    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), unfilled: Collection[str] = ()
+    spec: PipelineSpec,
+    catalog: Catalog,
+    lights: Sequence[LightFacts] = (),
+    objects: Sequence[ObjectFacts] | None = None,
 ) -> tuple[Graph, tuple[Problem, ...]]:
     """A graph to look at, where nothing is wrong but that node types are missing; those are drawn as far as known.
 
@@ -50,14 +57,14 @@ def sketch(
         InputError: something else is wrong; with all mistakes.
     """
     try:
-        return link(spec, catalog, lights, unfilled), ()
+        return link(spec, catalog, lights, objects), ()
     except InputError as error:
-        linker = _Linker(spec, catalog, lights, sketching=True)
+        linker = _Linker(spec, catalog, lights, objects, sketching=True)
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):
             raise
-        return replace(graph, unfilled=frozenset(unfilled)), error.problems
+        return graph, error.problems
 
 
 def endpoint(graph: Graph, text: str) -> Endpoint:
@@ -92,13 +99,20 @@ class _Linker:
     """
 
     def __init__(
-        self, spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts], *, sketching: bool = False
+        self,
+        spec: PipelineSpec,
+        catalog: Catalog,
+        lights: Sequence[LightFacts],
+        objects: Sequence[ObjectFacts] | None,
+        *,
+        sketching: bool = False,
     ) -> None:
         self.spec = spec
         self.sketching = sketching
         self.missing: list[Problem] = []
         self.catalog = spec.catalog or catalog
         self.lights = tuple(lights)
+        self.objects = None if objects is None else tuple(objects)
         self.problems: list[Problem] = []
         self.warnings: list[Problem] = []
 
@@ -111,7 +125,8 @@ class _Linker:
         outputs = self._outputs(names)
         knots = cycles(nodes)
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
-        infer = Infer(nodes, self.spec.size, self.lights, used | {found.source for found in outputs.values()})
+        used |= {found.source for found in outputs.values()}
+        infer = Infer(nodes, Facts(self.spec.size, self.lights, objects=self.objects or ()), used)
         textures: dict[Endpoint, TextureInfo] = {}
         if knots:
             self.problems += knots
@@ -132,6 +147,7 @@ class _Linker:
             outputs={name: found.source for name, found in outputs.items()},
             size=self.spec.size,
             lights=self.lights,
+            objects=self.objects,
             textures=textures,
             aliases=self._aliases(names),
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from rendergraph.catalog import NodeType
 from rendergraph.declare import LightFacts, Node, Texel, TextureInfo
 from rendergraph.errors import Place, Problem
+from rendergraph.facts import SELECTIONS, ObjectFacts
 from rendergraph.textures import Sampler
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class Graph:
             `Endpoint(node, port)`; an `InOut` shares its source's.
         warnings: what was noticed and is no error.
         aliases: the outputs of sub-pipelines, `glow.radiance`, and the ports inside that they stand for.
-        unfilled: what geometry steps may ask to draw and the scene has nothing of: `transparent`, `casters`, ….
+        objects: the scene's objects that are drawn; None where there is no scene.
     """
 
     name: str
@@ -85,13 +86,21 @@ class Graph:
     textures: Mapping[Endpoint, TextureInfo] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
     aliases: Mapping[str, Endpoint] = field(default_factory=dict)
-    unfilled: frozenset[str] = frozenset()
+    objects: tuple[ObjectFacts, ...] | None = None
 
     def __getitem__(self, node: str) -> GraphNode:
         return self.members[node]
 
     def __contains__(self, node: object) -> bool:
         return node in self.members
+
+    @cached_property
+    def unfilled(self) -> frozenset[str]:
+        """What geometry steps may ask to draw and the scene has nothing of: `transparent`, `casters`, …."""
+        if self.objects is None:
+            return frozenset()
+        kinds = {(one.casts_shadow, one.blended) for one in self.objects}
+        return frozenset(name for name, takes in SELECTIONS.items() if not any(takes(*kind) for kind in kinds))
 
     @property
     def nodes(self) -> list[GraphNode]:

@@ -20,7 +20,6 @@ from rendergraph.declare import (
     InOut,
     Input,
     Internal,
-    LightFacts,
     Node,
     Port,
     Texel,
@@ -107,13 +106,10 @@ class _Inputs(Mapping[str, Any]):
 class Infer:
     """Asks the rules of all nodes; keeps the answers and what is wrong with them."""
 
-    def __init__(
-        self, nodes: Mapping[str, Draft], viewport: tuple[int, int], lights: Sequence[LightFacts], used: set[Endpoint]
-    ) -> None:
+    def __init__(self, nodes: Mapping[str, Draft], scene: Facts, used: set[Endpoint]) -> None:
         self.nodes = nodes
-        self.viewport = viewport
+        self.scene = scene
         self.used = {end.now for end in used}
-        self.lights = tuple(lights)
         self.problems: list[Problem] = []
         self.infos: dict[Endpoint, TextureInfo | None] = {}
         self._open: set[Endpoint] = set()
@@ -201,7 +197,7 @@ class Infer:
     def _facts_of(self, draft: Draft) -> Facts:
         found = self._facts.get(draft.spec.id)
         if found is None:
-            found = Facts(self.viewport, self.lights, _Inputs(self, draft))
+            found = replace(self.scene, inputs=_Inputs(self, draft))
             self._facts[draft.spec.id] = found
         return found
 
@@ -296,7 +292,7 @@ class Infer:
     def _size(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> tuple[int, int] | None:
         rule: Any = 1.0 if port.size is None else port.size
         draft = self.nodes[end.node]
-        factor, base = 1.0, self.viewport
+        factor, base = 1.0, self.scene.viewport
         if callable(rule):
             given = self._ruled(end, "size", rule)
             try:

@@ -1,18 +1,13 @@
-"""Which of a scene's objects a geometry step draws."""
+"""Which of a scene's objects a geometry step draws, and what is known of them before the schedule."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cache, partial
 
-from rendergraph.scene.model import Material, Object, Scene
+import numpy as np
 
-SELECTIONS: dict[str, Callable[[Object, Material], bool]] = {
-    "all": lambda placed, material: True,
-    "opaque": lambda placed, material: material.alpha_mode != "blend",
-    "transparent": lambda placed, material: material.alpha_mode == "blend",
-    "casters": lambda placed, material: placed.casts_shadow and material.alpha_mode != "blend",
-}
-"""By the names that steps use. Keyframes change none of this, so that it holds for all frames."""
+from rendergraph.facts import SELECTIONS, ObjectFacts
+from rendergraph.scene.model import Mesh, Scene
 
 
 def selected(scene: Scene, name: str) -> list[int]:
@@ -21,10 +16,44 @@ def selected(scene: Scene, name: str) -> list[int]:
     return [
         number
         for number, placed in enumerate(scene.objects)
-        if not placed.hidden and takes(placed, scene.materials[placed.material])
+        if not placed.hidden and takes(placed.casts_shadow, scene.materials[placed.material].alpha_mode == "blend")
     ]
 
 
-def unfilled_selections(scene: Scene) -> frozenset[str]:
-    """The selections that no object of the scene is in."""
-    return frozenset(name for name in SELECTIONS if not selected(scene, name))
+def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
+    """What is known of the objects that are drawn, in the scene's order."""
+    closed = [cache(partial(is_closed, mesh)) for mesh in scene.meshes]
+    found = []
+    for number in selected(scene, "all"):
+        placed = scene.objects[number]
+        mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
+        found.append(
+            ObjectFacts(
+                placed.name,
+                len(mesh.indices),
+                len(mesh.positions),
+                placed.casts_shadow,
+                material.alpha_mode == "blend",
+                material.double_sided,
+                closed[placed.mesh],
+            )
+        )
+    return tuple(found)
+
+
+def is_closed(mesh: Mesh) -> bool:
+    """Whether each edge of a mesh, welded by position, has one triangle that runs it one way, and one the other way.
+
+    Triangles without area count for nothing.
+    """
+    if not len(mesh.indices):
+        return False
+    _, welded = np.unique(mesh.positions, axis=0, return_inverse=True)
+    corners = welded.reshape(-1)[mesh.indices].astype(np.int64)
+    a, b, c = corners.T
+    corners = corners[(a != b) & (b != c) & (c != a)]
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    count = int(corners.max(initial=0)) + 1
+    one_way, times = np.unique(edges[:, 0] * count + edges[:, 1], return_counts=True)
+    other_way = np.unique(edges[:, 1] * count + edges[:, 0])
+    return len(corners) > 0 and bool((times == 1).all()) and np.array_equal(one_way, other_way)

@@ -22,7 +22,7 @@ from rendergraph.errors import InputError, Problem
 from rendergraph.scene.animate import complete
 from rendergraph.scene.cameras import light_facts
 from rendergraph.scene.model import Scene
-from rendergraph.scene.selection import unfilled_selections
+from rendergraph.scene.selection import object_facts
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
@@ -69,7 +69,7 @@ def link(resolved: Resolved) -> Linked:
         scene = scene_of(resolved)
     except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
         raise InputError([*spec.problems, *error.problems]) from None
-    graph = rendergraph.link.link(spec, catalog, light_facts(scene), unfilled_selections(scene))
+    graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene))
     return Linked(selection, catalog, spec, scene, graph)
 
 

@@ -100,6 +100,10 @@ class Steps:
         """Whether anybody reads an output; one that nobody reads, or that the class drops, need not be written."""
         return port is not None and self._recorder.used(checks.own_port(self.ports, port, "used's argument"))
 
+    def draws(self, objects: str | Sequence[str]) -> bool:
+        """Whether a geometry step of these `objects` would draw anything in this scene: `transparent`, …, or names."""
+        return bool(self.facts.drawn(checks.objects(objects)))
+
     def needs(self, parameter: str) -> tuple[str, ...]:
         """What the choice of a parameter says that it needs, where choices are includes."""
         return self._recorder.needs(parameter)

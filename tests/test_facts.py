@@ -1,0 +1,107 @@
+"""What nodes are told of the scene before the schedule: objects, and the lights that cast."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rendergraph as rg
+from rendergraph.api import Facts, LightFacts, Node, ObjectFacts, Output, Radiance, SceneError, Steps, casting_lights
+from rendergraph.scene.model import Mesh
+from rendergraph.scene.selection import is_closed, object_facts
+
+LIGHTS = (
+    LightFacts("fill", "directional", casts_shadow=False),
+    LightFacts("lamp", "spot"),
+    LightFacts("key", "directional"),
+    LightFacts("bulb", "point"),
+)
+SCENE = """objects:
+  floor: {shape: plane, size: [4, 4], material: white}
+  ball: {shape: sphere, at: [0, 1, 0], material: glass}
+  box: {shape: box, at: [1, 1, 0], material: white, casts_shadow: false}
+  gone: {shape: box, hidden: true}
+materials:
+  white: {double_sided: true}
+  glass: {alpha_mode: blend}
+"""
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found"),
+    [("auto", (2,)), ("all", (1, 2, 3)), ("fill", (0,)), (["bulb", "lamp", "bulb"], (1, 3)), ([], ())],
+)
+def test_lights_that_cast(wanted: Any, found: tuple[int, ...]) -> None:
+    assert Facts((1, 1), LIGHTS).casting(wanted) == found == casting_lights(wanted, LIGHTS)
+
+
+def test_auto_takes_a_spot_light_where_no_directional_one_casts_and_nothing_else() -> None:
+    assert casting_lights("auto", LIGHTS[:2]) == (1,)
+    assert casting_lights("auto", LIGHTS[3:]) == ()
+
+
+def test_a_light_that_is_not_there() -> None:
+    with pytest.raises(SceneError, match="the scene has no light 'kye'; did you mean 'key'"):
+        casting_lights("kye", LIGHTS)
+    with pytest.raises(SceneError, match="the scene has no light 'sun'; there is no light"):
+        casting_lights("sun", ())
+
+
+class Told(Node):
+    """A picture, after having looked at the scene."""
+
+    color = Output(Radiance, clear=0.0, doc="Triangles.")
+
+    def record(self, steps: Steps) -> None:
+        words = ("all", "opaque", "transparent", "casters", ["ball", "box"], ["gone"])
+        SEEN.append((steps.facts.objects, {str(word): steps.draws(word) for word in words}))
+        steps.clear(self.color, 0.0)
+
+
+SEEN: list[tuple[tuple[ObjectFacts, ...], dict[str, bool]]] = []
+
+
+def test_record_is_told_of_the_scenes_objects(bench: Any) -> None:
+    bench.pipeline("nodes: {a: {type: told}}\noutputs: {image: a.color}", Told, scene=SCENE).plan()
+    objects, draws = SEEN.pop()
+    floor, ball, box = objects
+    assert floor == ObjectFacts("floor", 2, 4, True, False, True)
+    assert (ball.name, ball.blended, ball.double_sided, ball.casts_shadow) == ("ball", True, False, True)
+    assert (box.name, box.triangles, box.casts_shadow) == ("box", 12, False)
+    assert [one.closed for one in objects] == [False, True, True]
+    assert draws.pop("['gone']") is False
+    assert all(draws.values())
+
+
+def test_steps_draws_what_is_there(bench: Any) -> None:
+    scene = "objects: {pane: {shape: plane, material: glass}}\nmaterials: {glass: {alpha_mode: blend}}\n"
+    bench.pipeline("nodes: {a: {type: told}}\noutputs: {image: a.color}", Told, scene=scene).plan()
+    _, draws = SEEN.pop()
+    assert draws["transparent"]
+    assert draws["all"]
+    assert not any(draws[word] for word in ("opaque", "casters", "['ball', 'box']"))
+
+
+def test_shipped_scenes_are_told_of() -> None:
+    objects = object_facts(rg.load("forward").link().scene)
+    assert sum(one.triangles for one in objects) > 10
+    assert len({one.name for one in objects}) == len(objects)
+
+
+def test_a_mesh_is_closed_where_every_edge_has_two_sides() -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint32)
+
+    def mesh(indices: Any, positions: Any = corners) -> Mesh:
+        return Mesh("m", positions, indices, positions)
+
+    assert is_closed(mesh(faces))
+    apart = mesh(np.arange(12, dtype=np.uint32).reshape(4, 3), corners[faces.reshape(-1)])
+    assert is_closed(apart)  # welded by position
+    assert not is_closed(mesh(faces[:3]))
+    assert not is_closed(mesh(np.concatenate([faces, faces])))
+    assert not is_closed(mesh(np.concatenate([faces[:3], faces[3:, ::-1]])))
+    assert is_closed(mesh(np.concatenate([faces, np.array([[0, 1, 1]], np.uint32)])))
+    assert not is_closed(mesh(np.zeros((0, 3), np.uint32)))
