@@ -106,7 +106,7 @@ class GeometryCompiler:
 
     def _grouped(self, step: Step, objects: list[int]) -> list[Batch]:
         view = (step.view or CAMERA, step.view_index or 0)
-        key = (view, tuple(objects), step.materials, step.state.cull)
+        key = (view, tuple(objects), step.materials, step.state.cull, step.state.front)
         if key not in self._batches:
             groups: dict[BatchKey, list[int]] = {}
             for index in objects:
@@ -179,11 +179,11 @@ class GeometryCompiler:
         placed = scene.objects[index]
         material = scene.materials[placed.material]
         defines, found = features(material, scene.meshes[placed.mesh], step.materials)
-        mirrored = bool(self.scene.packed.mirrored[index])
-        cull = step.state.cull
+        cull, front = step.state.cull, step.state.front
+        clockwise = bool(self.scene.packed.mirrored[index]) if front == "object" else front == "clockwise"
         if cull == "material":
             cull = "none" if material.double_sided else "back"
-        return BatchKey(tuple(defines.items()), tuple(found.items()), cull, mirrored)
+        return BatchKey(tuple(defines.items()), tuple(found.items()), cull, clockwise)
 
 
 def select(scene: Scene, step: Step) -> list[int]:

@@ -326,6 +326,7 @@ class _Compiler:
             # OpenGL writes no depth where the test is off.
             depth_test, state = True, replace(state, depth_func="always")
         resolved = cull or ("none" if state.cull == "material" else state.cull)
+        clockwise = clockwise or state.front == "clockwise"
         targets = sum(write.use == "color" for write in step.writes)
         return gl_state.pieces(
             self.device.raw, state, depth_test=depth_test, cull=resolved, clockwise=clockwise, targets=targets

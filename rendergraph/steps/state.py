@@ -23,6 +23,7 @@ BlendFactor = Literal[
 ]
 BlendOp = Literal["add", "subtract", "reverse_subtract", "min", "max"]
 Cull = Literal["material", "back", "front", "none"]
+Front = Literal["object", "counter_clockwise", "clockwise"]
 
 
 _Byte: TypeAlias = Annotated[int, Range(0, 255)]
@@ -98,6 +99,9 @@ class State:
         blend: one `Blend` for all targets, one a target, or None.
         color_mask: which of RGBA are written.
         cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`.
+        front: which triangles show their front: those that run counter-clockwise on the screen, and with `object` of an
+            object that its transform mirrors those that run clockwise, as the winding of its corners is turned, too. A
+            geometry shader that winds its triangles by itself, and does not pass on the order it is given, says one.
         stencil: stencil state, None for off.
         scissor: x, y, width, height in texels from the bottom left.
         polygon_offset: factor and units of filled triangles' depth, negative for nearer; not of `wireframe`'s lines.
@@ -111,6 +115,7 @@ class State:
     blend: Annotated[Blend | tuple[Blend | None, ...] | None, "a Blend, a tuple of them, or None"] = None
     color_mask: Annotated[tuple[bool, bool, bool, bool], "four of True and False"] = (True, True, True, True)
     cull: Cull = "material"
+    front: Front = "object"
     stencil: Stencil | None = None
     scissor: Annotated[tuple[int, int, int, int], "x, y, width and height in texels"] | None = None
     polygon_offset: Annotated[tuple[float, float], "a factor and units"] | None = None

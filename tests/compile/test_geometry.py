@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from rendergraph.api import (
     Depth,
     InOut,
     Input,
+    Luminance,
     Node,
     Output,
     Radiance,
@@ -225,6 +226,60 @@ def test_back_faces_of_single_sided_materials_are_culled_and_mirrors_turn_the_wi
     _triangles(bench.folder, doubleSided=True)
     again = bench.pipeline(TEXT, Ids, shaders=SHADERS, size=(48, 16)).with_scene(bench.folder / "t.gltf")
     assert bench.session.render(again)["image"][12, 19, 0] == 2
+
+
+class Wound(Node):
+    """Triangles that a geometry shader winds counter-clockwise on the screen, whatever it is given."""
+
+    color = Output(Luminance, format="r32f", clear=0.0, doc="1 where a front shows, 2 where a back does.")
+    front: Literal["object", "counter_clockwise", "clockwise"] = structural(default="object", doc="What is a front.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(
+            "sides.frag",
+            geometry="wound.geom",
+            out=self.color,
+            materials="none",
+            state=State(cull="none", front=self.front),
+        )
+
+
+WOUND = {
+    "sides.frag": "out float color; void main() { color = gl_FrontFacing ? 1.0 : 2.0; }",
+    "wound.geom": """layout(triangles) in;
+layout(triangle_strip, max_vertices = 3) out;
+void main() {
+    vec2 a = gl_in[0].gl_Position.xy, b = gl_in[1].gl_Position.xy, c = gl_in[2].gl_Position.xy;
+    bool turned = determinant(mat2(b - a, c - a)) < 0.0;
+    for (int i = 0; i < 3; ++i) {
+        gl_Position = gl_in[turned ? 2 - i : i].gl_Position;
+        EmitVertex();
+    }
+}
+""",
+}
+
+
+@pytest.mark.parametrize(
+    ("front", "shown"), [("object", [1, 1, 2]), ("counter_clockwise", [1, 1, 1]), ("clockwise", [2, 2, 2])]
+)
+def test_a_geometry_shader_that_winds_by_itself_says_what_a_front_is(bench: Any, front: str, shown: list[int]) -> None:
+    text = f"nodes: {{w: {{type: wound, params: {{front: {front}}}}}}}\noutputs: {{image: w.color}}"
+    pipeline = bench.pipeline(text, Wound, shaders=WOUND, size=(48, 16))
+    _triangles(bench.folder)
+    image = bench.session.render(pipeline.with_scene(bench.folder / "t.gltf"))["image"][..., 0]
+    assert [image[12, column] for column in (3, 19, 44)] == shown
+
+
+def test_a_step_that_says_what_a_front_is_needs_no_batch_for_mirrors(bench: Any) -> None:
+    calls = []
+    for front in ("object", "counter_clockwise"):
+        text = f"nodes: {{w: {{type: wound, params: {{front: {front}}}}}}}\noutputs: {{image: w.color}}"
+        pipeline = bench.pipeline(text, Wound, shaders=WOUND, size=(48, 16))
+        _triangles(bench.folder)
+        bench.session.render(pipeline.with_scene(bench.folder / "t.gltf"))
+        calls.append(len(bench.session.cache.active.steps[0][0].draws))
+    assert calls == [2, 1]
 
 
 class Blended(Node):
