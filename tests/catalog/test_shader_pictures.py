@@ -220,3 +220,32 @@ def test_the_pictures_metadata_draw_the_same_again(gl: rg.Session, tmp_path: Pat
     rg.load(tmp_path / "p.yaml", size=SIZE).render(session=gl).save(tmp_path / "a.png")
     again = drawn(gl, tmp_path, {"p.yaml": read_metadata(tmp_path / "a.png")["pipeline"]})
     np.testing.assert_array_equal(found, again)
+
+
+KEPT = """/*---
+doc: A table.
+outputs:
+  table: {format: r32f, size: [4, 4], kept: true, doc: Values.}
+params:
+  value: {default: 3, min: 0, max: 9, doc: What it holds.}
+---*/
+uniform float value;
+out float table;
+void main() { table = value; }
+"""
+
+
+def test_what_a_header_keeps_is_made_once(gl: rg.Session, tmp_path: Path) -> None:
+    (tmp_path / "table.frag").write_text(KEPT)
+    show = "/*---\ninputs: {table: {size: any}}\n---*/\nuniform sampler2D table;\nout vec4 shown;\nvoid main() { shown = texelFetch(table, ivec2(0), 0).rrrr; }\n"
+    (tmp_path / "show.frag").write_text(show)
+    text = "nodes: {t: {type: ./table.frag}, s: {type: ./show.frag, inputs: {table: t.table}}}\noutputs: {image: s.shown}\n"
+    (tmp_path / "p.yaml").write_text(text)
+    frame = rg.load(tmp_path / "p.yaml", size=SIZE).render(session=gl)
+    assert (frame["image"] == 3.0).all()
+    assert [entry["node"] for entry in frame.passes] == ["s"]
+    (tmp_path / "table.frag").write_text(KEPT.replace("= value", "= value * camera.eye.x"))
+    with pytest.raises(
+        InputError, match=r"table\.frag:10:\d+: RG439 .* 't.table', which is kept, but looks at the camera"
+    ):
+        rg.load(tmp_path / "p.yaml", size=SIZE).check()

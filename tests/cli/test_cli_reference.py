@@ -194,3 +194,10 @@ def test_types_read_as_in_the_file() -> None:
 def test_tables_are_aligned() -> None:
     assert table([("a", 1, "x"), ("bbb", 22, None)], ("n", "v", ""), right=(1,)) == "n     v\na     1  x\nbbb  22"
     assert table([]) == ""
+
+
+def test_what_is_kept_says_so(cli: Any) -> None:
+    described = cli("explain", "ssao_hemisphere", "--json").json
+    kept = [port["name"] for port in described["internal"] if port.get("kept")]
+    assert kept == ["noise"]
+    assert "kept from frame to frame" in cli("explain", "ssao_hemisphere").out
