@@ -136,7 +136,7 @@ class Misuse(Exception):
 
 
 class SceneError(Exception):
-    """What a node says of a scene that it cannot work on, in a rule of its ports: a message for users.
+    """What a node says of a scene that it cannot work on, in a rule of its ports or in `record`: a message for users.
 
     Attributes:
         subject: the name that it speaks of, as a parameter has it; the message is shown there.

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 
 from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port, Views
 from rendergraph.declare.blame import happened
-from rendergraph.errors import InputError, Misuse, Problem, node_named
+from rendergraph.document import shown
+from rendergraph.errors import InputError, Misuse, Problem, SceneError, node_named
 from rendergraph.expand.model import is_empty
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
@@ -257,6 +258,8 @@ def _returns_nothing(value: object) -> None:
 def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", doing: str = "recording") -> Problem:
     """What a node's own code raised or asked for wrongly, with the author's line."""
     who = node_named(node.id, node.type.name)
+    if isinstance(error, SceneError):
+        return Problem("RG209", f"{who}: {shown(error, 200)}", node.place)
     mistake = happened(error, type(node.node), node.type.file)
     if isinstance(error, Misuse):
         return mistake.problem(error.code, who, node.place)

@@ -125,6 +125,12 @@ def test_a_record_that_gives_something_back(author: Any, head: str, body: str, k
     assert said == f"test.yaml:4:3: RG423 node 'a' (wrong): {expected}"
 
 
+def test_a_record_that_refuses_the_scene(author: Any) -> None:
+    author.node(f"{COLOR}def record(self, steps):\n    steps.facts.casting('moon')")
+    (said,) = author.said(author.pipeline(scene="objects: {box: {shape: box}}\nlights: {sun: {type: point}}\n").check)
+    assert said.endswith("RG209 node 'a' (wrong): the scene has no light 'moon'; there is sun")
+
+
 UPDATES = {
     "frame.set_views(self.views, [])": "'a.views' has 1 views, but update set 0",
     "frame.set_views(self.views, [None])": "set_views is given NoneType, not ViewMatrices",
