@@ -83,7 +83,7 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) ->
 
 @dataclass(frozen=True)
 class ObjectFacts:
-    """What is known of an object that is drawn before the schedule: where it stands is not.
+    """What is known of an object before the schedule: where it stands is not.
 
     Attributes:
         name: unique in the scene.
@@ -91,6 +91,7 @@ class ObjectFacts:
         casts_shadow: whether it does.
         blended: its material is laid over what is behind it (`alpha_mode: blend`).
         double_sided: its material shows from both sides.
+        hidden: it is drawn only where a step names it.
     """
 
     name: str
@@ -99,6 +100,7 @@ class ObjectFacts:
     casts_shadow: bool = True
     blended: bool = False
     double_sided: bool = False
+    hidden: bool = False
     _closed: Callable[[], bool] = field(default=bool, compare=False, repr=False)
 
     @property
@@ -141,7 +143,7 @@ class Facts:
         viewport: width and height of the picture.
         lights: the scene's lights in its order.
         inputs: what each connected input carries; a `many` input has one entry a link.
-        objects: the scene's objects that are not hidden, in its order.
+        objects: the scene's objects in its order.
     """
 
     viewport: tuple[int, int]
@@ -161,7 +163,7 @@ class Facts:
         """The objects that a geometry step of these `objects` draws: `opaque`, …, or names."""
         takes = SELECTIONS.get(objects) if isinstance(objects, str) else None
         if takes is not None:
-            return tuple(one for one in self.objects if takes(one.casts_shadow, one.blended))
+            return tuple(one for one in self.objects if not one.hidden and takes(one.casts_shadow, one.blended))
         names = [objects] if isinstance(objects, str) else objects
         return tuple(one for one in self.objects if one.name in names)
 

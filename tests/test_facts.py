@@ -55,7 +55,7 @@ class Told(Node):
     color = Output(Radiance, clear=0.0, doc="Triangles.")
 
     def record(self, steps: Steps) -> None:
-        words = ("all", "opaque", "transparent", "casters", ["ball", "box"], ["gone"])
+        words: tuple[Any, ...] = ("all", "opaque", "transparent", "casters", ["ball", "box"], ["gone"])
         SEEN.append((steps.facts.objects, {str(word): steps.draws(word) for word in words}))
         steps.clear(self.color, 0.0)
 
@@ -66,12 +66,13 @@ SEEN: list[tuple[tuple[ObjectFacts, ...], dict[str, bool]]] = []
 def test_record_is_told_of_the_scenes_objects(bench: Any) -> None:
     bench.pipeline("nodes: {a: {type: told}}\noutputs: {image: a.color}", Told, scene=SCENE).plan()
     objects, draws = SEEN.pop()
-    floor, ball, box = objects
+    floor, ball, box, gone = objects
     assert floor == ObjectFacts("floor", 2, 4, True, False, True)
     assert (ball.name, ball.blended, ball.double_sided, ball.casts_shadow) == ("ball", True, False, True)
     assert (box.name, box.triangles, box.casts_shadow) == ("box", 12, False)
-    assert [one.closed for one in objects] == [False, True, True]
-    assert draws.pop("['gone']") is False
+    assert [one.closed for one in objects] == [False, True, True, True]
+    assert gone.hidden
+    assert gone not in Facts((1, 1), objects=objects).drawn("all")
     assert all(draws.values())
 
 

@@ -19,7 +19,6 @@ import numpy.typing as npt
 from rendergraph.compile.executable import Call, Draw, SortedDraws
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
-from rendergraph.errors import InputError, suggestion
 from rendergraph.expand import CAMERA
 from rendergraph.scene.model import Material, Mesh, Scene, Texture
 from rendergraph.scene.selection import selected
@@ -187,21 +186,10 @@ class GeometryCompiler:
 
 
 def select(scene: Scene, step: Step) -> list[int]:
-    """The objects a step draws, in the scene's order.
-
-    Raises:
-        InputError: a name that no object has.
-    """
+    """The objects a step draws: in the scene's order, or in that of their names, which `expand` has found there."""
     if isinstance(step.objects, str):
         return selected(scene, step.objects)
     names = {placed.name: number for number, placed in enumerate(scene.objects)}
-    problems = [
-        step.problem("RG431", f"it draws object '{name}', which the scene does not have{suggestion(name, names)}")
-        for name in step.objects
-        if name not in names
-    ]
-    if problems:
-        raise InputError(problems)
     return [names[name] for name in step.objects]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
-from rendergraph.errors import InputError, Misuse, Problem, SceneError, node_named
+from rendergraph.errors import InputError, Misuse, Problem, SceneError, node_named, suggestion
 from rendergraph.expand.model import is_empty
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
@@ -68,6 +68,12 @@ class Recording:
     def add(self, request: StepRequest) -> None:
         """Keep a request, unless it would draw nothing onto what is there already."""
         objects = request.options.get("objects")
+        if isinstance(objects, tuple) and self.graph.objects is not None:
+            names = [one.name for one in self.graph.objects]
+            for name in objects:
+                if name not in names:
+                    text = f"it draws object '{name}', which the scene does not have{suggestion(name, names)}"
+                    raise Misuse(text, "RG431")
         if request.kind == "geometry" and objects in self.graph.unfilled:
             begun = {part for earlier in self.requests for _, part in earlier.out}
             if all(part in begun or self.continues(part.port) for _, part in request.out):

@@ -34,7 +34,7 @@ def link(
         spec: the resolved pipeline.
         catalog: the node types.
         lights: the scene's lights in its order; sizes and layers may depend on them.
-        objects: the scene's objects that are drawn; None where there is no scene, and any may be.
+        objects: the scene's objects; None where there is no scene, and any may be.
 
     Raises:
         InputError: something is wrong, here or already in `spec.problems`; with all mistakes.

@@ -75,7 +75,7 @@ class Graph:
             `Endpoint(node, port)`; an `InOut` shares its source's.
         warnings: what was noticed and is no error.
         aliases: the outputs of sub-pipelines, `glow.radiance`, and the ports inside that they stand for.
-        objects: the scene's objects that are drawn; None where there is no scene.
+        objects: the scene's objects; None where there is no scene.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Graph:
         """What geometry steps may ask to draw and the scene has nothing of: `transparent`, `casters`, …."""
         if self.objects is None:
             return frozenset()
-        kinds = {(one.casts_shadow, one.blended) for one in self.objects}
+        kinds = {(one.casts_shadow, one.blended) for one in self.objects if not one.hidden}
         return frozenset(name for name, takes in SELECTIONS.items() if not any(takes(*kind) for kind in kinds))
 
     @property

@@ -21,11 +21,10 @@ def selected(scene: Scene, name: str) -> list[int]:
 
 
 def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
-    """What is known of the objects that are drawn, in the scene's order."""
+    """What is known of the objects, in the scene's order."""
     closed = [cache(partial(is_closed, mesh)) for mesh in scene.meshes]
     found = []
-    for number in selected(scene, "all"):
-        placed = scene.objects[number]
+    for placed in scene.objects:
         mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
         found.append(
             ObjectFacts(
@@ -35,6 +34,7 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
                 placed.casts_shadow,
                 material.alpha_mode == "blend",
                 material.double_sided,
+                placed.hidden,
                 closed[placed.mesh],
             )
         )

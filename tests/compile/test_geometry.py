@@ -82,10 +82,10 @@ def test_a_step_draws_the_objects_it_names(draw: Draw, objects: Any, seen: set[i
         assert image[0, -1, 0] == 2
 
 
-def test_an_object_that_the_scene_lacks_is_named(draw: Draw) -> None:
+def test_an_object_that_the_scene_lacks_is_named_by_check(bench: Any) -> None:
     text = "nodes: {i: {type: ids, params: {objects: [nobody]}}}\noutputs: {image: i.color}"
     with pytest.raises(InputError, match=r"RG431 node 'i' .*: it draws object 'nobody', which the scene does not have"):
-        draw(text, Ids, shaders=SHADERS, scene=BOXES)
+        bench.pipeline(text, Ids, shaders=SHADERS, scene=BOXES).check()
 
 
 class Over(Node):
