@@ -37,8 +37,8 @@ class ShadowMapNode(Node):
 
     light: str | tuple[str, ...] = structural(
         default="auto",
-        doc="Lights that cast: names, or of those whose `casts_shadow` the scene does not switch off `all`, or `auto`: the "
-        "first directional, else the first spot light.",
+        doc="Lights that cast: names, or of those whose `casts_shadow` the scene does not switch off `all`, or `auto`: "
+        "the first directional, else the first spot light.",
     )
     resolution: int = structural(default=2048, unit="texels", min=1, max=16384, doc="Side of each layer.")
     slope_bias: float = structural(
