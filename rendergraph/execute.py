@@ -24,7 +24,7 @@ from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
 from rendergraph.steps import ViewMatrices
 from rendergraph.steps.checks import buffer as buffer_of
 from rendergraph.steps.checks import own_port
-from rendergraph.textures import BufferDesc, TextureDesc
+from rendergraph.textures import BufferDesc
 
 
 @dataclass(frozen=True)
@@ -271,19 +271,19 @@ class Runner:
             self.executable.renew()
             raise RenderError(Problem("RG614", f"the driver reported {error} while drawing"))
 
-    def read(self, resource: str) -> npt.NDArray[Any]:
+    def read(self, resource: str, *, mip: int = 0, layer: int | None = None, stencil: bool = False) -> npt.NDArray[Any]:
         """A resource's texels after the last frame: (height, width, channels), with layers before where it has them.
 
-        The top row comes first.
+        The top row comes first; samples are resolved. A `layer` stands alone, `stencil` instead of depth.
         """
         executable = self.executable
         desc = executable.plan.resources[resource].desc
         if isinstance(desc, BufferDesc):
             executable.device.ctx.finish()
             return np.frombuffer(executable.memory.buffer(resource).read(desc.bytes), np.uint8)
-        texels = textures.read(executable.device, executable.memory.texture(resource, self._parity))
-        assert isinstance(desc, TextureDesc)
-        return texels[0] if desc.kind == "texture2d" else texels
+        texture = executable.memory.texture(resource, self._parity)
+        texels = textures.read(executable.device, texture, mip=mip, layer=layer, stencil=stencil)
+        return texels[0] if desc.kind == "texture2d" or layer is not None else texels
 
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:

@@ -226,6 +226,13 @@ class TextureDesc:
         """Width and height of one level."""
         return max(1, self.width >> mip), max(1, self.height >> mip)
 
+    def lacks(self, mip: int | None, layer: int | None) -> str | None:
+        """The mip or layer that it does not have, as the end of a sentence that names it; None where it has them."""
+        for name, number, count in (("mip", mip, self.mips), ("layer", layer, self.layers)):
+            if number is not None and number >= count:
+                return f"has no {name} {number}; it has {f'0 to {count - 1}' if count > 1 else 'only 0'}"
+        return None
+
     @property
     def storage_class(self) -> TextureDesc:
         """The description with its format replaced by the texel class's name: equal ones can share through a view."""

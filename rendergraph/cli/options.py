@@ -82,10 +82,15 @@ def _output(text: str) -> Target:
 
 
 def _tap(text: str) -> Target:
-    found = re.fullmatch(rf"({_NODE}\.\w+)=(.*)", text, re.DOTALL)
+    from rendergraph.session.selection import TEXTURE_PART
+
+    found = re.fullmatch(rf"(?P<name>{_NODE}\.\w+{TEXTURE_PART})=(?P<file>.*)", text, re.DOTALL)
     if not found:
-        raise ValueError(f"'{text}' is not NODE.PORT=FILE, as in sun.shadow_map=depth.exr")
-    return Target(found[1], _picture(found[2], text), is_tap=True)
+        example = (
+            "sun.shadow_map=depth.exr; of a part 'sun.shadow_map[1]=…', 'bloom.glow[mip=1]=…', 'light.marks:stencil=…'"
+        )
+        raise ValueError(f"'{text}' is not NODE.PORT=FILE, as in {example}")
+    return Target(found["name"], _picture(found["file"], text), is_tap=True)
 
 
 def _picture(name: str, text: str) -> Path:

@@ -141,8 +141,8 @@ def _check(targets: Sequence[Target], expanded: Expanded) -> None:
     from rendergraph.images.saving import extension
 
     linked, numbers = expanded.linked, expanded.options.frames
-    for name, end in expanded.wanted.items():
-        if linked.graph.textures[end].desc is None:
+    for name, port in expanded.wanted.items():
+        if linked.graph.textures[port.end].desc is None:
             text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
             raise InputError(Problem("RG508", text))
     selection = linked.selection

@@ -7,7 +7,7 @@ differ and aliased textures would otherwise share filter state.
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -118,31 +118,78 @@ def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
     return _CHANNELS[fmt.components], _FLOAT, np.float32, fmt.components
 
 
-def read(device: Device, texture: GpuTexture, *, mip: int = 0) -> npt.NDArray[Any]:
-    """Texels as (layers, height, width, channels), the top row first; samples must be resolved before.
+def read(
+    device: Device, texture: GpuTexture, *, mip: int = 0, layer: int | None = None, stencil: bool = False
+) -> npt.NDArray[Any]:
+    """Texels as (layers, height, width, channels), the top row first.
 
-    `finish` comes first: without it a software rasteriser has returned stale texels.
+    Samples are resolved: the mean of colours, one sample of depth, stencil and whole numbers. `finish` comes first:
+    without it a software rasteriser has returned stale texels.
+
+    Args:
+        device: where it is.
+        texture: what is read.
+        mip: its level.
+        layer: one layer alone; all of them by default.
+        stencil: the stencil as 32-bit integers, in place of the depth.
     """
     desc = texture.desc
+    if desc.samples > 1:
+        resolved = _resolved(device, texture)
+        try:
+            return read(device, resolved, layer=layer, stencil=stencil)
+        finally:
+            delete(device, resolved)
+    first, layers = (0, desc.layers) if layer is None else (layer, 1)
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
-    texels: npt.NDArray[Any] = np.empty((desc.layers, height, width, channels), dtype)
+    texels: npt.NDArray[Any] = np.empty((layers, height, width, channels), dtype)
     device.ctx.finish()
     device.raw.glPixelStorei(0x0D05, 1)
     device.raw.glGetTextureSubImage(
-        texture.glo, mip, 0, 0, 0, width, height, desc.layers, gl_format, gl_type, texels.nbytes, texels.ctypes.data
+        texture.glo, mip, 0, 0, first, width, height, layers, gl_format, gl_type, texels.nbytes, texels.ctypes.data
     )
     error = device.raw.error()
     if error:
         raise RenderError(Problem("RG613", f"reading back a {desc.format} texture failed ({error})"))
     if FORMATS[desc.format].family == "depth_stencil":
-        texels = texels[..., :1]
+        texels = texels[..., 1:].view(np.uint32) & 255 if stencil else texels[..., :1]
     if FORMATS[desc.format].srgb:  # drivers hand out the encoded bytes; what the texels mean is linear
         code = np.arange(256) / 255
         linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
         colors, alpha = np.take(linear, texels[..., :3]), texels[..., 3:] / np.float32(255)
         texels = np.concatenate([colors, alpha], axis=-1)
     return texels[:, ::-1]
+
+
+def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
+    """A new texture with one sample a texel.
+
+    The driver does it, and of depth and whole numbers takes one sample: the first, on those that this was tried on.
+    """
+    raw, desc = device.raw, texture.desc
+    made = create(device, replace(desc, samples=1), "a resolved texture")
+    family, srgb = FORMATS[desc.format].family, FORMATS[desc.format].srgb
+    point, mask = {"depth": (0x8D00, 0x100), "depth_stencil": (0x821A, 0x500)}.get(family, (0x8CE0, 0x4000))
+    scissor, encoding = bool(raw.glIsEnabledi(0x0C11, 0)), bool(raw.glIsEnabled(0x8DB9))
+    source, target = (raw.make("glCreateFramebuffers") for _ in range(2))
+    try:
+        raw.glDisablei(0x0C11, 0)
+        (raw.glEnable if srgb else raw.glDisable)(0x8DB9)
+        for layer in range(desc.layers):
+            for framebuffer, attached in ((source, texture), (target, made)):
+                if desc.kind == "texture2d":
+                    raw.glNamedFramebufferTexture(framebuffer, point, attached.glo, 0)
+                else:
+                    raw.glNamedFramebufferTextureLayer(framebuffer, point, attached.glo, 0, layer)
+            box = (0, 0, desc.width, desc.height)
+            raw.glBlitNamedFramebuffer(source, target, *box, *box, mask, 0x2600)
+    finally:
+        (raw.glEnablei if scissor else raw.glDisablei)(0x0C11, 0)
+        (raw.glEnable if encoding else raw.glDisable)(0x8DB9)
+        raw.delete("glDeleteFramebuffers", source)
+        raw.delete("glDeleteFramebuffers", target)
+    return made
 
 
 def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip: int = 0) -> None:

@@ -15,7 +15,8 @@ from rendergraph.scene.cameras import view_matrices
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
 from rendergraph.session.values import Expanded
-from rendergraph.textures import FORMATS, TextureDesc
+from rendergraph.session.wanted import Wanted
+from rendergraph.textures import FORMATS, Semantic, TextureDesc
 
 
 @dataclass(eq=False)
@@ -82,9 +83,10 @@ class Drawing:
         graph, plan = self.expanded.linked.graph, self.executable.plan
         resources = plan.schedule.wanted
         infos = {}
-        for name, end in self.expanded.wanted.items():
-            info, desc = graph.textures[end], plan.resources[resources[name]].desc
-            infos[name] = _output_info(name, info.semantic.name, info.semantic.encoding, desc)
+        for name, port in self.expanded.wanted.items():
+            infos[name] = _output_info(
+                name, port, graph.textures[port.end].semantic, plan.resources[resources[name]].desc
+            )
         passes = tuple(
             {"node": t.node, "type": graph[t.node].type.name, "gpu_ms": t.gpu_ms, "cpu_ms": t.cpu_ms}
             for t in median_times(self.times)
@@ -93,7 +95,10 @@ class Drawing:
             number=self.number,
             pipeline=graph.name,
             size=graph.size,
-            arrays={name: self.runner.read(resources[name]) for name in infos},
+            arrays={
+                name: self.runner.read(resources[name], mip=port.mip or 0, layer=port.layer, stencil=port.stencil)
+                for name, port in self.expanded.wanted.items()
+            },
             infos=infos,
             device=self.gpu.device.as_json(),
             passes=passes,
@@ -122,8 +127,11 @@ class Drawing:
         }
 
 
-def _output_info(name: str, semantic: str, encoding: str | None, desc: object) -> OutputInfo:
+def _output_info(name: str, port: Wanted, semantic: Semantic, desc: object) -> OutputInfo:
     if not isinstance(desc, TextureDesc):
-        return OutputInfo(name, semantic, "bytes", "buffer", None, ())
-    channels = channel_names(PictureInfo(semantic, desc.format, encoding), FORMATS[desc.format].components)
-    return OutputInfo(name, semantic, desc.format, desc.kind, encoding, channels)
+        return OutputInfo(name, semantic.name, "bytes", "buffer", None, ())
+    meaning, format, encoding = semantic.name, desc.format, semantic.encoding
+    if port.stencil:
+        meaning, format, encoding = "stencil", "r8ui", None
+    channels = channel_names(PictureInfo(meaning, format, encoding), FORMATS[format].components)
+    return OutputInfo(name, meaning, format, desc.kind if port.layer is None else "texture2d", encoding, channels)

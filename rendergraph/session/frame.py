@@ -20,8 +20,8 @@ class OutputInfo:
     """What an array's texels are.
 
     Attributes:
-        name: the output's name, or `node.port` of a tap.
-        semantic: the semantic's name.
+        name: the output's name, or the tap: `node.port`, with its part.
+        semantic: the semantic's name, `stencil` where that was tapped.
         format: the texture format.
         kind: `texture2d`, `texture2d_array`, `texture_cube` or `buffer`.
         encoding: `linear`, `display` or None.

@@ -12,6 +12,11 @@ from typing import Any, TypedDict
 
 from rendergraph.errors import Problem, UsageError, suggestion
 
+TEXTURE_PART = (
+    r"(?:\[(?!\])(?:(?P<layer>\d{1,9})(?:,(?=mip)|(?=\])))?(?:mip=(?P<mip>\d{1,9}))?\])?(?P<stencil>:stencil)?"
+)
+"""What may stand behind `node.port` in a tap: `[2]`, `[mip=3]`, `[2,mip=3]` and `:stencil`."""
+
 
 @dataclass(frozen=True)
 class Selection:
@@ -91,7 +96,7 @@ class RenderOptions:
         frames: frame numbers from 1; frame 1 is time 0.
         fps: frames a second.
         outputs: names of the outputs to compute, all of the file's by default.
-        taps: further ports to read, `node.port`.
+        taps: further ports to read: `node.port`, of it `[layer]`, `[mip=1]` or `[layer,mip=1]`, and `:stencil`.
         alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, the seed of a random legal
             order instead of the best one.
         warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it.

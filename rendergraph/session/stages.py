@@ -101,7 +101,8 @@ def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded
         InputError: an output or port that there is not, or a node recorded what its declaration does not allow.
     """
     wanted = wanted_ports(linked.graph, options)
-    return Expanded(linked, options, wanted, rendergraph.expand.expand(linked.graph, wanted))
+    ends = {name: port.end for name, port in wanted.items()}
+    return Expanded(linked, options, wanted, rendergraph.expand.expand(linked.graph, ends))
 
 
 def plan(expanded: Expanded) -> Planned:

@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from rendergraph.catalog import Catalog
     from rendergraph.errors import Problem
     from rendergraph.expand import Expansion
-    from rendergraph.link import Endpoint, Graph
+    from rendergraph.link import Graph
     from rendergraph.resolve import PipelineSpec
     from rendergraph.scene.model import Scene
     from rendergraph.session.selection import RenderOptions, Selection
+    from rendergraph.session.wanted import Wanted
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +60,13 @@ class Expanded:
     Attributes:
         linked: where they come from.
         options: what was wanted of it.
-        wanted: the ports that must exist at the end of a frame, by output name or tap.
+        wanted: the ports that must exist at the end of a frame with the part that is read, by output name or tap.
         expansion: all steps with what they read and write.
     """
 
     linked: Linked
     options: RenderOptions
-    wanted: Mapping[str, Endpoint]
+    wanted: Mapping[str, Wanted]
     expansion: Expansion
 
     def for_frames(self, frames: range, *, warm_up: bool = True) -> Self:

@@ -1,32 +1,65 @@
-"""The ports that a render asks for."""
+"""The textures that a render asks for."""
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
+
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link import Endpoint, Graph, endpoint
-from rendergraph.session.selection import RenderOptions
+from rendergraph.session.selection import TEXTURE_PART, RenderOptions
+from rendergraph.textures import FORMATS, TextureDesc
 
 
-def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Endpoint]:
-    """The ports that must exist at the end of a frame, by output name or tap.
+@dataclass(frozen=True)
+class Wanted:
+    """A port whose texture must exist at the end of a frame, and what of it is read.
+
+    Attributes:
+        end: the port.
+        layer, mip: the part, None for all layers and for mip 0.
+        stencil: read the stencil instead of the depth.
+    """
+
+    end: Endpoint
+    layer: int | None = None
+    mip: int | None = None
+    stencil: bool = False
+
+    def lacks(self, desc: TextureDesc | None) -> str | None:
+        """What its port has not of the part that is asked for, as the end of a sentence that names the port."""
+        if (self.layer, self.mip, self.stencil) == (None, None, False):
+            return None
+        if desc is None:
+            return "is a buffer, which has no layers, no mips and no stencil"
+        if desc.layers and (missing := desc.lacks(self.mip, self.layer)):
+            return missing
+        if self.stencil and FORMATS[desc.format].family != "depth_stencil":
+            return f"has no stencil: its format is {desc.format}"
+        return None
+
+
+def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
+    """What must exist at the end of a frame, by output name or tap.
 
     Raises:
-        InputError: an output or a port that the pipeline does not have.
+        InputError: an output, a port or a part of one that the pipeline does not have.
     """
-    wanted: dict[str, Endpoint] = {}
+    wanted: dict[str, Wanted] = {}
     problems = []
     for name in graph.outputs if options.outputs is None else options.outputs:
         if name in graph.outputs:
-            wanted[name] = graph.outputs[name]
+            wanted[name] = Wanted(graph.outputs[name])
         else:
             hint = suggestion(name, graph.outputs)
             problems.append(Problem("RG205", f"pipeline '{graph.name}' has no output '{name}'{hint}"))
     for tap in options.taps:
         try:
-            end = wanted[tap] = endpoint(graph, tap)
+            wanted[tap] = _tapped(graph, tap)
         except InputError as error:
             problems += [Problem("RG206", f"--tap {tap}: {problem.text}") for problem in error.problems]
             continue
+        end = wanted[tap].end
         node = graph[end.node]
         problems += [
             Problem("RG116", f"--tap {tap}: it needs input '{name}' of '{end.node}', which is not connected")
@@ -35,4 +68,19 @@ def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Endpoint]:
         ]
     if problems:
         raise InputError(problems)
+    return wanted
+
+
+def _tapped(graph: Graph, tap: str) -> Wanted:
+    """What a tap names: `node.port`, `node.port[2]`, `node.port[2,mip=3]` or `node.port:stencil`."""
+    found = re.fullmatch(r"([^\[:]*)" + TEXTURE_PART, tap)
+    if found is None:
+        text = "the part of a texture is [LAYER], [mip=N], [LAYER,mip=N] or :stencil after NODE.PORT"
+        raise InputError(Problem("RG206", text))
+    end = endpoint(graph, found[1])
+    layer, mip = (None if found[name] is None else int(found[name]) for name in ("layer", "mip"))
+    wanted = Wanted(end, layer, mip, stencil=found["stencil"] is not None)
+    desc = graph.textures[end].desc
+    if missing := wanted.lacks(desc):
+        raise InputError(Problem("RG206", f"'{found[1]}' {missing}"))
     return wanted

@@ -89,10 +89,8 @@ def within(part: Part, desc: TextureDesc | BufferDesc) -> None:
         return
     if isinstance(desc, BufferDesc):
         raise Misuse(f"'{part.port.name}' is a buffer, which has no mips and no layers")
-    for name, number, count in (("mip", part.mip, desc.mips), ("layer", part.layer, desc.layers)):
-        if number is not None and number >= count:
-            last = f"0 to {count - 1}" if count > 1 else "only 0"
-            raise Misuse(f"'{part.port.name}' has no {name} {number}; it has {last}")
+    if missing := desc.lacks(part.mip, part.layer):
+        raise Misuse(f"'{part.port.name}' {missing}")
 
 
 def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:

@@ -86,6 +86,8 @@ def test_version(cli: Any) -> None:
         (["run", "x", "-s", "=3"], "'=3' is not PATH=VALUE"),
         (["run", "x", "--tap", "sun.map"], "'sun.map' is not NODE.PORT=FILE"),
         (["run", "x", "--tap", "sun=a.exr"], "'sun=a.exr' is not NODE.PORT=FILE"),
+        (["run", "x", "--tap", "sun.map[mip]=a.exr"], "'sun.map[mip]=a.exr' is not NODE.PORT=FILE"),
+        (["run", "x", "--tap", "sun.map:depth=a.exr"], "'sun.map:depth=a.exr' is not NODE.PORT=FILE"),
         (["run", "x", "-o", "image="], "'image=' names no file"),
         (["run", "x", "-o", "folder/"], "'folder/' names no file"),
         (["run", "x", "--shuffle", "a"], "'a' is not a valid integer"),

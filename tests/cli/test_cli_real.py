@@ -96,6 +96,14 @@ def test_taps_keep_values_and_are_viewable(cli: Any) -> None:
     assert images.read("s.png").shape == (2048, 2048, 1)
 
 
+def test_taps_of_parts_become_pictures_and_keep_values(cli: Any) -> None:
+    words = ["bloom.glow[mip=1]=g.exr", "sun.shadow_map[0]=s.png", "sun.shadow_map[0]=s.exr"]
+    assert cli("run", "bloom", *SMALL, *(word for tap in words for word in ("--tap", tap))).code == 0
+    assert images.read("g.exr").shape == (9, 16, 4)
+    assert images.read("s.png").shape == (2048, 2048, 1)
+    assert images.read("s.exr").shape == (2048, 2048, 1)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
