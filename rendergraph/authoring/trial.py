@@ -201,7 +201,7 @@ class Trial:
                     self._interface(compiled.step, draw)
                 self._note_files(compiled.step)
             drawn = [self._draw(drawing, number) for number in (0, 1)]
-        self._compare(variant, *drawn)
+        self._compare(*drawn)
 
     def _resolved(self, variant: Variant) -> Resolved:
         file = self.around.write(variant, self.scene)
@@ -263,9 +263,7 @@ class Trial:
             place = declared_in(self.type.shader_file(dict(step.shaders)["fragment"])[0], colors[0])
             self.say(Problem("RG454", f"the shader never writes '{colors[0]}', which its step draws to", place))
 
-    def _compare(
-        self, variant: Variant, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]
-    ) -> None:
+    def _compare(self, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]) -> None:
         for name in one:
             port = self.around.input_of(name)
             if port:

@@ -32,7 +32,6 @@ class Header:
         names: by name the entry, for its place.
         threads: how many threads a compute shader runs; None where it is not said.
         problems: everything that is wrong.
-        present: whether there is a header at all.
     """
 
     doc: str | None = None
@@ -42,7 +41,6 @@ class Header:
     names: Mapping[str, Value] = field(default_factory=dict)
     threads: Value | None = None
     problems: tuple[Problem, ...] = ()
-    present: bool = False
 
 
 def is_in(text: str) -> bool:
@@ -204,4 +202,4 @@ def _checked(document: Document) -> Header:
             found[name] = {key: value for key, value in entry.items() if value.data is not None}
     given = {key: value for key, value in root.items() if value.data is not None}
     doc = str(given["doc"].data).strip() if "doc" in given else None
-    return Header(doc, **parts, names=names, threads=given.get("threads"), problems=tuple(walk.problems), present=True)
+    return Header(doc, **parts, names=names, threads=given.get("threads"), problems=tuple(walk.problems))

@@ -123,8 +123,8 @@ def define(
 ) -> Any:
     """A parameter that becomes program text: `#define NAME value`, and `#define NAME_CHOICE` for a choice.
 
-    Numbers and switches become `#define SAMPLES 16`; a choice `curve: aces` becomes `#define CURVE CURVE_ACES`, where
-    every choice has a number, so that shaders say `#if CURVE == CURVE_ACES`.
+    Numbers and switches become `#define SAMPLES 16`; a choice `smith: fast` becomes `#define SMITH SMITH_FAST`, where
+    every choice has a number, so that shaders say `#if SMITH == SMITH_FAST`.
 
     Args:
         default: value where the file gives none.

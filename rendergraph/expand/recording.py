@@ -133,7 +133,7 @@ def record_all(
         wanted: what must exist at the end of the frame.
 
     Returns:
-        Recorders by node id in the same order, and idle nodes with their reasons.
+        Recordings by node id in the same order, and idle nodes with their reasons.
     """
     remembering = _remembering(graph, wanted)
     while True:
@@ -189,7 +189,7 @@ def _recorded(
         except InputError:
             raise
         except (Exception, SystemExit) as error:  # whatever a stranger's node raises is a mistake in that node
-            raise InputError(author_problem(node, error)) from error
+            raise InputError(_author_problem(node, error)) from error
         ports = node.node.ports()
         if not recording.requests and all(recording.continues(ports[port]) for port in used):
             idle[name] = (
@@ -261,7 +261,7 @@ def _returns_nothing(value: object) -> None:
         raise Misuse(f"`record` gives back a {type(value).__name__}; it calls steps.… and returns nothing")
 
 
-def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", doing: str = "recording") -> Problem:
+def _author_problem(node: GraphNode, error: BaseException) -> Problem:
     """What a node's own code raised or asked for wrongly, with the author's line."""
     who = node_named(node.id, node.type.name)
     if isinstance(error, SceneError):
@@ -269,4 +269,4 @@ def author_problem(node: GraphNode, error: BaseException, code: str = "RG420", d
     mistake = happened(error, type(node.node), node.type.file)
     if isinstance(error, Misuse):
         return mistake.problem(error.code, who, node.place)
-    return mistake.problem(code, f"{who} failed while {doing}", node.place)
+    return mistake.problem("RG420", f"{who} failed while recording", node.place)

@@ -32,7 +32,6 @@ class GpuTexture:
     glo: int
     target: int
     desc: TextureDesc
-    view_of: int | None = None
 
 
 def target_of(desc: TextureDesc) -> int:
@@ -94,7 +93,7 @@ def view(
     error = raw.error()
     if error:
         raise RenderError(Problem("RG612", f"the driver refused a texture view of {desc} as {shown} ({error})"))
-    return GpuTexture(glo, target, shown, view_of=texture.glo)
+    return GpuTexture(glo, target, shown)
 
 
 def delete(device: Device, texture: GpuTexture) -> None:

@@ -62,7 +62,7 @@ def decode(
         light = image.kind in (".hdr", ".exr")
         wide = image.spec.format.basesize() > 1
         pixels = image.read(_color_channels(image), "half" if light or (wide and not srgb) else "uint8")
-        pixels = _in_display_window(image, pixels, limits)
+        pixels = _in_display_window(image, pixels)
     if light:
         pixels = finite(image.source, pixels, warn)
     return as_rgba(pixels)
@@ -297,7 +297,7 @@ def _color_channels(image: _Image) -> range:
     return range(first, first + len(wanted))
 
 
-def _in_display_window(image: _Image, pixels: Pixels, limits: ImageLimits) -> Pixels:
+def _in_display_window(image: _Image, pixels: Pixels) -> Pixels:
     """An EXR may hold a part of its picture, or more than it."""
     spec = image.spec
     window = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)

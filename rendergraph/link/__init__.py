@@ -43,10 +43,7 @@ def link(
 
 
 def sketch(
-    spec: PipelineSpec,
-    catalog: Catalog,
-    lights: Sequence[LightFacts] = (),
-    objects: Sequence[ObjectFacts] | None = None,
+    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = ()
 ) -> tuple[Graph, tuple[Problem, ...]]:
     """A graph to look at, where nothing is wrong but that node types are missing; those are drawn as far as known.
 
@@ -57,9 +54,9 @@ def sketch(
         InputError: something else is wrong; with all mistakes.
     """
     try:
-        return link(spec, catalog, lights, objects), ()
+        return link(spec, catalog, lights), ()
     except InputError as error:
-        linker = _Linker(spec, catalog, lights, objects, sketching=True)
+        linker = _Linker(spec, catalog, lights, None, sketching=True)
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):

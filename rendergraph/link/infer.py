@@ -16,10 +16,8 @@ from rendergraph.annotations import fits, quoted, words_for
 from rendergraph.declare import (
     Facts,
     Function,
-    History,
     InOut,
     Input,
-    Internal,
     Node,
     Port,
     Texel,
@@ -88,16 +86,16 @@ class _Inputs(Mapping[str, Any]):
 
     def __init__(self, infer: Infer, draft: Draft) -> None:
         self._infer = infer
-        self._bound = draft
+        self._draft = draft
 
     def __getitem__(self, name: str) -> _Infos:
-        links = self._bound.links[name]
+        links = self._draft.links[name]
         if not links:
             raise KeyError(name)
         return _Infos(self._infer, [link.source for link in links])
 
     def __iter__(self) -> Iterator[str]:
-        return (name for name, links in self._bound.links.items() if links)
+        return (name for name, links in self._draft.links.items() if links)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -360,4 +358,4 @@ def made_ports(draft: Draft) -> Iterator[Endpoint]:
             yield Endpoint(draft.spec.id, name)
 
 
-__all__ = ["CAMERA", "History", "Infer", "Internal", "made_ports"]
+__all__ = ["CAMERA", "Infer", "made_ports"]

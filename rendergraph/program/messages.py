@@ -30,7 +30,7 @@ def compile_problems(message: str, text: StageText) -> list[Problem]:
     Understands the forms of Mesa (`0:12(5): error: …`), NVIDIA (`0(12) : error C1008: …`) and of AMD, Intel and glslang
     (`ERROR: 0:12: …`). Warnings are left out where there are errors. A message that names no line becomes one problem.
     """
-    found = _located(message.splitlines(), text, "RG410", f"{text.stage} shader")
+    found = _located(message.splitlines(), text, "RG410")
     if found:
         return found
     where = _first_place(text.source)
@@ -50,7 +50,7 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     for start, end in pairwise([*heads, len(rows)]):
         stage = _SECTION.match(rows[start])[1].lower()  # type: ignore[index]  # it has just matched
         if stage in texts:
-            found += _located(rows[start + 1 : end], texts[stage], "RG411", f"{stage} shader")
+            found += _located(rows[start + 1 : end], texts[stage], "RG411")
     if found:
         return found
     text = re.sub(r"^error:\s*", "", "; ".join(row.strip() for row in rows))
@@ -97,7 +97,7 @@ def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] 
     return None
 
 
-def _located(rows: Sequence[str], text: StageText, code: str, what: str) -> list[Problem]:
+def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
     """The messages that name a line; warnings only where there is no error."""
     found: list[Problem] = []
     for row in rows:

@@ -109,10 +109,9 @@ class Part:
             raise self.wrong(f"'{key}' is '{shown(found)}', not one of {', '.join(choices)}")
         return found
 
-    def flag(self, key: str, default: bool = False) -> bool:
-        """A boolean."""
-        found = self._typed(key, bool)
-        return default if found is None else bool(found)
+    def flag(self, key: str) -> bool:
+        """A boolean, false where it is missing."""
+        return bool(self._typed(key, bool))
 
     def part(self, key: str) -> Part | None:
         """An object, or None."""

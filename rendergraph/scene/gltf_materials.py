@@ -114,8 +114,8 @@ class Materials:
     ) -> tuple[float, ...]:
         return tuple(self._clamped(part, key, value, high) for value in part.numbers(key, count, default))
 
-    def _factor(self, part: Part, key: str, default: float, high: float = 1.0) -> float:
-        return self._clamped(part, key, part.number(key, default), high)
+    def _factor(self, part: Part, key: str, default: float) -> float:
+        return self._clamped(part, key, part.number(key, default), 1.0)
 
     def _material(self, part: Part, names: Names) -> Material:
         textures: dict[str, Texture] = {}

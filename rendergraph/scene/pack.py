@@ -100,7 +100,7 @@ class PackedScene:
         material_uvs: float32 (m, 16, 4): per material the eight `SLOTS`' two rows (a, b, c, 0) of the uv transform.
         material_moved: bool (m,), whether any slot's transform is not the identity (`HAS_UV_TRANSFORM`).
         lights: `LIGHT` records.
-        object_mesh, object_material: int32 (n,).
+        object_mesh: int32 (n,).
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
         casts_shadow, hidden, double_sided: bool (n,).
         alpha_mode: `opaque`, `mask` or `blend` for each object.
@@ -123,7 +123,6 @@ class PackedScene:
     material_moved: Bools
     lights: Records
     object_mesh: Ints
-    object_material: Ints
     mirrored: Bools
     casts_shadow: Bools
     hidden: Bools
@@ -200,7 +199,6 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
         "material_moved": moved,
         "lights": pack_lights(scene.lights),
         "object_mesh": mesh,
-        "object_material": material,
         "mirrored": np.linalg.det(transforms[:, :3, :3]) < 0,
         "casts_shadow": np.array([entry.casts_shadow for entry in objects], bool),
         "hidden": np.array([entry.hidden for entry in objects], bool),

@@ -112,9 +112,7 @@ def _grid(columns: int, rows: int, degenerate: tuple[bool, bool] = (False, False
     return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
 
 
-def _lathe(
-    name: str, profile: Sequence[tuple[float, float, float, float]], segments: int, v: Sequence[float] | None = None
-) -> Mesh:
+def _lathe(name: str, profile: Sequence[tuple[float, float, float, float]], segments: int) -> Mesh:
     """A profile of (radius, height, normal's radial part, normal's height) from top to bottom, turned about Y."""
     r, y, nr, ny = np.array(profile, np.float64).T
     rows = len(r) - 1
@@ -128,8 +126,7 @@ def _lathe(
     poles = r == 0
     u[poles] += 0.5 / segments  # a pole's vertex belongs to one triangle: it takes the middle of its side
     turn[poles] += np.pi / segments
-    down = np.linspace(0, 1, rows + 1) if v is None else np.asarray(v)
-    uv = np.stack([u, np.repeat(down[:, None], segments + 1, 1)], axis=-1)
+    uv = np.stack([u, np.repeat(np.linspace(0, 1, rows + 1)[:, None], segments + 1, 1)], axis=-1)
     along = np.stack([np.cos(turn), np.zeros_like(turn), -np.sin(turn)], axis=-1)
     return _mesh(
         name,
