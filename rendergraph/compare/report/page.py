@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from html import escape
 
 from rendergraph.compare.product import Sweep, pareto
 from rendergraph.compare.report.parts import (
+    Section,
     card,
     drawing,
     heat,
@@ -103,7 +103,7 @@ def sweep_page(found: Sweep, command: str) -> str:
     )
 
 
-def _page(title: str, comparison: Comparison, sections: Sequence[str], command: str) -> str:
+def _page(title: str, comparison: Comparison, sections: Sequence[Section], command: str) -> str:
     home = folder("rendergraph") / "compare" / "report"
     style, script = ((home / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
     width, height = comparison.size
@@ -114,12 +114,8 @@ def _page(title: str, comparison: Comparison, sections: Sequence[str], command: 
         section("machine", "Machine", _machine(comparison)),
         section("again", "The same again", f"<pre><code>{escape(command)}</code></pre>", _notes(comparison)),
     ]
-    body = [part for part in [*sections, *closing] if part]
-    links = "".join(
-        f'<a href="#{found[1]}">{found[2]}</a>'
-        for part in body
-        if (found := re.match(r'<section id="(\w+)".*?<h2[^>]*>(.*?)</h2>', part, re.DOTALL))
-    )
+    filled = [part for part in [*sections, *closing] if part.body]
+    links = "".join(part.link for part in filled)
     # Nothing may be fetched: the page says so to the browser, which then holds it to that.
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     return (
@@ -131,7 +127,7 @@ def _page(title: str, comparison: Comparison, sections: Sequence[str], command: 
         f"<h1>{escape(title)}</h1>\n"
         f'<p class="lead">{escape(" · ".join(fact for fact in facts if fact))}</p>\n'
         f'<nav aria-label="Sections">{links}</nav>\n</header>\n'
-        + "\n".join(body)
+        + "\n".join(part.html for part in filled)
         + f"\n</main>\n<script>\n{script}</script>\n</body>\n</html>\n"
     )
 

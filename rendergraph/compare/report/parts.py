@@ -7,6 +7,7 @@ import math
 import re
 import tempfile
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
@@ -104,10 +105,32 @@ def card(entries: Iterable[tuple[str, object]]) -> str:
     return f'<dl class="card">{rows}</dl>'
 
 
-def section(identity: str, title: str, *parts: str) -> str:
-    """A part of the page under a title of its own; nothing where there is nothing in it."""
-    body = "\n".join(part for part in parts if part)
-    if not body:
-        return ""
-    head = f'<h2 id="{identity}-title">{escape(title)}</h2>'
-    return f'<section id="{identity}" aria-labelledby="{identity}-title">{head}\n{body}\n</section>'
+@dataclass(frozen=True)
+class Section:
+    """A part of the page under a title of its own; one without a body is left out.
+
+    Attributes:
+        identity: what links lead to.
+        title: as text.
+        body: as HTML.
+    """
+
+    identity: str
+    title: str
+    body: str
+
+    @property
+    def link(self) -> str:
+        """What leads to it."""
+        return f'<a href="#{self.identity}">{escape(self.title)}</a>'
+
+    @property
+    def html(self) -> str:
+        """All of it."""
+        head = f'<h2 id="{self.identity}-title">{escape(self.title)}</h2>'
+        return f'<section id="{self.identity}" aria-labelledby="{self.identity}-title">{head}\n{self.body}\n</section>'
+
+
+def section(identity: str, title: str, *parts: str) -> Section:
+    """A section of the parts that there are."""
+    return Section(identity, title, "\n".join(part for part in parts if part))
