@@ -29,11 +29,15 @@ _NODE = rf"{_NAME}(?:/{_NAME})*"
 
 @dataclass(frozen=True)
 class Target:
-    """A file, and the output or port it shows; of an output without a name the extension chooses it."""
+    """A file, and the output or port it shows; of an output without a name the extension chooses it.
+
+    What is `on_sheet` is one of all ports, and on their contact sheet.
+    """
 
     name: str
     path: Path
     is_tap: bool = False
+    on_sheet: bool = False
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click only

@@ -13,9 +13,10 @@ from rendergraph.cli import options
 from rendergraph.cli.options import Target
 from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say_summary
 from rendergraph.cli.words import click
-from rendergraph.errors import InputError, Problem, UsageError
+from rendergraph.errors import InputError, Place, Problem, UsageError
 
 if TYPE_CHECKING:
+    from rendergraph.images import Saved
     from rendergraph.session import Frame, RenderOptions, Selection
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Expanded
@@ -27,6 +28,12 @@ if TYPE_CHECKING:
 @click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
 @click.option("-o", "--output", "outputs", multiple=True, type=options.OUTPUT, help="Write an output to a file.")
 @click.option("--tap", "taps", multiple=True, type=options.TAP, help="Write any port's texture to a file.")
+@click.option(
+    "--tap-all",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="Write every port's texture there as a picture, and all on one sheet.",
+)
 @options.json_option
 @options.device_option
 @click.option("--watch", is_flag=True, help="Stay, and render again whenever a file that went into it changes.")
@@ -39,6 +46,7 @@ def command(
     fps: float,
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
+    tap_all: Path | None,
     as_json: bool,
     device: int | None,
     watch: bool,
@@ -56,6 +64,7 @@ def command(
       rendergraph run forward
       rendergraph run forward --scene spheres --size 640x360 -o spheres.exr --json
       rendergraph run forward -s light.ambient=0 -o image=dark.jpg --tap sun.shadow_map=depth.exr
+      rendergraph run forward --tap-all inside
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
       rendergraph run my.yaml --watch
     """
@@ -64,8 +73,8 @@ def command(
 
     modes = RenderOptions(frames or range(1, 2), fps, alias=not no_alias, poison=poison, shuffle=shuffle)
     warnings = Warnings()
-    read = partial(_read, selection, modes, outputs, taps, warnings)
-    draw = partial(_draw, warnings=warnings, quiet=as_json)
+    read = partial(_read, selection, modes, outputs, taps, tap_all, warnings)
+    draw = partial(_draw, sheet=tap_all, warnings=warnings, quiet=as_json)
     if watch:
         from rendergraph.cli.watching import keep_drawing
 
@@ -84,23 +93,42 @@ def _read(
     modes: RenderOptions,
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
+    tap_all: Path | None,
     warnings: Warnings,
 ) -> tuple[Expanded, list[Target]]:
     """Everything before the device is opened: what is to be drawn, and the files it goes to, each with its name."""
     from rendergraph import images
     from rendergraph.session import stages
+    from rendergraph.session.wanted import every_port
 
     linked = stages.link(stages.resolve(selection))
     warnings.say(linked.warnings)
-    if not outputs and not taps:
-        stem = Path(selection.source).stem
-        outputs = (Target("", Path(f"{stem}.####.png" if len(modes.frames) > 1 else f"{stem}.png")),)
+    ending = ".####.png" if len(modes.frames) > 1 else ".png"
+    if not outputs and not taps and tap_all is None:
+        outputs = (Target("", Path(f"{Path(selection.source).stem}{ending}")),)
+    if tap_all is not None:
+        ports = every_port(stages.plan(stages.expand(linked, modes)))
+        taps += tuple(
+            Target(port, tap_all / f"{number:02d}-{port.replace('/', '-')}{ending}", is_tap=True, on_sheet=True)
+            for number, port in enumerate(ports, start=1)
+        )
     known = linked.graph.outputs
     named = [t if t.name else replace(t, name=images.output_for(t.path, known)) for t in outputs]
     expanded = stages.expand(linked, replace(modes, outputs=_names(named), taps=_names(taps)))
     targets = [*named, *taps]
+    if tap_all is not None:
+        _make(tap_all)
     _check(targets, expanded)
     return expanded, targets
+
+
+def _make(folder: Path) -> None:
+    """Make a folder and those above it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        text = f"cannot be made: {error.strerror or error}"
+        raise InputError(Problem("RG504", text, Place(str(folder)))) from error
 
 
 def _names(targets: Iterable[Target]) -> tuple[str, ...]:
@@ -108,13 +136,14 @@ def _names(targets: Iterable[Target]) -> tuple[str, ...]:
 
 
 def _draw(
-    expanded: Expanded, targets: Sequence[Target], gpu: Gpu, *, warnings: Warnings, quiet: bool
+    expanded: Expanded, targets: Sequence[Target], gpu: Gpu, *, sheet: Path | None, warnings: Warnings, quiet: bool
 ) -> dict[str, Any]:
     """Draw and write everything; the document of `--json`. Paths are printed unless `quiet`."""
     from rendergraph import images
     from rendergraph.session import stages
 
     written: list[str] = []
+    contact = "contact.####.png" if len(expanded.options.frames) > 1 else "contact.png"
     progress = Progress(len(expanded.options.frames))
     frame: Frame | None = None
     for frame in stages.draw(expanded, gpu):
@@ -122,17 +151,36 @@ def _draw(
             images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
             for t in targets
         ]
+        if sheet is not None:
+            files = _with_sheet(files, targets, images.numbered(sheet / contact, frame.number))
         images.save_outputs(files, frame.metadata)
         progress.clear()
         for file in files:
             written.append(str(file.path))
             if not quiet:
                 emit(str(file.path))
-        progress.show(len(written) // len(targets))
+        progress.show(len(written) // len(files))
     progress.clear()
     assert frame is not None  # a range of frames has one at least
     warnings.say(frame.warnings)
     return frame.as_json() | {"outputs": written}
+
+
+def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -> list[Saved]:
+    """The files, those of the sheet made viewable once, and the sheet."""
+    from rendergraph import images
+
+    viewed = images.PictureInfo("display_color", "rgba8", "display")
+    done, tiles = [], []
+    for file, target in zip(files, targets, strict=True):
+        if target.on_sheet:
+            height, width = file.pixels.shape[-3:-1]
+            layers = f", {len(file.pixels)} layers" if file.pixels.ndim == 4 and len(file.pixels) > 1 else ""
+            note = f"{file.info.format} {width}×{height}{layers}"
+            file = file._replace(pixels=images.viewable_as(file.pixels, file.info), info=viewed)
+            tiles.append((file.pixels, f"{target.path.name.partition('-')[0]} {target.name}", note))
+        done.append(file)
+    return [*done, images.Saved(path, images.contact_sheet(tiles), viewed)]
 
 
 def _check(targets: Sequence[Target], expanded: Expanded) -> None:

@@ -40,7 +40,8 @@ def ended(graph: Graph, found: Versioned, wanted: Mapping[str, Endpoint]) -> Exp
             resources[shown[name]] = replace(resources[resource], id=shown[name], role="output")
             steps.append(_copy(name, end, resource, version, steps))
     _mark_roles(graph, found, shown, steps, resources)
-    return Expansion(tuple(steps), resources, shown, found.idle, found.views)
+    ports = {end: resource for end, (resource, _) in found.at_end.items()}
+    return Expansion(tuple(steps), resources, shown, found.idle, found.views, ports)
 
 
 def _copy(name: str, end: Endpoint, resource: str, version: int, steps: list[Step]) -> Step:

@@ -54,6 +54,7 @@ class Expansion:
         wanted: output name or tap to the id of the resource that must exist at the end of the frame.
         idle: nodes that recorded nothing, with the reason.
         views: view tables by id.
+        ports: port to the id of the resource that holds its texture or buffer.
     """
 
     steps: tuple[Step, ...]
@@ -61,6 +62,7 @@ class Expansion:
     wanted: Mapping[str, str]
     idle: Mapping[str, str] = field(default_factory=dict)
     views: Mapping[str, ViewTable] = field(default_factory=dict)
+    ports: Mapping[Endpoint, str] = field(default_factory=dict)
 
 
 def behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:

@@ -4,6 +4,7 @@
 into something an eye can read, and `save_outputs` says what of a frame goes into which kind of file.
 """
 
+from rendergraph.images.contact import contact_sheet
 from rendergraph.images.decode import decode, read, read_metadata
 from rendergraph.images.encode import EXTENSIONS, write
 from rendergraph.images.pixels import ImageLimits
@@ -17,6 +18,7 @@ from rendergraph.images.saving import (
     output_for,
     save_output,
     save_outputs,
+    viewable_as,
 )
 from rendergraph.images.view import from_srgb, to_srgb, viewable
 
@@ -27,6 +29,7 @@ __all__ = [
     "Saved",
     "channel_names",
     "check_target",
+    "contact_sheet",
     "decode",
     "from_srgb",
     "is_numbered",
@@ -38,5 +41,6 @@ __all__ = [
     "save_outputs",
     "to_srgb",
     "viewable",
+    "viewable_as",
     "write",
 ]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
 from rendergraph.images.encode import EXTENSIONS, Job, write_all
-from rendergraph.images.view import viewable
+from rendergraph.images.view import Bytes, viewable
 from rendergraph.textures import FORMATS
 
 Pixels: TypeAlias = npt.NDArray[Any]
@@ -97,18 +97,27 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
     """
     jobs: list[Job] = []
     for path, pixels, info, raw in files:
-        known = FORMATS.get(info.format)
-        if known and known.family in ("uint", "int"):
-            pixels = pixels.astype(np.int64)  # numbers, where 8-bit arrays are otherwise colours
         if EXTENSIONS[extension(path)] in ("png", "jpeg"):
-            jobs.append((path, viewable(pixels, info.semantic, info.encoding), None, "data", False))
+            jobs.append((path, viewable_as(pixels, info), None, "data", False))
             continue
+        pixels = _numbers(pixels, info)
         shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
         decoded = not raw and info.encoding == "display"
         half = decoded or info.format in _HALF or pixels.dtype == np.float16
         names = channel_names(info, shaped.shape[-1])
         jobs.append((path, shaped, names, "display" if decoded else "data", half))
     write_all(jobs, metadata)
+
+
+def viewable_as(pixels: Pixels, info: Described) -> Bytes:
+    """What an eye can read of an array, by what its values are: see `viewable`."""
+    return viewable(_numbers(pixels, info), info.semantic, info.encoding)
+
+
+def _numbers(pixels: Pixels, info: Described) -> Pixels:
+    """Whole numbers as such, where 8-bit arrays are otherwise colours."""
+    known = FORMATS.get(info.format)
+    return pixels.astype(np.int64) if known and known.family in ("uint", "int") else pixels
 
 
 def extension(path: Path) -> str:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.link import Endpoint, Graph, endpoint
 from rendergraph.session.selection import TEXTURE_PART, RenderOptions
 from rendergraph.textures import FORMATS, TextureDesc
+
+if TYPE_CHECKING:
+    from rendergraph.session.values import Planned
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,22 @@ def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
     if problems:
         raise InputError(problems)
     return wanted
+
+
+def every_port(planned: Planned) -> tuple[str, ...]:
+    """All ports whose textures the steps of a plan write, internals included, as taps, in the order they are done."""
+    graph, expansion = planned.linked.graph, planned.expansion
+    held: dict[tuple[str, str], list[str]] = {}
+    for end, resource in expansion.ports.items():
+        if graph.textures[end].desc is not None:
+            held.setdefault((end.node, resource), []).append(str(end))
+    written = [
+        tap
+        for step in planned.plan.schedule.steps
+        for write in step.writes
+        for tap in held.get((step.node, write.resource), ())
+    ]
+    return tuple(reversed(dict.fromkeys(reversed(written))))
 
 
 def _tapped(graph: Graph, tap: str) -> Wanted:

@@ -104,6 +104,33 @@ def test_taps_of_parts_become_pictures_and_keep_values(cli: Any) -> None:
     assert images.read("s.exr").shape == (2048, 2048, 1)
 
 
+def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_path: Path) -> None:
+    result = cli("run", "bloom", *SMALL, "--tap-all", "a/inside", "-o", "b.exr")
+    assert result.code == 0
+    names = [line.removeprefix("a/inside/") for line in result.out.splitlines()[1:]]
+    assert [name.partition("-")[0] for name in names[:-1]] == [f"{n:02d}" for n in range(1, len(names))]
+    assert names[-1] == "contact.png"
+    ports = [name.partition("-")[2].removesuffix(".png") for name in names[:-1]]
+    assert ports.index("sun.shadow_map") < ports.index("shadows.visibility") < ports.index("light.radiance")
+    assert ports[-4:] == ["bloom.across", "bloom.glow", "bloom.radiance", "display.color"]
+    assert sorted(path.name for path in (tmp_path / "a/inside").iterdir()) == sorted(names)
+    assert images.read(f"a/inside/{names[ports.index('light.radiance')]}").shape == (36, 64, 3)
+    assert images.read("a/inside/contact.png").max() > 0.9
+
+
+def test_all_ports_of_several_frames_are_numbered(cli: Any, tmp_path: Path) -> None:
+    assert cli("run", "forward", *SMALL, "--tap-all", "in", "--frames", "1-2").code == 0
+    assert {"contact.0001.png", "contact.0002.png"} < {path.name for path in (tmp_path / "in").iterdir()}
+    assert not (tmp_path / "forward.png").exists()
+
+
+def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = cli("run", "forward", *SMALL, "--tap-all", "file/in")
+    assert result.code == 3
+    assert "file/in: RG504 cannot be made: Not a directory" in result.err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
