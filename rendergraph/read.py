@@ -57,6 +57,7 @@ NODE = Table(
         Key("type", Later(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
         Key("inputs", Names(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
         Key("params", Names(ANYTHING, _NAMING), "Parameter to value; null is its default."),
+        Key("enabled", FLAG, "`false` takes the node out: its readers read what went into it.", default=True),
     ),
 )
 _NOT_A_NODE = {"inputs": "a node cannot be called 'inputs'; rename it"}

@@ -173,7 +173,8 @@ def selection_options(function: F) -> F:
                 "sets",
                 multiple=True,
                 type=SETTING,
-                help="Set a parameter, rewire an input, swap a type: ao.radius=0.5, light.lookup=null, sun.type=T.",
+                help="Set a parameter, rewire an input, swap a type, take a node out: ao.radius=0.5, "
+                "light.lookup=null, sun.type=T, ao.enabled=false.",
             ),
             click.option("-p", "--patch", "patches", multiple=True, type=_PATH, help="Apply a merge patch file."),
             click.option(

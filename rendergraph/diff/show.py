@@ -27,8 +27,8 @@ def diff_text(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | No
     """The difference in lines that begin with `+`, `-` or `~`, then what it does to the plan."""
     old, new = difference.names
     lines = [f"{old} → {new}"]
-    lines += [f"  - {node}" for node in difference.removed]
-    lines += [f"  + {node}" for node in difference.added]
+    lines += [f"  - {node}{_disabled(node, difference)}" for node in difference.removed]
+    lines += [f"  + {node}{_disabled(node, difference)}" for node in difference.added]
     lines += [f"  ~ {was} is called {now}" for was, now in difference.renamed.items()]
     lines += [f"  ~ {change.node}: {change}" for change in difference.retyped]
     lines += [
@@ -49,6 +49,10 @@ def diff_text(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | No
     if plans is not None:
         lines += ["", "plan", *_plan_lines(plans)]
     return "\n".join(lines) + "\n"
+
+
+def _disabled(node: str, difference: GraphDiff) -> str:
+    return f" (disabled in {difference.names[node in difference.removed]})" if node in difference.disabled else ""
 
 
 def _ends(ends: Sequence[str]) -> str:
@@ -90,6 +94,7 @@ def diff_json(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | No
         "equal": not difference,
         "added": list(difference.added),
         "removed": list(difference.removed),
+        "disabled": list(difference.disabled),
         "renamed": dict(difference.renamed),
         "retyped": [asdict(change) for change in difference.retyped],
         "parameters": [asdict(change) for change in difference.parameters],
@@ -137,7 +142,10 @@ def _marks_of_old(difference: GraphDiff) -> dict[str, Mark]:
     marks = {old: Mark(RENAMED, (f"→ {new}",)) for old, new in difference.renamed.items()}
     inputs = _inputs(difference, old=True)
     marks |= {back[node]: Mark(CHANGED, inputs=inputs.get(node, frozenset())) for node in difference.changed()}
-    return marks | {node: Mark(REMOVED, ("− removed",), _EVERY) for node in difference.removed}
+    for node in difference.removed:
+        word = "disabled" if node in difference.disabled else "removed"
+        marks[node] = Mark(REMOVED, (f"− {word}",), _EVERY)
+    return marks
 
 
 def _marks_of_new(difference: GraphDiff) -> dict[str, Mark]:

@@ -79,6 +79,7 @@ class GraphDiff:
         names: the two pipelines.
         nodes: first graph's node to the second's, for all that were recognised.
         added, removed: nodes that only the second, only the first graph has.
+        disabled: those of them that the other graph takes out with `enabled: false`.
         renamed: old id to new id, where nothing but the id differs.
         retyped: nodes of another type under the same id.
         links: inputs that read something else; those of added and removed nodes are not listed.
@@ -91,6 +92,7 @@ class GraphDiff:
     nodes: Mapping[str, str] = field(repr=False)
     added: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
+    disabled: tuple[str, ...] = ()
     renamed: Mapping[str, str] = field(default_factory=dict)
     retyped: tuple[Retyped, ...] = ()
     links: tuple[LinkChange, ...] = ()
@@ -123,11 +125,14 @@ def diff(a: Graph, b: Graph) -> GraphDiff:
     """What turns `a` into `b`; both are resolved and linked, so that only what they mean is compared."""
     nodes = _matched(a, b)
     kept = {new: old for old, new in nodes.items()}
+    added = tuple(node.id for node in b.nodes if node.id not in kept)
+    removed = tuple(node.id for node in a.nodes if node.id not in nodes)
     return GraphDiff(
         names=(a.name, b.name),
         nodes=nodes,
-        added=tuple(node.id for node in b.nodes if node.id not in kept),
-        removed=tuple(node.id for node in a.nodes if node.id not in nodes),
+        added=added,
+        removed=removed,
+        disabled=(*(node for node in removed if node in b.disabled), *(node for node in added if node in a.disabled)),
         renamed={old: new for old, new in nodes.items() if old != new},
         retyped=tuple(
             _retyped(new, a[old].type, b[new].type) for old, new in nodes.items() if not _same_type(a[old], b[new])

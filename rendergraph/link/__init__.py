@@ -12,6 +12,7 @@ from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, kind_of
+from rendergraph.link.disabled import lost, past, take_out
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Draft, Link, Names, Wrong, line_of
@@ -74,6 +75,9 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
         return graph.aliases[text]
     node, _, port = text.rpartition(".")
     names = [known.id for known in graph.nodes]
+    if node in graph.disabled:
+        text = f"node '{node}' is disabled, and nothing stands in for '{port}'; enable it"
+        raise InputError(Problem("RG132", text))
     if node not in names:
         hint = suggestion(node or text, names) if node else f"; write NODE.PORT{suggestion(text, names)}"
         raise InputError(Problem("RG109", f"there is no node '{node or text}'{hint}"))
@@ -119,7 +123,10 @@ class _Linker:
         nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
         for draft in nodes.values():
             self._connect(draft, names)
-        outputs = self._outputs(names)
+        written, nodes = nodes, take_out(nodes, names)
+        for draft in nodes.values():
+            self._complete(draft, written)
+        outputs = self._outputs(names, written)
         knots = cycles(nodes)
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
@@ -128,7 +135,7 @@ class _Linker:
         if knots:
             self.problems += knots
         else:
-            self.problems += needs(nodes, outputs) + versions(nodes)
+            self.problems += needs(nodes, outputs, written) + versions(nodes)
             self._crossings(nodes, infer)
             textures = self._textures(nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
@@ -146,7 +153,8 @@ class _Linker:
             lights=self.lights,
             objects=self.objects,
             textures=textures,
-            aliases=self._aliases(names),
+            aliases=self._aliases(names, written),
+            disabled=tuple(name for name in written if name not in nodes),
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )
 
@@ -204,15 +212,23 @@ class _Linker:
                     hint = f"; '{name}' is a param, move it to `params`"
                 text = f"node type '{draft.type.name}' has no input '{name}'{hint}"
                 self._say(value.problem("RG111", text, key=True))
-        for name, port in inputs.items():
-            if (
-                not draft.links[name]
-                and not port.optional
-                and name not in draft.failed
-                and not self._dropped(draft, name)
-            ):
+
+    def _complete(self, draft: Draft, written: Mapping[str, Draft]) -> None:
+        """Say which required inputs lack a link."""
+        by_link: dict[int, list[str]] = {}
+        for name, port in draft.inputs.items():
+            if draft.links[name] or port.optional or name in draft.failed or self._dropped(draft, name):
+                continue
+            if name in draft.lost:
+                by_link.setdefault(id(draft.lost[name].value), []).append(name)
+            else:
                 text = f"input '{name}' of {node_named(draft.spec.id, draft.type.name)} is not connected"
                 self._say(draft.spec.value.problem("RG114", text + self._source_for(draft, port), key=True))
+        for inputs in by_link.values():
+            end = draft.lost[inputs[0]].source
+            needed = f"needs '{end}'" if len(inputs) == 1 else f"need '{end.node}'"
+            listed = ", ".join(f"'{draft.spec.id}.{name}'" for name in inputs)
+            self._say(lost(f"{listed} {needed}", draft.lost[inputs[0]], written))
 
     def _dropped(self, draft: Draft, name: str) -> bool:
         """Whether a link was left out for a mistake that has been said."""
@@ -288,7 +304,7 @@ class _Linker:
         what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
         return f"; it takes {what}"
 
-    def _outputs(self, names: Names) -> dict[str, Link]:
+    def _outputs(self, names: Names, written: Mapping[str, Draft]) -> dict[str, Link]:
         found: dict[str, Link] = {}
         for name, value in self.spec.outputs.items():
             try:
@@ -297,8 +313,13 @@ class _Linker:
                 if wrong.problem is not None:
                     self._say(wrong.problem)
                 continue
-            if followed is not None:
-                found[name] = followed
+            if followed is None:
+                continue
+            led = past(followed, written, names)
+            if written[led.source.node].spec.disabled is None:
+                found[name] = led
+            else:
+                self._say(lost(f"output '{name}' shows '{led.source}'", led, written))
         return found
 
     # Textures ---------------------------------------------------------------------------------------------------------
@@ -354,14 +375,19 @@ class _Linker:
                     )
                     self.warnings.append(replace(found.value.problem("RG154", text), severity="warning"))
 
-    def _aliases(self, names: Names) -> dict[str, Endpoint]:
-        found: dict[str, Endpoint] = {}
+    def _aliases(self, names: Names, written: Mapping[str, Draft]) -> dict[str, Endpoint]:
+        found: dict[str, Link] = {}
         for scope, inner in self.spec.scopes.items():
             for name, value in inner.outputs.items():
                 followed = names.follow(scope, value, name)
                 if followed is not None:
-                    found[f"{scope[:-1]}.{name}"] = followed.source
-        return found
+                    found[f"{scope[:-1]}.{name}"] = followed
+        for draft in written.values():
+            for name in draft.type.cls.outputs() if draft.spec.disabled is not None else ():
+                end = Endpoint(draft.spec.id, name)
+                found[str(end)] = Link(end, draft.spec.value)
+        led = {name: past(link, written, names).source for name, link in found.items()}
+        return {name: end for name, end in led.items() if written[end.node].spec.disabled is None}
 
 
 def _upstream_first(nodes: Mapping[str, Draft]) -> list[str]:

@@ -74,7 +74,8 @@ class Graph:
         textures: what every made port (outputs, internals, history, functions, views) has turned out to be, by
             `Endpoint(node, port)`; an `InOut` shares its source's.
         warnings: what was noticed and is no error.
-        aliases: the outputs of sub-pipelines, `glow.radiance`, and the ports inside that they stand for.
+        aliases: the outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports that they stand for.
+        disabled: the nodes that `enabled: false` takes out; they are no members.
         objects: the scene's objects; None where there is no scene.
     """
 
@@ -86,6 +87,7 @@ class Graph:
     textures: Mapping[Endpoint, TextureInfo] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
     aliases: Mapping[str, Endpoint] = field(default_factory=dict)
+    disabled: tuple[str, ...] = ()
     objects: tuple[ObjectFacts, ...] | None = None
 
     def __getitem__(self, node: str) -> GraphNode:

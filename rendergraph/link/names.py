@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rendergraph.catalog import NodeType
@@ -61,6 +61,7 @@ class Draft:
         inputs: the ports that take links.
         links: by input, what is connected.
         failed: inputs whose link is wrong, so that nobody says they lack one.
+        lost: inputs that lack a link because it leads to a disabled node that nothing stands in for.
         choices: parameters whose value a plugin brings.
     """
 
@@ -72,6 +73,7 @@ class Draft:
     links: dict[str, list[Link]]
     failed: set[str]
     choices: Mapping[str, Path]
+    lost: dict[str, Link] = field(default_factory=dict)
 
 
 class Wrong(Exception):

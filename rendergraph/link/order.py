@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 
 from rendergraph.declare import InOut
 from rendergraph.errors import Problem
+from rendergraph.link.disabled import lost
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Draft, Link, line_of
 
@@ -55,8 +57,8 @@ def sources(nodes: Mapping[str, Draft]) -> dict[str, set[str]]:
     }
 
 
-def needs(nodes: Mapping[str, Draft], outputs: Mapping[str, Link]) -> list[Problem]:
-    """Ports that are used although an input they need is not connected."""
+def needs(nodes: Mapping[str, Draft], outputs: Mapping[str, Link], written: Mapping[str, Draft]) -> list[Problem]:
+    """Ports that are used although an input they need is not connected; `written` has the disabled nodes, too."""
     problems = []
     users = [link for draft in nodes.values() for links in draft.links.values() for link in links]
     for link in [*users, *outputs.values()]:
@@ -65,8 +67,11 @@ def needs(nodes: Mapping[str, Draft], outputs: Mapping[str, Link]) -> list[Probl
         for name in wanted:
             if not source.links.get(name) and name not in source.failed:
                 where = line_of(source.spec.place, link.value.place)
-                text = f"'{link.source}' needs input '{name}' of '{source.spec.id}' ({where}), which is not connected"
-                problems.append(link.value.problem("RG116", text))
+                text = f"'{link.source}' needs input '{name}' of '{source.spec.id}' ({where})"
+                if name in source.lost:
+                    problems.append(lost(text, replace(source.lost[name], value=link.value), written))
+                else:
+                    problems.append(link.value.problem("RG116", f"{text}, which is not connected"))
     return problems
 
 

@@ -91,7 +91,8 @@ class Flattener:
             if problem:
                 self.files.say(problem)
             name_of = self.files.type_name(node_type) if node_type is not None and node_type.data is not None else ""
-            self._add(NodeSpec(node_id, "" if problem else name_of, scope, inputs, params, node))
+            type_name = "" if problem else name_of
+            self._add(NodeSpec(node_id, type_name, scope, inputs, params, node, self._disabled(node, scope)))
             said = ("nodes", name, "type") in self.files.dropped
             if (node_type is None or node_type.data is None) and not said:
                 self._without_type(name, node)
@@ -128,12 +129,13 @@ class Flattener:
                     f"sub-pipeline '{display(node_type.data)}' has no input '{key}'{suggestion(key, declared_inputs)}"
                 )
                 self.files.say(link.problem("RG111", text, key=True))
-        for key, declared in declared_inputs.items():
+        disabled = self._disabled(node, scope)
+        for key, declared in declared_inputs.items() if disabled is None else ():
             optional = declared.get("optional")
             if (key not in inputs or inputs[key].data is None) and not (optional and optional.data):
                 text = f"input '{key}' of node '{scope}{name}' is not connected; link it to a node's port"
                 self.files.say(node.problem("RG114", text, key=True))
-        self.scopes[inside] = Scope(scope, declared_inputs, inputs, entries(sub, "outputs"), node)
+        self.scopes[inside] = Scope(scope, declared_inputs, inputs, entries(sub, "outputs"), node, disabled)
         self._open.append(path or Path())
         if path is None:
             self._open[-1] = Path(f"/{len(self._open)}")  # written in place: it has no file to contain
@@ -146,6 +148,13 @@ class Flattener:
         self._open.pop()
         parts = dict(node.data) if isinstance(node.data, dict) else {}
         return node.with_data({**parts, "type": node_type.with_data(whole.data)})
+
+    def _disabled(self, node: Value, scope: str) -> Value | None:
+        """The `false` that takes a node out."""
+        own = node.get("enabled")
+        if own is not None and own.data is False:
+            return own
+        return self.scopes[scope].disabled if scope else None
 
     def _set_inside(self, sub: Value, sets: Sequence[Setting]) -> Value:
         here = [setting for setting in sets if len(setting.scope) == 1]

@@ -22,7 +22,7 @@ class Setting:
     Attributes:
         scope: the sub-pipelines it goes down into, outermost first.
         node: the node, None for a pipeline parameter.
-        name: a parameter, an input, `type`, or the pipeline parameter.
+        name: a parameter, an input, `type`, `enabled`, or the pipeline parameter.
         value: what it becomes.
         text: how the user wrote the path.
     """
@@ -54,8 +54,8 @@ def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
         if raw is None and is_text:
             problems.append(source.problem("RG120", "a setting is written PATH=VALUE, as in light.ambient=0.1"))
         elif match is None or (match[1] and match[2] is None):
-            text = f"'{shown(path)}' is no path; write NODE.PARAM, NODE.INPUT, NODE.type or the NAME of a parameter"
-            problems.append(source.problem("RG120", text))
+            words = "NODE.PARAM, NODE.INPUT, NODE.type, NODE.enabled or the NAME of a parameter"
+            problems.append(source.problem("RG120", f"'{shown(path)}' is no path; write {words}"))
         else:
             try:
                 value = _value(str(raw), source) if is_text else from_plain(raw, source)
@@ -115,6 +115,12 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
                 _put(root, setting.value, "nodes", setting.node, "type")
             else:
                 text = f"'{setting.text}' takes the name of a node type, this is {setting.value.kind}"
+                problems.append(setting.problem("RG106", text))
+        elif setting.name == "enabled":
+            if isinstance(setting.value.data, bool | None):
+                _put(root, setting.value, "nodes", setting.node, "enabled")
+            else:
+                text = f"'{setting.text}' takes true or false, this is {setting.value.kind}"
                 problems.append(setting.problem("RG106", text))
         else:
             known.append(setting)

@@ -28,6 +28,7 @@ class NodeSpec:
         inputs: links by input or group name; a null says that nothing is connected.
         params: values by parameter name, `$name` replaced, nulls left out.
         value: the node in the file.
+        disabled: the `false` that takes it out, its own or that of a sub-pipeline around it; None where there is none.
     """
 
     id: str
@@ -36,6 +37,7 @@ class NodeSpec:
     inputs: Mapping[str, Value]
     params: Mapping[str, Value]
     value: Value
+    disabled: Value | None = None
 
     @property
     def place(self) -> Place:
@@ -53,6 +55,7 @@ class Scope:
         links: what the node connects to them; refers to the parent scope.
         outputs: its outputs; refers to nodes inside.
         value: the node whose type it is.
+        disabled: the `false` that takes it out, as a node has it.
     """
 
     parent: str
@@ -60,6 +63,7 @@ class Scope:
     links: Mapping[str, Value]
     outputs: Mapping[str, Value]
     value: Value
+    disabled: Value | None = None
 
 
 @dataclass(frozen=True)

@@ -198,6 +198,19 @@ def test_config_prints_origins_and_resolved_values(cli: Any) -> None:
     assert yaml.safe_load(told["yaml"]) == told["resolved"]
 
 
+def test_a_disabled_node_is_in_config_and_not_drawn(cli: Any) -> None:
+    off = ("-s", "bloom.enabled=false")
+    assert re.search(r"enabled: false +# --set bloom.enabled=false\n", cli("config", "bloom", *off).out)
+    assert "bloom" not in [entry["node"] for entry in cli("run", "bloom", *SMALL, *off, "--json").json["passes"]]
+    assert "bloom.radiance" not in cli("graph", "bloom", *off).out
+    needed = cli("check", "bloom", "-s", "light.enabled=false")
+    assert needed.code == 3
+    assert "RG132 'bloom.radiance' needs 'light.radiance', but 'light' is disabled (--set" in needed.err
+    tapped = cli("run", "bloom", *SMALL, "-s", "shadows.enabled=false", "--tap", "shadows.visibility=a.exr")
+    assert tapped.code == 3
+    assert "node 'shadows' is disabled, and nothing stands in for 'visibility'" in tapped.err
+
+
 def test_bench_has_spreads(cli: Any) -> None:
     result = cli("bench", "forward", *SMALL, "-n", "3", "--json")
     report = result.json

@@ -198,3 +198,14 @@ def test_the_picture_is_well_formed_and_says_what_changed(make: Maker) -> None:
     ET.fromstring(picture)
     for text in ("radius 0.5 → 0.75", "− removed", "radiance ← light.radiance"):
         assert text in picture
+
+
+def test_a_disabled_node_is_said_to_be(make: Maker) -> None:
+    base, without = make(BASE), make(BASE, name="without", sets=("stable.enabled=false",))
+    there, back = diff(base, without), diff(without, base)
+    assert there.removed == back.added == there.disabled == back.disabled == ("stable",)
+    assert "  - stable (disabled in without)\n" in diff_text(there)
+    assert "  + stable (disabled in without)\n" in diff_text(back)
+    assert "  ~ display.radiance: stable.stable → light.radiance\n" in diff_text(there)
+    assert diff_json(there)["disabled"] == ["stable"]
+    assert "− disabled" in diff_svg(base, without, there)
