@@ -21,7 +21,7 @@ from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import bounds
 from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
-from rendergraph.steps import ViewMatrices
+from rendergraph.steps import Step, ViewMatrices
 from rendergraph.steps.checks import buffer as buffer_of
 from rendergraph.steps.checks import own_port
 from rendergraph.textures import BufferDesc
@@ -31,12 +31,15 @@ from rendergraph.textures import BufferDesc
 class StepTime:
     """Milliseconds of one step in one frame; `gpu_ms` is None where the driver has no timer.
 
-    A node's `update` counts as part of its first step.
+    A node's `update` counts as part of its first step. `index` is the step's number in its node, -1 where there is only
+    an `update`, and `label` what the author calls it.
     """
 
     node: str
     cpu_ms: float
     gpu_ms: float | None
+    index: int = 0
+    label: str = ""
 
 
 @dataclass(frozen=True)
@@ -211,7 +214,7 @@ class Runner:
                     call()
             executable.done()
             return None
-        taken: list[tuple[str, float, Timer]] = []
+        taken: list[tuple[Step, float, Timer]] = []
         measured = executable.device.can_time
         for step in listed:
             before = perf_counter()
@@ -222,13 +225,16 @@ class Runner:
             if measured:
                 step.timer.stop()
             node_id = step.step.node
-            taken.append((node_id, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
+            taken.append((step.step, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
         executable.done()
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        steps = [StepTime(node_id, cpu * 1e3, None) for node_id, cpu in updates.items()]  # those that draw nothing
-        for node_id, cpu, timer in taken:
-            steps.append(StepTime(node_id, cpu * 1e3, timer.milliseconds() if measured else None))
+        steps = [
+            StepTime(node_id, cpu * 1e3, None, -1, "update") for node_id, cpu in updates.items()
+        ]  # those that draw nothing
+        for done, cpu, timer in taken:
+            gpu = timer.milliseconds() if measured else None
+            steps.append(StepTime(done.node, cpu * 1e3, gpu, done.index, done.label))
         return FrameTimes(frame_ms, tuple(steps))
 
     def activate(self) -> None:

@@ -17,9 +17,12 @@ if TYPE_CHECKING:
 @click.option("-n", "--frames", type=click.IntRange(1, 100_000), default=30, show_default=True, help="Measured frames.")
 @click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@click.option("--steps", is_flag=True, help="Time each step of a pass, too.")
 @options.json_option
 @options.device_option
-def command(selection: Selection, frames: int, fps: float, no_alias: bool, as_json: bool, device: int | None) -> None:
+def command(
+    selection: Selection, frames: int, fps: float, no_alias: bool, steps: bool, as_json: bool, device: int | None
+) -> None:
     """Time each pass.
 
     Renders frames and prints the median time of each pass, with its spread. All of the pipeline's outputs are
@@ -29,6 +32,7 @@ def command(selection: Selection, frames: int, fps: float, no_alias: bool, as_js
     Examples:
       rendergraph bench forward --frames 5 --size 320x180
       rendergraph bench forward --frames 5 --size 320x180 --json
+      rendergraph bench bloom --frames 5 --size 320x180 --steps
     """
     from rendergraph.session import RenderOptions, stages
     from rendergraph.session.gpu import Gpu
@@ -40,6 +44,10 @@ def command(selection: Selection, frames: int, fps: float, no_alias: bool, as_js
         frame = stages.draw_last(expanded, gpu)
     warn(frame.warnings)
     report = measured(frame)
+    if steps:
+        from rendergraph.compare.timing import step_times
+
+        report["steps"] = step_times(frame.times)
     emit_json(report) if as_json else emit(_text(report))
     if report["device"]["software"]:
         say(f"software rendering on {report['device']['renderer']}: these times say nothing about GPUs")
@@ -54,10 +62,13 @@ def measured(frame: Frame) -> dict[str, Any]:
 
 
 def _text(report: dict[str, Any]) -> str:
-    rows = [
-        (entry["node"], entry["type"], *_figures(entry["gpu_ms"]), *_figures(entry["cpu_ms"]))
-        for entry in report["passes"]
-    ]
+    rows: list[tuple[str, ...]] = []
+    for entry in report["passes"]:
+        rows.append((entry["node"], entry["type"], *_figures(entry["gpu_ms"]), *_figures(entry["cpu_ms"])))
+        own = [step for step in report.get("steps", ()) if step["node"] == entry["node"]]
+        for step in own if len(own) > 1 else ():
+            name = f"  {step['step']} {step['label']}"
+            rows.append((name, "", *_figures(step["gpu_ms"]), *_figures(step["cpu_ms"])))
     rows.append(("frame", "", "", "", *_figures(report["frame_ms"])))
     width, height = report["size"]
     device, memory = report["device"], report["memory"]

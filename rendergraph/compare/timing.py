@@ -100,6 +100,24 @@ def times_of(frames: Sequence[FrameTimes], types: Mapping[str, str]) -> Times:
     return Times(len(frames), Spread.of([frame.frame_ms for frame in frames]), _gpu(whole), _cpu(whole), passes)
 
 
+def step_times(frames: Sequence[FrameTimes]) -> list[dict[str, Any]]:
+    """Each step in order of execution: `node`, its number there, `label`, and `gpu_ms` and `cpu_ms` as passes have."""
+    own: dict[tuple[str, int, str], list[tuple[float, float | None]]] = {}
+    for frame in frames:
+        for step in frame.steps:
+            own.setdefault((step.node, step.index, step.label), []).append((step.cpu_ms, step.gpu_ms))
+    return [
+        {
+            "node": node,
+            "step": index,
+            "label": label,
+            "gpu_ms": asdict(gpu) if (gpu := _gpu(values)) else None,
+            "cpu_ms": asdict(_cpu(values)),
+        }
+        for (node, index, label), values in own.items()
+    ]
+
+
 def times_within(frames: Sequence[FrameTimes], names: Mapping[str, str], types: Mapping[str, str]) -> Times:
     """Times of one of several pipelines that were drawn in the same frames.
 

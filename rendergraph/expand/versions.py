@@ -155,7 +155,18 @@ class _Versions:
         for layout, port in attributes.items():
             reads += self._reads(recording, port.name, Part(port))
             held.append((layout, reads[-1].resource))
-        keep = ("state", "objects", "materials", "order", "per_light", "topology", "instances", "groups", "invocations")
+        keep = (
+            "label",
+            "state",
+            "objects",
+            "materials",
+            "order",
+            "per_light",
+            "topology",
+            "instances",
+            "groups",
+            "invocations",
+        )
         return Step(
             node=node.id,
             index=index,
@@ -173,7 +184,6 @@ class _Versions:
             view_index=view_index,
             vertices=vertices,
             attributes=tuple(held),
-            label=f"{node.id}" + (f" {index}" if len(recording.requests) > 1 else ""),
             type=node.type.name,
             place=node.place,
             caller=request.caller,

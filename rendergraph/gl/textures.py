@@ -164,7 +164,7 @@ def read(
 def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
     """A new texture with one sample a texel.
 
-    The driver does it, and of depth and whole numbers takes one sample: the first, on those that this was tried on.
+    The driver does it, and of depth, stencil and whole numbers takes one sample of its choice.
     """
     raw, desc = device.raw, texture.desc
     made = create(device, replace(desc, samples=1), "a resolved texture")

@@ -19,12 +19,15 @@ def mebibytes(count: int) -> str:
 
 
 def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
-    """Step key to what it is called: the node's id, with a number where the node has several steps.
+    """Step key to what it is called: the node's id, with number and label where the node has several steps.
 
     A copy is the framework's own and has a name that says what for.
     """
     several = {step.node for step in steps if step.index > 0 and step.kind != "copy"}
-    names = {step.key: f"{step.node}[{step.index}]" if step.node in several else step.node for step in steps}
+    names = {
+        step.key: f"{step.node}[{f'{step.index} {step.label}'.rstrip()}]" if step.node in several else step.node
+        for step in steps
+    }
     return names | {step.key: step.label for step in steps if step.kind == "copy"}
 
 

@@ -122,7 +122,7 @@ class Step:
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
         groups: work groups of a compute step.
         invocations: what a compute step covers along x, y and z; the groups are then as many as its shader needs.
-        label: shown in plans and GL debug groups.
+        label: what the author calls it, or what a copy is for; shown in plans and beside times.
         type: the node's type.
         place: where the node stands in the pipeline's file.
         caller: the author's file and line of the call that recorded it; None where the framework did by itself.

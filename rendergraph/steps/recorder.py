@@ -71,7 +71,7 @@ class Steps:
     step reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a
     port, a part, or a mapping from the shader's output names; without it the step writes every output of the node
     that is used. A texture with a depth format is attached as depth. What is None, a port that a subclass drops, is
-    left out.
+    left out. A `label` is what plans and `bench --steps` call the step, beside its node and number.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -143,10 +143,11 @@ class Steps:
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
         defines: Defines | None = None,
+        label: str = "",
         **bindings: Target | UniformValue,
     ) -> None:
         """One fragment shader over the whole target."""
-        self._add("fullscreen", {"fragment": shader}, out, bindings, defines, state=state)
+        self._add("fullscreen", {"fragment": shader}, out, bindings, defines, label=label, state=state)
 
     @checked
     def geometry(
@@ -158,6 +159,7 @@ class Steps:
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
         defines: Defines | None = None,
+        label: str = "",
         view: Port | None = None,
         view_index: Count | None = 0,
         objects: Objects = "all",
@@ -171,7 +173,7 @@ class Steps:
         Args:
             fragment: fragment shader, None for depth alone.
             vertex, geometry: other stages; the default vertex shader transforms by object and view.
-            out, state, defines, bindings: see the class.
+            out, state, defines, label, bindings: see the class.
             view: a `Views` port, a `view` input or a texture that carries one; the node's connected `view` input, else
                 the pipeline's camera.
             view_index: which view of it, None where a geometry shader sets `gl_Layer`.
@@ -189,6 +191,7 @@ class Steps:
             out,
             bindings,
             defines,
+            label=label,
             state=state,
             view=view,
             view_index=view_index,
@@ -212,6 +215,7 @@ class Steps:
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
         defines: Defines | None = None,
+        label: str = "",
         view: Port | None = None,
         view_index: Count | None = 0,
         **bindings: Target | UniformValue,
@@ -224,7 +228,7 @@ class Steps:
                 (count, instances, first, base instance).
             attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`.
             topology, instances: as in OpenGL.
-            out, state, defines, bindings: see the class.
+            out, state, defines, label, bindings: see the class.
             view, view_index: as for `geometry`.
         """
         if isinstance(vertices, Port):
@@ -242,6 +246,7 @@ class Steps:
             out,
             bindings,
             defines,
+            label=label,
             state=state,
             vertices=vertices,
             topology=topology,
@@ -260,6 +265,7 @@ class Steps:
         groups: Counts | None = None,
         out: Target | Mapping[str, Target] | None = None,
         defines: Defines | None = None,
+        label: str = "",
         **bindings: Target | UniformValue,
     ) -> None:
         """A compute dispatch: `out` is bound as images and buffers; barriers follow from who reads them next.
@@ -270,12 +276,12 @@ class Steps:
                 default the first texture it writes, else the first that it reads. There are as many work groups as
                 that takes, so the last ones reach beyond the edge: the shader leaves those invocations out.
             groups: the number of work groups instead.
-            out, defines, bindings: see the class.
+            out, defines, label, bindings: see the class.
         """
         if groups is not None and over is not None:
             raise Misuse("both over and groups are given; over finds the number of groups itself")
         options = {"over": over} if groups is None else {"groups": checks.counts(groups)}
-        self._add("compute", {"compute": shader}, out, bindings, defines, **options)
+        self._add("compute", {"compute": shader}, out, bindings, defines, label=label, **options)
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
         """Fill a texture with one value in every channel, or one a channel; a buffer with 0."""

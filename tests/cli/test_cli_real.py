@@ -169,6 +169,16 @@ def test_several_mistakes_are_told_at_once(cli: Any) -> None:
     assert [problem["code"] for problem in result.json["error"]["problems"]] == ["RG103", "RG102"]
 
 
+def test_bench_shows_the_steps_of_a_pass(cli: Any) -> None:
+    told = cli("bench", "bloom", *SMALL, "-n", "2", "--steps", "--json").json
+    nodes = [step["node"] for step in told["steps"]]
+    assert set(nodes) == {entry["node"] for entry in told["passes"]}
+    assert nodes.count("bloom") > 2
+    assert "steps" not in cli("bench", "forward", *SMALL, "-n", "1", "--json").json
+    lines = cli("bench", "bloom", *SMALL, "-n", "1", "--steps").out.splitlines()
+    assert sum(line.startswith("  0 ") for line in lines) >= 1
+
+
 def test_check_and_plan_say_what_they_found(cli: Any) -> None:
     result = cli("check", "forward")
     assert (result.code, result.out) == (0, "")
