@@ -10,6 +10,9 @@ from typing import Any
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts, summary
+from rendergraph.cli.program_text import program, shown_at_work
+from rendergraph.errors import InputError
+from rendergraph.session import Selection
 
 from .markdown import block, code, folded, listing, page, prose, table
 from .pictures import Studio, View, example_and_base, exhibit
@@ -89,8 +92,26 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         f"## Outputs\n\n{outputs}",
         f"## Parameters\n\n{parameters}" if parameters else "",
         f"## Textures of its own\n\n{internal}" if internal else "",
+        _in_scope(found),
         "## How it is made\n\n" + "\n\n".join(_sources(found)),
     )
+
+
+def _in_scope(found: NodeType) -> str:
+    """What the shaders of its steps may use in the pipeline above, folded; nothing where it has no program there."""
+    try:
+        linked, node = shown_at_work(found, Catalog.discover(), Selection)
+        steps = [program(linked, node, step["step"]) for step in program(linked, node, None)["steps"]]
+    except InputError:
+        return ""
+    tables = [
+        folded(
+            f"step {step['step']}: " + ", ".join(f"<code>{name}</code>" for name in step["shaders"].values()),
+            table(("in scope", "from"), [(code(one["name"]), prose(one["source"])) for one in step["scope"]]),
+        )
+        for step in steps
+    ]
+    return "## In scope of its shaders\n\n" + "\n\n".join(tables)
 
 
 def _pictures(found: NodeType, outputs: list[dict[str, Any]], studio: Studio) -> str:

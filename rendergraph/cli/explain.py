@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING, Any
 from rendergraph.cli import options
 from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts
 from rendergraph.cli.output import emit, emit_json, table, warn
+from rendergraph.cli.program_text import as_text, program, shown_at_work
 from rendergraph.cli.words import click
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Problem, UsageError, suggestion
 
 if TYPE_CHECKING:
+    from rendergraph.cli.options import Select
     from rendergraph.keys import Table
+    from rendergraph.session.values import Linked
 
 FILES = ("pipeline", "scene", "sweep", "settings", "header")
 """Kinds of file whose keys can be explained."""
@@ -23,20 +26,36 @@ FILES = ("pipeline", "scene", "sweep", "settings", "header")
 
 @click.command("explain", no_args_is_help=True)
 @click.argument("topic")
-@options.plugin_option
+@click.option("--glsl", is_flag=True, help="Print the program of the node: what is in scope, and its final text.")
+@click.option("--pipeline", metavar="PIPELINE", help="The program that node TOPIC of this pipeline has.")
+@click.option("--step", type=click.IntRange(min=0), metavar="N", help="Which of the node's steps, as `plan` counts.")
+@options.selection_options
 @options.json_option
-def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
+def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
     """Explain a node type, an error code or a file.
 
     `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of such a file; the path of a shader file
-    explains the node that it is.
+    explains the node that it is. With --glsl a type is shown in a small pipeline, or TOPIC is a node of
+    --pipeline; either is changed by the options that `run` has.
 
     \b
     Examples:
       rendergraph explain tonemap
       rendergraph explain RG103
       rendergraph explain scene
+      rendergraph explain tonemap --glsl
+      rendergraph explain ao --glsl --step 2 --pipeline ssao-hemisphere -s ao.samples=16
     """
+    from rendergraph.session import Selection, stages
+
+    plugins = select(topic).plugins
+    if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
+        raise UsageError(Problem("RG500", "--pipeline, --step and what changes a pipeline go with --glsl"))
+    if pipeline is not None:
+        linked = stages.link(stages.resolve(select(pipeline)))
+        warn(linked.warnings)
+        _program(linked, topic, step, as_json)
+        return
     if re.fullmatch(r"[Rr][Gg]\d+", topic):
         page = error_page(topic.upper())
         emit_json(page) if as_json else emit(_error_text(page))
@@ -59,11 +78,19 @@ def command(topic: str, plugins: tuple[Path, ...], as_json: bool) -> None:
         text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
         raise InputError(Problem("RG511", text))
     found = catalog.get(topic)
+    if glsl:
+        _program(*shown_at_work(found, catalog, select), step, as_json)
+        return
     described = describe(found, catalog.extensions) | {"example": in_a_file(found, catalog)}
     if any("added" in parameter for parameter in described["parameters"]):
         warn(catalog.extensions.warnings)
     warn(found.warnings)
     emit_json(described) if as_json else emit(_node_text(described))
+
+
+def _program(linked: Linked, node: str, step: int | None, as_json: bool) -> None:
+    found = program(linked, node, step)
+    emit_json(found) if as_json else emit(as_text(found))
 
 
 # --- error codes -----------------------------------------------------------------------------------------------------

@@ -20,8 +20,8 @@ from rendergraph.compile.executable import Call, Draw, SortedDraws
 from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.views import ViewBuffers
 from rendergraph.expand import CAMERA
-from rendergraph.scene.model import Material, Mesh, Scene, Texture
-from rendergraph.scene.selection import selected
+from rendergraph.program.variants import features, select
+from rendergraph.scene.model import Texture
 from rendergraph.steps import Step, ViewMatrices
 
 COMMAND = np.dtype(
@@ -183,53 +183,3 @@ class GeometryCompiler:
         if cull == "material":
             cull = "none" if material.double_sided else "back"
         return BatchKey(tuple(defines.items()), tuple(found.items()), cull, clockwise)
-
-
-def select(scene: Scene, step: Step) -> list[int]:
-    """The objects a step draws: in the scene's order, or in that of their names, which `expand` has found there."""
-    if isinstance(step.objects, str):
-        return selected(scene, step.objects)
-    names = {placed.name: number for number, placed in enumerate(scene.objects)}
-    return [names[name] for name in step.objects]
-
-
-def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
-    """Macros and textures a material needs of a shader that looks at `level` of it.
-
-    Only what makes a difference is named, so that objects which differ in nothing else share a batch.
-    """
-    defines: dict[str, str] = {}
-    if level == "none":
-        return defines, {}
-    masked = material.alpha_mode == "mask"
-    slots = (
-        material.textures
-        if level == "full"
-        else {slot: texture for slot, texture in material.textures.items() if masked and slot == "base_color"}
-    )
-    found: dict[str, Texture] = {}
-    for slot, texture in slots.items():
-        if (mesh.uv1 if texture.uv else mesh.uv0) is None:
-            continue
-        defines[f"HAS_{slot.upper()}_TEXTURE"] = "1"
-        defines[f"{slot.upper()}_UV"] = str(texture.uv)
-        defines[f"HAS_UV{texture.uv}"] = "1"
-        if texture.transform is not None:
-            defines["HAS_UV_TRANSFORM"] = "1"
-        found[f"{slot}_texture"] = texture
-    if masked:
-        defines["ALPHA_MASK"] = "1"
-    if mesh.colors is not None and (masked or level == "full"):
-        defines["HAS_VERTEX_COLOR"] = "1"
-    if level == "full":
-        if material.alpha_mode == "blend":
-            defines["ALPHA_BLEND"] = "1"
-        if material.double_sided:
-            defines["DOUBLE_SIDED"] = "1"
-        if material.unlit:
-            defines["UNLIT"] = "1"
-        if material.anisotropy_strength > 0:
-            defines["ANISOTROPIC"] = "1"
-        if mesh.tangents is not None and ("normal" in slots or material.anisotropy_strength > 0):
-            defines["HAS_TANGENT"] = "1"
-    return defines, found

@@ -16,8 +16,9 @@ from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
+from rendergraph.program.variants import light_macros, scene_macros, storage_blocks
 from rendergraph.scene import pack
-from rendergraph.scene.model import ImageSource, Material, Scene, Texture
+from rendergraph.scene.model import ImageSource, Scene, Texture
 from rendergraph.scene.pack import PackedScene
 from rendergraph.textures import TextureDesc, full_mip_count
 
@@ -86,48 +87,24 @@ class GpuScene:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
         self._indices = ctx.buffer(packed.indices.tobytes() or bytes(4))
         self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
-        blocks: dict[str, npt.NDArray[Any]] = {"light_block": packed.lights, "material_block": packed.materials}
-        if packed.material_moved.any():
-            blocks["material_uv_block"] = packed.material_uvs
-        for block, records in blocks.items():
+        stored = storage_blocks(packed, self.device.limits["uniform_block"])
+        for block, records in pack.blocks(packed).items():
             if records.size:
-                storage = records.nbytes > self.device.limits["uniform_block"]
-                self._blocks[block] = (ctx.buffer(records.tobytes()), storage)
+                self._blocks[block] = (ctx.buffer(records.tobytes()), block in stored)
 
     @property
     def light_defines(self) -> dict[str, str]:
         """Macros about the lights, for every shader."""
-        kinds = [light.type for light in self.scene.lights]
-        macros = {
-            "LIGHT_COUNT": str(len(kinds)),
-            "LIGHT_DIRECTIONALS": str(kinds.count("directional")),
-            "LIGHT_POINTS": str(kinds.count("point")),
-            "LIGHT_SPOTS": str(kinds.count("spot")),
-        }
-        if self._blocks.get("light_block", (None, False))[1]:
-            macros["LIGHT_STORAGE"] = "1"
-        return macros
+        return light_macros(self.scene, self._stored)
 
     @property
     def defines(self) -> dict[str, str]:
-        """Macros about objects and materials, for geometry steps: what none of them needs is not compiled."""
-        macros = {"MATERIAL_COUNT": str(max(1, len(self.scene.materials)))}
-        moving = {path.partition(".")[0] for path in self.scene.keyframes}
-        if "objects" not in moving and _evenly_scaled(self.packed.instances["rows"]):
-            macros["UNIFORM_SCALE"] = "1"
-        if "materials" not in moving:
-            textured = {slot for material in self.scene.materials for slot in material.textures}
-            table, default = self.packed.materials, pack.pack_materials([Material("default")])
-            if not table["emissive"][:, :3].any():
-                macros["NO_EMISSIVE"] = "1"
-            same = (table["specular"] == default["specular"]).all() and (table["extra"] == default["extra"])[:, 0].all()
-            if same and not textured & {"specular", "specular_color"}:
-                macros["DEFAULT_SPECULAR"] = "1"
-        if self._blocks.get("material_block", (None, False))[1]:
-            macros["MATERIAL_STORAGE"] = "1"
-        if self._blocks.get("material_uv_block", (None, False))[1]:
-            macros["MATERIAL_UV_STORAGE"] = "1"
-        return macros
+        """Macros about objects and materials, for geometry steps."""
+        return scene_macros(self.scene, self.packed, self._stored)
+
+    @property
+    def _stored(self) -> set[str]:
+        return {name for name, (_, storage) in self._blocks.items() if storage}
 
     def bind(self) -> None:
         """Bind lights and materials to their points; once a frame."""
@@ -220,11 +197,3 @@ class GpuScene:
             textures.delete(self.device, image)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)
-
-
-def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
-    """Whether every object, given by the rows of its matrix (n, 3, 4), is only turned, moved and scaled evenly."""
-    linear = rows[:, :, :3].astype(np.float64)
-    products = np.einsum("nij,nkj->nik", linear, linear)
-    size = np.trace(products, axis1=1, axis2=2)[:, None, None] / 3
-    return bool((np.abs(products - size * np.eye(3)) <= 1e-5 * size).all())

@@ -30,13 +30,14 @@ from rendergraph.compile.stored import check_stored
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
-from rendergraph.expand import CAMERA, ViewTable
+from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
 from rendergraph.program import Texts, check_kept_text, prefix, stage_texts
+from rendergraph.program.variants import view_count
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -182,7 +183,7 @@ class _Compiler:
                 draw.binds.append(self.units.bind(draw.textures[name][0], unit))
 
     def _draw(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        program, binds, uniforms = self._program(step, {"PASS_VIEW_COUNT": str(self._view_count(step))})
+        program, binds, uniforms = self._program(step, {"PASS_VIEW_COUNT": view_count(step, self.view_tables)})
         self._target(step, compiled, parity)
         content: list[tuple[Any, ...]] = []
         names: list[int] = []
@@ -206,7 +207,7 @@ class _Compiler:
 
     def _geometry(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         self._target(step, compiled, parity)
-        defines = {"PASS_VIEW_COUNT": str(self._view_count(step)), **self.scene.defines}
+        defines = {"PASS_VIEW_COUNT": view_count(step, self.view_tables), **self.scene.defines}
 
         def make(batch: Batch) -> Draw:
             program, binds, uniforms = self._program(step, {**defines, **batch.defines}, materials=batch.textures)
@@ -238,9 +239,6 @@ class _Compiler:
         compiled.before += transfer_calls(self.device, self.memory, step, parity)
 
     # Parts ----------------------------------------------------------------------------------------------------------
-
-    def _view_count(self, step: Step) -> int:
-        return max(1, self.view_tables[step.view or CAMERA].count)
 
     def _program(
         self, step: Step, defines: Mapping[str, str], *, materials: Collection[str] = ()

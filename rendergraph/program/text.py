@@ -95,7 +95,7 @@ def stage_texts(
     if step.kind == "fullscreen":
         shaders.setdefault("vertex", "<fullscreen.vert>")
     macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
-    wanted = _signatures(step, types)
+    wanted = signatures_of(step, types)
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
         if stage in shaders:
@@ -200,7 +200,7 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
 # --- functions -------------------------------------------------------------------------------------------------------
 
 
-def _signatures(step: Step, types: Mapping[str, NodeType]) -> dict[str, Signature]:
+def signatures_of(step: Step, types: Mapping[str, NodeType]) -> dict[str, Signature]:
     """Every function the step's shader may call: with providers, or declared as an input and so neutral."""
     found = {signature.name: signature for signature in SIGNATURES}
     for binding in step.functions:
@@ -235,7 +235,7 @@ def _functions(
         factors.append(f"result = result {signature.combine} {prefix(binding.node)}{signature.name}({arguments});")
     lines: list[str] = []
     if stage == "fragment":
-        for read in _screen_reads(signature, step, types[step.node]):
+        for read in screen_reads(signature, step, types[step.node]):
             lines.append(f"uniform sampler2DArray {read.name};")
             factors += _screen_factors(read, _lights(read, resources), signature)
     kind = signature.declaration.split()[0]
@@ -247,7 +247,7 @@ def _functions(
 def _light_table(signature: Signature, step: Step, node: NodeType, resources: Mapping[str, Resource]) -> Iterator[str]:
     """The lights that some provider or texture of the function knows, for shaders that treat those apart."""
     reads = [read for binding in step.functions if binding.signature == signature.name for read in binding.reads]
-    reads += _screen_reads(signature, step, node)
+    reads += screen_reads(signature, step, node)
     known = list(dict.fromkeys(light for read in reads for light in _lights(read, resources)))
     yield f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"
     if known:
@@ -258,7 +258,7 @@ def _lights(read: Read, resources: Mapping[str, Resource]) -> tuple[int, ...]:
     return resources[read.resource].lights if read.resource in resources else ()
 
 
-def _screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read]:
+def screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read]:
     """The step's textures that hold the function's values in screen space."""
     names = [
         name

@@ -174,6 +174,12 @@ def pack(scene: Scene) -> PackedScene:
     )
 
 
+def blocks(packed: PackedScene) -> dict[str, Records | Floats]:
+    """The tables that shaders read, by the names of their blocks."""
+    found: dict[str, Records | Floats] = {"light_block": packed.lights, "material_block": packed.materials}
+    return found | ({"material_uv_block": packed.material_uvs} if packed.material_moved.any() else {})
+
+
 def update(packed: PackedScene, scene: Scene) -> PackedScene:
     """The same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame."""
     return replace(packed, **_placed(scene, packed.meshes))

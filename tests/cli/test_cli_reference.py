@@ -201,3 +201,71 @@ def test_what_is_kept_says_so(cli: Any) -> None:
     kept = [port["name"] for port in described["internal"] if port.get("kept")]
     assert kept == ["noise"]
     assert "kept from frame to frame" in cli("explain", "ssao_hemisphere").out
+
+
+# --- programs --------------------------------------------------------------------------------------------------------
+
+
+def test_the_program_of_a_type_and_of_a_node(cli: Any) -> None:
+    shown = cli("explain", "tonemap", "--glsl")
+    assert shown.code == 0
+    assert shown.out.startswith("// step 0 of node 'display' (tonemap) in pipeline 'forward'")
+    assert "//   uniform float exposure  parameter 'exposure': 0" in shown.out
+    assert "// ==================== fragment shader\n\n#version 450 core\n" in shown.out
+    told = cli("explain", "display", "--glsl", "--pipeline", "forward", "-s", "display.exposure=2", "--json").json
+    assert {"section": "uniforms", "name": "uniform float exposure", "source": "parameter 'exposure': 2"} in told[
+        "scope"
+    ]
+    stage = told["stages"]["fragment"]
+    assert len(stage["origins"]) == len(stage["text"].splitlines())
+    assert stage["origins"][stage["text"].splitlines().index("uniform float exposure;")]["file"].endswith(
+        "tonemap.frag"
+    )
+
+
+def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) -> None:
+    shown = cli("explain", "ao", "--glsl", "--pipeline", "ssao-hemisphere", "--step", "2").out
+    assert "step 2 of node 'ao' (ssao_hemisphere)" in shown
+    assert "//   3  fullscreen  bilateral_blur.frag" in shown
+    (tmp_path / "two.yaml").write_text(
+        "scene: 1\nobjects: {a: {shape: box}, b: {shape: plane, material: thin}}\nmaterials: {thin: {double_sided: true}}\n"
+    )
+    shown = cli("explain", "light", "--glsl", "--pipeline", "forward", "--scene", "two.yaml").out
+    assert "// the first of 2 variants, which differ in DOUBLE_SIDED 1\n" in shown
+    assert "variants" not in cli("explain", "light", "--glsl", "--pipeline", "forward").out
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        ("shadows --glsl --pipeline forward", 3, r"RG511 node 'shadows' \(shadow_pcf\) has no program: .* of 'light'"),
+        ("ligth --glsl --pipeline forward", 3, r"RG511 pipeline 'forward' has no node 'ligth'; did you mean 'light'"),
+        (
+            "display --glsl --pipeline forward --step 3",
+            2,
+            r"RG500 --step: 'display' has no step 3 .* 0 \(tonemap.frag\)",
+        ),
+        (
+            "ssao_hemisphere --glsl -s ao.type=ssao_disc",
+            3,
+            "RG511 what was set leaves no node of type 'ssao_hemisphere'",
+        ),
+        ("tonemap --step 1", 2, "RG500 --pipeline, --step and what changes a pipeline go with --glsl"),
+        ("tonemap -s display.exposure=1", 2, "RG500 --pipeline, --step and what changes a pipeline go with --glsl"),
+    ],
+)
+def test_programs_that_are_not_there(cli: Any, words: str, code: int, message: str) -> None:
+    answer = cli("explain", *words.split())
+    assert answer.code == code
+    assert re.search(message, answer.err)
+
+
+def test_a_shader_file_s_program(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "dim.frag").write_text(
+        "//---\n// doc: Darker.\n// inputs: {color: {semantic: display_color}}\n// outputs: {dark: {like: color}}\n//---\n"
+        "uniform sampler2D color;\nuniform float gain = 0.5;\nin vec2 v_uv;\nout vec4 dark;\n"
+        "void main() { dark = gain * texture(color, v_uv); }\n"
+    )
+    shown = cli("explain", "./dim.frag", "--glsl")
+    assert "dark = gain * texture(color, v_uv);" in shown.out, shown.err
+    assert re.search(r"uniform float gain +parameter 'gain': 0\.5", shown.out)

@@ -1,0 +1,258 @@
+"""Everything that the text of a step may use, and where each thing comes from; and the text with its files noted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rendergraph.catalog import NodeType
+from rendergraph.errors import shown_file
+from rendergraph.expand import ViewTable
+from rendergraph.glsl.globals import Global, globals_of
+from rendergraph.glsl.names import declared, without_directives
+from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.program.text import StageText, prefix, read_defines, screen_reads, signatures_of
+from rendergraph.resources import folder
+from rendergraph.steps import Read, Resource, Step
+from rendergraph.textures import FORMATS, TextureDesc
+
+_BLOCK = re.compile(r"\b(?:uniform|buffer)\s+(\w+)\s*\{([^{}]*)\}")
+_KINDS = {"texture2d": "2D", "texture2d_array": "2DArray", "texture_cube": "Cube"}
+
+
+@dataclass(frozen=True)
+class InScope:
+    """One thing that a step's text may use.
+
+    Attributes:
+        section: `textures`, `uniforms`, `blocks`, `macros`, `functions`, `includes`, `attributes`, `varyings` or
+            `outputs`.
+        name: what stands in the text, such as `uniform sampler2D depth`; of an include its file.
+        source: where it comes from, such as `input 'depth': gbuffer.depth`; of an include the names it declares.
+    """
+
+    section: str
+    name: str
+    source: str
+
+
+def in_scope(
+    step: Step,
+    types: Mapping[str, NodeType],
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
+    defines: Mapping[str, str],
+    texts: Mapping[str, StageText],
+) -> list[InScope]:
+    """Everything that is in scope in a step, section by section.
+
+    Args:
+        step, types, resources, views, defines: as `stage_texts` takes them.
+        texts: what it made of them.
+    """
+    found = _Scope(step, types, resources)
+    return [
+        *found.textures(),
+        *found.uniforms(texts),
+        *found.blocks(texts),
+        *found.macros(read_defines(step.reads, resources, views), defines),
+        *found.functions(),
+        *found.includes(texts),
+        *found.between(texts),
+        *found.outputs(),
+    ]
+
+
+@dataclass(frozen=True)
+class _Scope:
+    step: Step
+    types: Mapping[str, NodeType]
+    resources: Mapping[str, Resource]
+
+    def textures(self) -> Iterator[InScope]:
+        for before, read in self._reads():
+            desc = self.resources[read.resource].desc
+            if not isinstance(desc, TextureDesc) or read.use not in ("sample", "image"):
+                continue
+            letter = {"int": "i", "uint": "u"}.get(FORMATS[desc.format].family, "")
+            kind = _KINDS.get(read.kind, "2D") + ("MS" if desc.samples > 1 else "")
+            word = "image" if read.use == "image" else "sampler"
+            shadow = "Shadow" if read.sampler.compare and read.use == "sample" else ""
+            yield InScope(
+                "textures", f"uniform {letter}{word}{kind}{shadow} {before}{read.name}", self._port(before, read)
+            )
+
+    def uniforms(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+        types = {one.name: one for text in texts.values() for one, _ in _globals(text.source, "uniform")}
+        textures = {before + read.name for before, read in self._reads()}
+        values = [("", self.step.node, name, value) for name, value in self.step.uniforms]
+        for one in self.step.functions:
+            values += [(prefix(one.node), one.node, name, value) for name, value in one.uniforms]
+        for before, node, name, value in values:
+            declaration = types.pop(before + name, None)
+            kind = _type(declaration) if declaration is not None else ""
+            whose = "" if node == self.step.node else f" of '{node}'"
+            knob = name in self.types[node].cls.parameters()
+            where = f"parameter '{name}'{whose}" if knob else f"the step{whose}"
+            yield InScope("uniforms", f"uniform {kind} {before}{name}".replace("  ", " "), f"{where}: {_value(value)}")
+        inputs = self.types[self.step.node].cls.inputs()
+        for name, declaration in types.items():
+            if name not in textures:
+                where = "the step's view" if name == "view_index" else "the scene's materials, where they have one"
+                where = f"input '{name}', not connected" if name in inputs else where
+                yield InScope("uniforms", f"uniform {_type(declaration)} {name}", where)
+
+    def blocks(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+        seen = set()
+        buffers = {before + read.name: (before, read) for before, read in self._reads() if read.use == "buffer"}
+        for text in texts.values():
+            for match in _BLOCK.finditer(without_directives(text.text)):
+                name, members = match[1], " ".join(match[2].split())
+                if name in seen:
+                    continue
+                seen.add(name)
+                origin = text.source.origins[text.text.count("\n", 0, match.start())]
+                where = self._port(*buffers[name]) if name in buffers else origin.made or _file(origin.file)
+                yield InScope("blocks", f"{name} {{ {members} }}", where)
+        for before, read in self._reads():
+            resource = self.resources[read.resource]
+            if resource.view is not None and f"{before}{read.name}_view_block" not in seen:
+                yield InScope(
+                    "blocks", f"{before}{read.name}_views[]", f"the views of '{read.name}', where it is looked at"
+                )
+            if resource.lights:
+                yield InScope(
+                    "blocks", f"{before}{read.name}_lights[]", f"the scene's light of each layer of '{read.name}'"
+                )
+
+    def macros(self, of_reads: Mapping[str, str], added: Mapping[str, str]) -> Iterator[InScope]:
+        node = self.types[self.step.node].cls
+        knobs = {name.upper(): name for name in node.parameters()}
+        inputs = {name.upper(): name for name in node.inputs()}
+        reads = {read.name.upper(): read.name for read in self.step.reads}
+        for name, value in {**of_reads, **dict(self.step.defines), **added}.items():
+            stem = name.removeprefix("HAS_")
+            knob = next((knobs[k] for k in knobs if name == k or name.startswith(f"{k}_")), None)
+            read = next((reads[r] for r in reads if name.startswith(f"{r}_")), None)
+            if name in added:
+                where = "the scene's lights" if name.startswith("LIGHT_") else "the scene and its materials"
+                where = "the step's view" if name == "PASS_VIEW_COUNT" else where
+            elif stem != name and stem in inputs | reads:
+                where = f"input '{inputs[stem]}' is connected" if stem in inputs else f"the step reads '{reads[stem]}'"
+            elif name in of_reads:
+                where = f"texture '{read}'" if read is not None else "the inputs"
+            elif name.startswith("NEEDS_"):
+                where = "what the choice of a parameter needs"
+            else:
+                where = f"parameter '{knob}'" if knob is not None else "the step"
+            yield InScope("macros", f"{name} {value}".rstrip(), where)
+
+    def functions(self) -> Iterator[InScope]:
+        for signature in signatures_of(self.step, self.types).values():
+            by = [one.node for one in self.step.functions if one.signature == signature.name]
+            by = [f"node '{node}'" for node in by]
+            by += [f"texture '{read.name}'" for read in screen_reads(signature, self.step, self.types[self.step.node])]
+            given = " and ".join(by) or f"nobody here; it returns {signature.neutral}"
+            yield InScope("functions", signature.declaration, given)
+
+    def includes(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+        """The names of every file but the stages' own, whatever condition they stand in."""
+        lines: dict[tuple[Path, str], list[str]] = {}
+        for text in texts.values():
+            for line, origin in zip(text.source.lines, text.source.origins, strict=True):
+                if origin.file is not None and (origin.by is not None or origin.shared or origin.prefix):
+                    lines.setdefault((origin.file, origin.prefix), []).append(line)
+        for (file, _), own in lines.items():
+            body = "\n".join(own)
+            names = sorted(name for name in declared(body) if not name.startswith("INCLUDED_"))
+            called = [f"{name}()" for name in names if re.search(rf"\b{name}\s*\([^;{{}}]*\)\s*\{{", body)]
+            others = [name for name in names if f"{name}()" not in called]
+            if names:
+                yield InScope("includes", _file(file), ", ".join([*called, *others]))
+
+    def between(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
+        """What goes into the vertex shader, and from one stage to the next."""
+        for stage, storage, section in (
+            ("vertex", "in", "attributes"),
+            ("vertex", "out", "varyings"),
+            ("geometry", "out", "varyings"),
+        ):
+            for one, origin in _globals(texts[stage].source, storage) if stage in texts else ():
+                name = " ".join([*sorted(one.qualifiers), _type(one), one.name])
+                yield InScope(section, name, f"{stage} shader, {origin.made or _file(origin.file)}")
+
+    def outputs(self) -> Iterator[InScope]:
+        for write in self.step.writes:
+            desc = self.resources[write.resource].desc
+            what = f"{desc.format}" if isinstance(desc, TextureDesc) else "a buffer"
+            word = {"color": "out vec4 ", "image": "uniform image2D ", "buffer": "buffer ", "depth": "gl_FragDepth: "}
+            yield InScope("outputs", f"{word[write.use]}{write.name}", f"{write.resource}, {what}")
+
+    def _reads(self) -> Iterator[tuple[str, Read]]:
+        """Every read of the step and its functions, with what stands before its name."""
+        yield from (("", read) for read in self.step.reads)
+        yield from ((prefix(one.node), read) for one in self.step.functions for read in one.reads)
+
+    def _port(self, before: str, read: Read) -> str:
+        node, port = read.resource.rpartition(".")[::2]
+        last = " of the last frame" if read.previous else ""
+        if before:
+            return f"{read.resource}{last}, for a function"
+        inputs = self.types[self.step.node].cls.inputs()
+        name = re.sub(r"_\d+\Z", "", read.name)
+        if read.name in inputs or name in inputs:
+            return f"input '{read.name if read.name in inputs else name}': {read.resource}{last}"
+        return f"its own '{port}'{last}" if node == self.step.node else f"{read.resource}{last}"
+
+
+def _globals(source: SourceText, storage: str) -> Iterator[tuple[Global, Origin]]:
+    text = source.text
+    for one in globals_of(text).declared:
+        if one.storage == storage:
+            yield one, source.origins[text.count("\n", 0, one.at)]
+
+
+def _type(one: Global) -> str:
+    return one.type + ("[]" if one.array else "")
+
+
+def _value(value: object) -> str:
+    if isinstance(value, Sequence):
+        shown = ", ".join(f"{part:g}" for part in value[:4])
+        return f"{len(value)} numbers" if len(value) > 4 else f"[{shown}]"
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else f"{value:g}"
+
+
+def _file(file: Path | None) -> str:
+    """A file as an author names it: `<view.glsl>` of the shared includes, else its path."""
+    if file is None:
+        return "rendergraph"
+    shared = folder("rendergraph.shaders")
+    return file.relative_to(shared).as_posix() if file.is_relative_to(shared) else shown_file(file)
+
+
+# --- the text --------------------------------------------------------------------------------------------------------
+
+
+def annotated(text: StageText) -> str:
+    """A stage's text with a comment above each run of lines that says where they stand; it compiles as it did."""
+    found: list[str] = []
+    last = Origin()
+    gap = True
+    for line, origin in zip(text.source.lines, text.source.origins, strict=True):
+        if not line.strip():
+            gap = True
+            continue
+        made = "macros" if origin.made.startswith("the macro ") else origin.made
+        follows = origin.file == last.file and (
+            made == last.made if origin.file is None else origin.line == last.line + 1
+        )
+        if not follows or (gap and origin.file is not None):
+            label = f"{_file(origin.file)}:{origin.line}" if origin.file is not None else made or "rendergraph"
+            found += [""] * bool(found) + [f"// {label}"]
+        found.append(line)
+        last = Origin(origin.file, origin.line, made=made)
+        gap = False
+    return "\n".join(found) + "\n"

@@ -1,0 +1,152 @@
+"""The macros that the scene, its lights and its batches add to a step's program: one variant for each kind of batch."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.expand import CAMERA, ViewTable
+from rendergraph.scene import pack
+from rendergraph.scene.model import Material, Mesh, Scene, Texture
+from rendergraph.scene.pack import PackedScene
+from rendergraph.scene.selection import selected
+from rendergraph.steps import Step
+
+LARGEST_BLOCK = 65536
+"""Bytes that a uniform block holds on drivers for desktops; OpenGL promises 16384."""
+
+
+def variants(
+    step: Step, scene: Scene, packed: PackedScene, views: Mapping[str, ViewTable], largest_block: int = LARGEST_BLOCK
+) -> list[dict[str, str]]:
+    """What `stage_texts` takes as `defines`, for every program that a step is compiled to.
+
+    Args:
+        step: one that draws or computes.
+        scene: what geometry steps draw.
+        packed: the same.
+        views: view tables by id.
+        largest_block: bytes of a uniform block; tables that are larger are storage blocks.
+
+    Returns:
+        Macros, in the order in which the scene's objects first need them; none for a geometry step that draws nothing.
+    """
+    stored = storage_blocks(packed, largest_block)
+    macros = light_macros(scene, stored)
+    if step.kind in ("geometry", "draw"):
+        macros["PASS_VIEW_COUNT"] = view_count(step, views)
+    if step.kind != "geometry":
+        return [macros]
+    macros |= scene_macros(scene, packed, stored)
+    found = []
+    for index in select(scene, step):
+        placed = scene.objects[index]
+        batch, _ = features(scene.materials[placed.material], scene.meshes[placed.mesh], step.materials)
+        if macros | batch not in found:
+            found.append(macros | batch)
+    return found
+
+
+def view_count(step: Step, views: Mapping[str, ViewTable]) -> str:
+    """`PASS_VIEW_COUNT` of a step."""
+    return str(max(1, views[step.view or CAMERA].count))
+
+
+def storage_blocks(packed: PackedScene, largest_block: int) -> frozenset[str]:
+    """The scene's blocks that are too large for a uniform block."""
+    return frozenset(name for name, records in pack.blocks(packed).items() if records.nbytes > largest_block)
+
+
+def light_macros(scene: Scene, stored: Collection[str]) -> dict[str, str]:
+    """Macros about the lights, for every shader."""
+    kinds = [light.type for light in scene.lights]
+    macros = {
+        "LIGHT_COUNT": str(len(kinds)),
+        "LIGHT_DIRECTIONALS": str(kinds.count("directional")),
+        "LIGHT_POINTS": str(kinds.count("point")),
+        "LIGHT_SPOTS": str(kinds.count("spot")),
+    }
+    if "light_block" in stored:
+        macros["LIGHT_STORAGE"] = "1"
+    return macros
+
+
+def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> dict[str, str]:
+    """Macros about objects and materials, for geometry steps: what none of them needs is not compiled."""
+    macros = {"MATERIAL_COUNT": str(max(1, len(scene.materials)))}
+    moving = {path.partition(".")[0] for path in scene.keyframes}
+    if "objects" not in moving and _evenly_scaled(packed.instances["rows"]):
+        macros["UNIFORM_SCALE"] = "1"
+    if "materials" not in moving:
+        textured = {slot for material in scene.materials for slot in material.textures}
+        table, default = packed.materials, pack.pack_materials([Material("default")])
+        if not table["emissive"][:, :3].any():
+            macros["NO_EMISSIVE"] = "1"
+        same = (table["specular"] == default["specular"]).all() and (table["extra"] == default["extra"])[:, 0].all()
+        if same and not textured & {"specular", "specular_color"}:
+            macros["DEFAULT_SPECULAR"] = "1"
+    if "material_block" in stored:
+        macros["MATERIAL_STORAGE"] = "1"
+    if "material_uv_block" in stored:
+        macros["MATERIAL_UV_STORAGE"] = "1"
+    return macros
+
+
+def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
+    """Whether every object, given by the rows of its matrix (n, 3, 4), is only turned, moved and scaled evenly."""
+    linear = rows[:, :, :3].astype(np.float64)
+    products = np.einsum("nij,nkj->nik", linear, linear)
+    size = np.trace(products, axis1=1, axis2=2)[:, None, None] / 3
+    return bool((np.abs(products - size * np.eye(3)) <= 1e-5 * size).all())
+
+
+def select(scene: Scene, step: Step) -> list[int]:
+    """The objects a step draws: in the scene's order, or in that of their names, which `expand` has found there."""
+    if isinstance(step.objects, str):
+        return selected(scene, step.objects)
+    names = {placed.name: number for number, placed in enumerate(scene.objects)}
+    return [names[name] for name in step.objects]
+
+
+def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
+    """Macros and textures a material needs of a shader that looks at `level` of it.
+
+    Only what makes a difference is named, so that objects which differ in nothing else share a batch.
+    """
+    defines: dict[str, str] = {}
+    if level == "none":
+        return defines, {}
+    masked = material.alpha_mode == "mask"
+    slots = (
+        material.textures
+        if level == "full"
+        else {slot: texture for slot, texture in material.textures.items() if masked and slot == "base_color"}
+    )
+    found: dict[str, Texture] = {}
+    for slot, texture in slots.items():
+        if (mesh.uv1 if texture.uv else mesh.uv0) is None:
+            continue
+        defines[f"HAS_{slot.upper()}_TEXTURE"] = "1"
+        defines[f"{slot.upper()}_UV"] = str(texture.uv)
+        defines[f"HAS_UV{texture.uv}"] = "1"
+        if texture.transform is not None:
+            defines["HAS_UV_TRANSFORM"] = "1"
+        found[f"{slot}_texture"] = texture
+    if masked:
+        defines["ALPHA_MASK"] = "1"
+    if mesh.colors is not None and (masked or level == "full"):
+        defines["HAS_VERTEX_COLOR"] = "1"
+    if level == "full":
+        if material.alpha_mode == "blend":
+            defines["ALPHA_BLEND"] = "1"
+        if material.double_sided:
+            defines["DOUBLE_SIDED"] = "1"
+        if material.unlit:
+            defines["UNLIT"] = "1"
+        if material.anisotropy_strength > 0:
+            defines["ANISOTROPIC"] = "1"
+        if mesh.tangents is not None and ("normal" in slots or material.anisotropy_strength > 0):
+            defines["HAS_TANGENT"] = "1"
+    return defines, found
