@@ -97,7 +97,9 @@ def program(linked: Linked, node: str, number: int | None) -> dict[str, Any]:
         "type": types[node].name,
         "step": step.index,
         "shaders": dict(step.shaders),
-        "steps": [{"step": one.index, "kind": one.kind, "shaders": dict(one.shaders)} for one in steps],
+        "steps": [
+            {"step": one.index, "label": one.label, "kind": one.kind, "shaders": dict(one.shaders)} for one in steps
+        ],
         "variants": len(found),
         "differ": sorted({f"{k} {v}" for one in found for k, v in one.items() if any(o.get(k) != v for o in found)}),
         "scope": [{"section": one.section, "name": one.name, "source": one.source} for one in scope],
@@ -112,7 +114,7 @@ _DRAWS = ("fullscreen", "geometry", "draw", "compute")
 
 
 def _step_words(step: Step) -> str:
-    return f"{step.index} ({', '.join(name for _, name in step.shaders)})"
+    return f"{step.index} ({step.label or ', '.join(name for _, name in step.shaders)})"
 
 
 def _why_not(node: str, name: str, steps: tuple[Step, ...], idle: str | None) -> str:
@@ -135,7 +137,10 @@ def as_text(found: dict[str, Any]) -> str:
     lines = [f"step {found['step']} of {node_named(found['node'], found['type'])} in pipeline '{found['pipeline']}'"]
     if len(found["steps"]) > 1:
         lines.append("steps with a program; --step N shows another:")
-        lines += [f"  {one['step']}  {one['kind']}  {', '.join(one['shaders'].values())}" for one in found["steps"]]
+        lines += [
+            f"  {one['step']}  {one['kind']}  {', '.join(one['shaders'].values())}  {one['label']}".rstrip()
+            for one in found["steps"]
+        ]
     if found["variants"] == 0:
         lines.append("it draws nothing of this scene")
     elif found["variants"] > 1:
