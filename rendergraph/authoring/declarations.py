@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
+from types import FunctionType, MethodType
 
 from rendergraph.catalog import NodeType
 from rendergraph.catalog.types import shared_includes
@@ -83,9 +84,11 @@ def shader_text(file: Path) -> str:
 
 
 def _python_text(node: NodeType) -> str:
-    """The modules of the node and of those that it extends."""
+    """The modules of the node, of those that it extends, and of the rules that its ports ask: they look at it too."""
     if node.is_shader:
         return ""
     modules = {cls.__module__ for cls in node.cls.__mro__ if issubclass(cls, Node) and cls is not Node}
+    said = [value for port in node.cls.ports().values() for value in vars(port).values()]
+    modules |= {rule.__module__ for rule in said if isinstance(rule, FunctionType | MethodType)}
     files = {Path(sys.modules[module].__file__ or "") for module in modules}
     return "".join(file.read_text(encoding="utf-8", errors="replace") for file in files)

@@ -40,6 +40,8 @@ out vec4 brighter;
 void main() { brighter = gain * texelFetch(radiance, ivec2(gl_FragCoord.xy), 0); }
 """
 QUICK = CheckLimits(import_seconds=2, pass_seconds=3, memory=500 << 20)
+PATIENCE = 20
+"""Seconds for a check, its 2 or 3 s and starting Python on a busy machine; what waits for a hostile node takes 30 or more."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +146,7 @@ def test_a_hostile_import_is_one_message(check: Check, name: str) -> None:
     assert answer.code == 3
     assert len(answer.messages) == 1, answer.messages
     assert re.match(message, answer.messages[0]), answer.messages
-    assert answer.seconds < 6  # the import's 2 s, and starting Python on a busy machine
+    assert answer.seconds < PATIENCE
 
 
 RUNNING = {
@@ -227,7 +229,7 @@ def test_a_hostile_pass_is_one_message(check: Check, name: str) -> None:
     assert answer.code == 3
     assert len(answer.messages) == 1, answer.messages
     assert re.match(message, answer.messages[0]), answer.messages
-    assert answer.seconds < 10
+    assert answer.seconds < PATIENCE
 
 
 BOMB = "\n".join(["#define B0 1.0", *(f"#define B{n + 1} B{n}+B{n}" for n in range(30))])
