@@ -25,10 +25,13 @@ Count: TypeAlias = Annotated[int, Range(0)]
 Texel: TypeAlias = Annotated[float | tuple[float, ...], Length(1, 4), "a number, up to four of them"]
 """One value for every channel, or one a channel."""
 Shader: TypeAlias = Annotated[str, Length(1), "the name of a file"]
-_Side: TypeAlias = Annotated[int, Range(1)]
+Positive: TypeAlias = Annotated[int, Range(1)]
+Samples: TypeAlias = Literal[1, 2, 4, 8, 16]
+FormatName: TypeAlias = Annotated[str, Known(tuple(FORMATS)), "a format such as 'rgba16f'"]
+Sides: TypeAlias = Annotated[tuple[int, int], "width and height in whole texels"]
 _Factor: TypeAlias = Annotated[float, Range(0, above=True)]
 SizeRule: TypeAlias = Annotated[
-    _Factor | tuple[_Side, _Side] | str | tuple[str, _Factor] | Rule[tuple[int, int]],
+    _Factor | tuple[Positive, Positive] | str | tuple[str, _Factor] | Rule[Sides],
     "a factor of the viewport above 0, width and height from 1 up, an input's name, that with a factor, a function",
 ]
 """A factor of the viewport; width and height; an input's name; an input's name with a factor; a function."""
@@ -112,7 +115,7 @@ class Input(Port):
     filter: Ruled[Filter] = "nearest"
     wrap: Wrap = "clamp"
     compare: bool = False
-    anisotropy: Annotated[int, Range(1)] = 1
+    anisotropy: Positive = 1
     samples: Literal["single", "multi", "any"] = "single"
     optional: bool = False
     many: bool = False
@@ -148,11 +151,11 @@ class WrittenPort(Port):
     semantic: Meaning | None = None
     like: str | None = None
     kind: Literal["texture2d", "texture2d_array", "texture_cube", "buffer"] = "texture2d"
-    format: Ruled[Annotated[str, Known(tuple(FORMATS)), "a format such as 'rgba16f'"]] | None = None
+    format: Ruled[FormatName] | None = None
     size: SizeRule | None = None
     mips: Ruled[Count] = 1
     layers: Ruled[Count] | None = None
-    samples: Ruled[Annotated[int, Range(1)]] = 1
+    samples: Ruled[Samples] = 1
     bytes: Ruled[Count] = 0
     clear: Ruled[Texel | None] = None
     first: float | None = None

@@ -32,6 +32,7 @@ from rendergraph.api import (
 )
 from rendergraph.authoring.variants import Variant
 from rendergraph.catalog import Catalog, NodeType
+from rendergraph.ports import Samples
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
 SIZE = (37, 23)
@@ -148,7 +149,7 @@ def _source(name: str, port: Input | InOut, folder: Path) -> type[Node]:
     depth = meaning.name in _DEPTHS or (given is not None and FORMATS[given].is_depth)
     format = given or ("depth32f" if depth else "rgba16f" if image else "rgba32f")
     layers = {"texture2d": 1, "texture_cube": 6}.get(port.kind, 1 if _has_lights(meaning) else 2)
-    samples = 4 if getattr(port, "samples", "single") == "multi" else 1
+    samples: Samples = 4 if getattr(port, "samples", "single") == "multi" else 1
     shader = f"feed_{name}.frag"
     (folder / shader).write_text(_pattern(meaning, format), encoding="utf-8")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, overload
+from typing import Annotated, Any, NoReturn, overload
 
 from rendergraph import textures
 from rendergraph.annotations import fits, quoted, words_for
@@ -30,9 +30,8 @@ from rendergraph.document import shown
 from rendergraph.errors import Mistake, Place, Problem, SceneError, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Draft
-from rendergraph.ports import Count
+from rendergraph.ports import Count, FormatName, Positive, Samples, Sides
 from rendergraph.textures import (
-    FORMATS,
     MOST_SIDE,
     Albedo,
     Depth,
@@ -53,7 +52,6 @@ from rendergraph.textures import (
 CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
 DEFAULT_FORMAT = "rgba16f"
-_SAMPLES = (1, 2, 4, 8, 16)
 _LIGHTS = Annotated[Sequence[Count], "the indices of lights"]
 
 
@@ -160,7 +158,7 @@ class Infer:
             return None
         return value
 
-    def _fitting(self, end: Endpoint, what: str, rule: Any, annotation: Any) -> Any:
+    def _fitting(self, end: Endpoint, what: str, rule: Any, annotation: Any, code: str = "RG209") -> Any:
         """A constant, or what the author's function gives where that is what an annotation says.
 
         Raises:
@@ -168,15 +166,17 @@ class Infer:
         """
         value = self._ruled(end, what, rule)
         if not fits(value, annotation):
-            text = f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}"
-            self._say(end, "RG209", text)
-            raise _Unknown
+            self._stop(end, code, f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}")
         return value
 
     def _say(self, end: Endpoint, code: str, text: str, place: Place | None = None) -> None:
         draft = self.nodes[end.node]
         problem = draft.spec.value.problem(code, f"'{end}' ({draft.type.name}): {text}", key=True)
         self.problems.append(replace(problem, mistake=Mistake(end.port, problem.text, place=place)))
+
+    def _stop(self, end: Endpoint, code: str, text: str) -> NoReturn:
+        self._say(end, code, text)
+        raise _Unknown
 
     def _evaluate(self, end: Endpoint) -> TextureInfo | None:
         draft = self.nodes[end.node]
@@ -239,17 +239,12 @@ class Infer:
         if problem not in self.problems:
             self.problems.append(problem)
 
-    def _made(self, end: Endpoint, draft: Draft, port: WrittenPort) -> TextureInfo | None:
+    def _made(self, end: Endpoint, draft: Draft, port: WrittenPort) -> TextureInfo:
         like = self._linked(draft, port.like)
         if port.kind == "buffer":
-            size = self._ruled(end, "bytes", port.bytes)
-            if not isinstance(size, int) or size < 1:
-                self._say(end, "RG208", f"a buffer has at least 1 byte, not {size}")
-                return None
+            size = self._fitting(end, "bytes", port.bytes, Positive)
             return TextureInfo(None, port.semantic or textures.Any, bytes=size)
         desc = self._desc(end, port, like.desc if like is not None else None)
-        if desc is None:
-            return None
         semantic = port.semantic or (like.semantic if like is not None else textures.Any)
         view, lights = self._view(end, draft, port, semantic)
         if like is not None:
@@ -260,45 +255,32 @@ class Infer:
         links = draft.links.get(name, []) if name else []
         return self.known(links[0].source) if links else None
 
-    def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> TextureDesc | None:
+    def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> TextureDesc:
         size = self._size(end, port, like)
-        if size is None:
-            return None
-        name = self._ruled(end, "format", port.format) or (like.format if like is not None else DEFAULT_FORMAT)
-        if not isinstance(name, str) or name not in FORMATS:
-            self._say(end, "RG211", f"there is no format '{name}'")
-            return None
+        name = self._fitting(end, "format", port.format, FormatName | None, "RG211")
+        name = name or (like.format if like is not None else DEFAULT_FORMAT)
         kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
-        layers = self._ruled(end, "layers", port.layers)
+        layers = self._fitting(end, "layers", port.layers, Count | None)
         if layers is None:
             layers = like.layers if like is not None else 1
         layers = 6 if kind == "texture_cube" else layers
         full = full_mip_count(*size)
-        mips = self._ruled(end, "mips", port.mips) or full
-        samples = self._ruled(end, "samples", port.samples)
-        if not isinstance(layers, int) or layers < 0 or (kind == "texture2d" and layers != 1):
-            self._say(end, "RG208", f"a {kind} cannot have {layers} layers")
-        elif not isinstance(mips, int) or not 1 <= mips <= full:
-            self._say(end, "RG208", f"a texture of {size[0]}×{size[1]} has 1 to {full} mips, not {mips}")
-        elif samples not in _SAMPLES or (samples > 1 and (mips > 1 or kind == "texture_cube")):
-            more = " with mips or in a cube" if samples in _SAMPLES else ""
-            self._say(end, "RG208", f"a texture cannot have {samples} samples a texel{more}")
-        else:
-            return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
-        return None
+        mips = self._fitting(end, "mips", port.mips, Count) or full
+        samples = self._fitting(end, "samples", port.samples, Samples)
+        if kind == "texture2d" and layers != 1:
+            self._stop(end, "RG208", f"a {kind} cannot have {layers} layers")
+        if mips > full:
+            self._stop(end, "RG208", f"a texture of {size[0]}×{size[1]} has 1 to {full} mips, not {mips}")
+        if samples > 1 and (mips > 1 or kind == "texture_cube"):
+            self._stop(end, "RG208", f"a texture cannot have {samples} samples a texel with mips or in a cube")
+        return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
 
-    def _size(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> tuple[int, int] | None:
+    def _size(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> tuple[int, int]:
         rule: Any = 1.0 if port.size is None else port.size
         draft = self.nodes[end.node]
         factor, base = 1.0, self.scene.viewport
         if callable(rule):
-            given = self._ruled(end, "size", rule)
-            try:
-                width, height = given
-                base = int(width), int(height)
-            except (TypeError, ValueError, OverflowError):
-                self._say(end, "RG209", f"the rule for its size gives {given!r}, not width and height")
-                return None
+            base = self._fitting(end, "size", rule, Sides)
         elif isinstance(rule, str) or (isinstance(rule, tuple) and isinstance(rule[0], str)):
             name, factor = (rule, 1.0) if isinstance(rule, str) else (rule[0], float(rule[1]))
             source = self._linked(draft, name)  # not connected: the viewport
@@ -310,8 +292,7 @@ class Infer:
             base = like.size if like is not None and port.size is None else base
         width, height = (max(1, math.ceil(side * factor - 1e-9)) if factor != 1.0 else side for side in base)
         if min(width, height) < 1 or max(width, height) > MOST_SIDE:
-            self._say(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
-            return None
+            self._stop(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
         return width, height
 
     # Views and lights -------------------------------------------------------------------------------------------------
