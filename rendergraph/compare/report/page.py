@@ -11,13 +11,13 @@ from rendergraph.compare.report.parts import (
     Section,
     card,
     drawing,
+    eight_bit,
     heat,
     img,
     milliseconds,
     number,
     png,
     section,
-    shown,
     software_note,
     table,
 )
@@ -269,10 +269,10 @@ def _sheet(comparison: Comparison) -> str:
     figures = []
     reference = comparison.reference
     if reference.kind != "variant":
-        source = png(shown(reference.pixels, reference.encoding))
+        source = png(eight_bit(reference.pixels, reference.encoding))
         figures.append(_figure("pic-ref", source, f"{reference.name}, the reference"))
     for place, result in enumerate(comparison.results):
-        figures.append(_figure(f"pic-{place}", png(shown(result.pixels, result.encoding)), result.name))
+        figures.append(_figure(f"pic-{place}", png(eight_bit(result.pixels, result.encoding)), result.name))
     maps = [
         _figure("", png(heat(result.flip_map)), f"FLIP of {result.name}: {number(result.metrics.flip)}")
         for result in comparison.results

@@ -37,7 +37,7 @@ def png(pixels: npt.NDArray[np.uint8]) -> str:
         return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
 
 
-def shown(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:
+def eight_bit(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:
     """A compared output as 8 bits."""
     return viewable(pixels, "display_color" if encoding == "display" else "radiance")
 
