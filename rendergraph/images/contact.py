@@ -46,7 +46,7 @@ def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:
 
 def _fitted(picture: Bytes) -> Bytes:
     """As large as a tile takes it: averaged where it shrinks, texels as squares where it grows."""
-    import OpenImageIO as oiio
+    import OpenImageIO as oiio  # loaded with the first picture written
 
     height, width = picture.shape[:2]
     scale = min(_WIDTH / width, _HEIGHT / height)

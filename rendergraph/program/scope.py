@@ -22,13 +22,26 @@ _BLOCK = re.compile(r"\b(?:uniform|buffer)\s+(\w+)\s*\{([^{}]*)\}")
 _KINDS = {"texture2d": "2D", "texture2d_array": "2DArray", "texture_cube": "Cube"}
 
 
+SECTIONS = (
+    "textures",
+    "uniforms",
+    "blocks",
+    "macros",
+    "functions",
+    "includes",
+    "attributes",
+    "varyings",
+    "outputs",
+)
+"""In the order in which they are shown."""
+
+
 @dataclass(frozen=True)
 class InScope:
     """One thing that a step's text may use.
 
     Attributes:
-        section: `textures`, `uniforms`, `blocks`, `macros`, `functions`, `includes`, `attributes`, `varyings` or
-            `outputs`.
+        section: one of `SECTIONS`.
         name: what stands in the text, such as `uniform sampler2D depth`; of an include its file.
         source: where it comes from, such as `input 'depth': gbuffer.depth`; of an include the names it declares.
     """
@@ -53,7 +66,7 @@ def in_scope(
         texts: what it made of them.
     """
     found = _Scope(step, types, resources)
-    return [
+    rows = [
         *found.textures(),
         *found.uniforms(texts),
         *found.blocks(texts),
@@ -63,6 +76,7 @@ def in_scope(
         *found.between(texts),
         *found.outputs(),
     ]
+    return sorted(rows, key=lambda row: SECTIONS.index(row.section))
 
 
 @dataclass(frozen=True)
@@ -92,17 +106,19 @@ class _Scope:
             values += [(prefix(one.node), one.node, name, value) for name, value in one.uniforms]
         for before, node, name, value in values:
             declaration = types.pop(before + name, None)
-            kind = _type(declaration) if declaration is not None else ""
+            kind = _type(declaration) if declaration is not None else "…"  # the step's text does not declare it
             whose = "" if node == self.step.node else f" of '{node}'"
             knob = name in self.types[node].cls.parameters()
             where = f"parameter '{name}'{whose}" if knob else f"the step{whose}"
-            yield InScope("uniforms", f"uniform {kind} {before}{name}".replace("  ", " "), f"{where}: {_value(value)}")
+            unused = "" if declaration is not None else ", not declared here"
+            yield InScope("uniforms", f"uniform {kind} {before}{name}", f"{where}: {_value(value)}{unused}")
         inputs = self.types[self.step.node].cls.inputs()
         for name, declaration in types.items():
             if name not in textures:
                 where = "the step's view" if name == "view_index" else "the scene's materials, where they have one"
                 where = f"input '{name}', not connected" if name in inputs else where
-                yield InScope("uniforms", f"uniform {_type(declaration)} {name}", where)
+                section = "textures" if "sampler" in declaration.type or "image" in declaration.type else "uniforms"
+                yield InScope(section, f"uniform {_type(declaration)} {name}", where)
 
     def blocks(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
         seen = set()

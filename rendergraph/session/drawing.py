@@ -14,8 +14,7 @@ from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.values import Expanded
-from rendergraph.session.wanted import Wanted
+from rendergraph.session.values import Expanded, Wanted
 from rendergraph.textures import FORMATS, Semantic, TextureDesc
 
 

@@ -3,44 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.link import Endpoint, Graph, endpoint
+from rendergraph.link import Graph, endpoint
 from rendergraph.session.selection import TEXTURE_PART, RenderOptions
-from rendergraph.textures import FORMATS, TextureDesc
-
-if TYPE_CHECKING:
-    from rendergraph.session.values import Planned
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """A port whose texture must exist at the end of a frame, and what of it is read.
-
-    Attributes:
-        end: the port.
-        layer, mip: the part, None for all layers and for mip 0.
-        stencil: read the stencil instead of the depth.
-    """
-
-    end: Endpoint
-    layer: int | None = None
-    mip: int | None = None
-    stencil: bool = False
-
-    def lacks(self, desc: TextureDesc | None) -> str | None:
-        """What its port has not of the part that is asked for, as the end of a sentence that names the port."""
-        if (self.layer, self.mip, self.stencil) == (None, None, False):
-            return None
-        if desc is None:
-            return "is a buffer, which has no layers, no mips and no stencil"
-        if desc.layers and (missing := desc.lacks(self.mip, self.layer)):
-            return missing
-        if self.stencil and FORMATS[desc.format].family != "depth_stencil":
-            return f"has no stencil: its format is {desc.format}"
-        return None
+from rendergraph.session.values import Planned, Wanted
 
 
 def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
