@@ -36,11 +36,22 @@ class Range:
         to = f" to {self.high}" if self.high is not None else "" if self.above else " up"
         return f" above {self.low}{to}" if self.above else f" from {self.low}{to}"
 
+    @property
+    def empty(self) -> bool:
+        """Whether no number lies inside."""
+        return self.low is not None and self.high is not None and self.low > self.high
+
+    def beyond(self, value: float) -> str | None:
+        """What a number that lies outside must be; None where it lies inside."""
+        if not -math.inf < value < math.inf:
+            return "must be finite"
+        if self.low is not None and (value < self.low or (self.above and value == self.low)):
+            return f"must be {'above' if self.above else 'at least'} {self.low}"
+        return f"must be at most {self.high}" if self.high is not None and value > self.high else None
+
     def holds(self, value: Any) -> bool:
         """Whether a number lies inside."""
-        if not math.isfinite(value) or (self.low is not None and value < self.low):
-            return False
-        return not (self.above and value == self.low) and (self.high is None or value <= self.high)
+        return self.beyond(value) is None
 
 
 @dataclass(frozen=True)

@@ -183,7 +183,7 @@ def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Sch
         doc = " ".join([doc, *(f"`{one.name}` ({one.plugin}): {about(one.value)}" for one in added)])
         words = [*parameter.words, *(one.name for one in added)]
         own = {"type": "string", "enum": list(dict.fromkeys(words))}
-    limits = {"minimum": parameter.minimum, "maximum": parameter.maximum}
+    limits = {"minimum": parameter.limits.low, "maximum": parameter.limits.high}
     limits = {key: limit for key, limit in limits.items() if limit is not None}
     common = {"description": _about_param(parameter, doc), "default": written.get("default")}
     kind = own.get("type")
@@ -205,7 +205,7 @@ def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Sch
 def _about_param(parameter: Parameter, doc: str) -> str:
     """Its line of documentation, its default, its range and what a change of it costs."""
     unit = f" {parameter.unit}" if parameter.unit else ""
-    low, high = parameter.minimum, parameter.maximum
+    low, high = parameter.limits.low, parameter.limits.high
     limits = {
         (True, True): f", {low} to {high}",
         (True, False): f", at least {low}",

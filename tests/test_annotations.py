@@ -52,6 +52,22 @@ def test_what_fits(annotation: Any, right_ones: list[object], wrong_ones: list[o
     assert all(list(mistakes_in("it", value, annotation)) for value in wrong_ones)
 
 
+BEYOND: list[tuple[Range, float, str | None]] = [
+    (Range(0, 4), 4, None),
+    (Range(0, 4), -1, "must be at least 0"),
+    (Range(0, 4), 4.5, "must be at most 4"),
+    (Range(0, above=True), 0, "must be above 0"),
+    (Range(), 10**400, None),
+    (Range(), float("nan"), "must be finite"),
+    (Range(high=4), float("-inf"), "must be finite"),
+]
+
+
+@pytest.mark.parametrize(("limits", "value", "said"), BEYOND)
+def test_limits_of_a_number(limits: Range, value: float, said: str | None) -> None:
+    assert (limits.beyond(value), limits.holds(value)) == (said, said is None)
+
+
 SAID: list[tuple[object, Any, str]] = [
     ("yes", bool, "it is 'yes', not True or False"),
     (-1, Count, "it is -1, not a whole number from 0 up"),

@@ -45,7 +45,7 @@ def docs(cls: type[Node]) -> Iterator[Mistake]:
 def ranges(cls: type[Node]) -> Iterator[str]:
     """Number parameters that reach a shader and do not say between which limits they lie."""
     for name, parameter in cls.parameters().items():
-        if parameter.type in (int, float) and None in (parameter.minimum, parameter.maximum):
+        if parameter.type in (int, float) and None in (parameter.limits.low, parameter.limits.high):
             yield name
 
 

@@ -81,6 +81,6 @@ def _values(cls: type[Node]) -> Iterator[tuple[str, Any, bool]]:
             if choice != default:
                 yield name, choice, False
         if parameter.type in (int, float):
-            for limit in (parameter.minimum, parameter.maximum):
+            for limit in (parameter.limits.low, parameter.limits.high):
                 if limit is not None and limit != default:
                     yield name, parameter.type(limit), True

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any, Literal
 
+from rendergraph.annotations import Range, fits
 from rendergraph.declare import define, param, structural
 from rendergraph.document import Value
 from rendergraph.errors import Problem, suggestion
@@ -64,7 +64,7 @@ class HeaderParameter:
         low, high = self._limit("min"), self._limit("max")
         if low is None and found is not None and found.type.startswith("u"):
             low = 0
-        self._check_range(low, high, default)
+        self._check_range(Range(low, high), default)
         self.lacks_range = not {"min", "max", "choices"} & entry.keys() and annotation is not bool
         kinds: dict[str, Callable[..., Any]] = {"param": param, "define": define, "structural": structural}
         field = kinds[role](default=default, min=low, max=high, doc=self._word("doc"), unit=self._word("unit"))
@@ -134,7 +134,7 @@ class HeaderParameter:
                 text = f"the initialiser of '{self.name}': {error}; write a number, or say its default in the header"
                 self.said.append(("RG442", text))
         parts = list(value) if isinstance(value, list | tuple) else [value] * count
-        if len(parts) != count or not all(_fits(number, part) for number in parts):
+        if len(parts) != count or not all(fits(number, part) and Range().holds(number) for number in parts):
             words = f"{count} numbers" if vector else _WORDS[part]
             text = f"the default of '{self.name}' ({found.type}) is {words}, not {_text(value)}"
             self._wrong("RG442", "default", text)
@@ -161,23 +161,15 @@ class HeaderParameter:
             self.problems.append(self.named.problem("RG444", text, key=True))
         return None
 
-    def _check_range(self, low: float | None, high: float | None, default: Any) -> None:
-        if low is not None and high is not None and low > high:
-            self._wrong("RG442", "min", f"'{self.name}' has a min of {low:g} above its max of {high:g}")
+    def _check_range(self, limits: Range, default: Any) -> None:
+        if limits.empty:
+            self._wrong("RG442", "min", f"'{self.name}' has a min of {limits.low:g} above its max of {limits.high:g}")
             return
         for number in default if isinstance(default, tuple) else (default,):
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                continue
-            if (low is not None and number < low) or (high is not None and number > high):
+            if fits(number, float) and not limits.holds(number):
                 key = next((key for key in ("default", "min", "max") if key in self.entry), "")
                 self._wrong("RG442", key, f"the default of '{self.name}' is {number:g}, outside of its own range")
                 return
-
-
-def _fits(value: object, part: type) -> bool:
-    if part is bool or isinstance(value, bool):
-        return part is bool and isinstance(value, bool)
-    return isinstance(value, int) or (part is float and isinstance(value, float) and math.isfinite(value))
 
 
 def _text(value: object) -> str:

@@ -148,7 +148,7 @@ def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
             {"name": one.name, "plugin": one.plugin, "doc": about(one.value), "needs": list(needs(one.value))}
             for one in added
         ]
-    limits = {"min": parameter.minimum, "max": parameter.maximum}
+    limits = {"min": parameter.limits.low, "max": parameter.limits.high}
     return found | {word: limit for word, limit in limits.items() if limit is not None}
 
 

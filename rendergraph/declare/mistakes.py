@@ -139,19 +139,31 @@ def _macros(cls: type[Node]) -> Iterator[Mistake]:
 
 
 def _parameters(cls: type[Node]) -> Iterator[Mistake]:
+    sound = True
     for name, parameter in cls.parameters().items():
         if parameter.open_name and str not in get_args(parameter.type):
             yield Mistake(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
         if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
             yield Mistake(name, f"parameter '{name}' is {wrong}")
-        low, high = parameter.minimum, parameter.maximum
-        for word, limit in (("min", low), ("max", high)):
-            yield from mistakes_in(f"parameter '{name}': {word}", limit, float | None, name)
-        if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
-            yield Mistake(name, f"parameter '{name}' goes from {low} to {high}, which is nothing")
+        wrong_limits = list(_limits(parameter))
+        yield from wrong_limits
+        sound = sound and not wrong_limits
         if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):
             yield Mistake(name, f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type")
-    yield from _defaults(cls)
+    if sound:
+        yield from _defaults(cls)
+
+
+def _limits(parameter: Parameter) -> Iterator[Mistake]:
+    name, limits = parameter.name, parameter.limits
+    wrong = [
+        mistake
+        for word, limit in (("min", limits.low), ("max", limits.high))
+        for mistake in mistakes_in(f"parameter '{name}': {word}", limit, float | None, name)
+    ]
+    yield from wrong
+    if not wrong and limits.empty:
+        yield Mistake(name, f"parameter '{name}' goes{limits}, which is nothing")
 
 
 def _defaults(cls: type[Node]) -> Iterator[Mistake]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args, get_origin
@@ -10,7 +9,7 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
-from rendergraph.annotations import Range, words_for
+from rendergraph.annotations import Range, fits, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 
@@ -25,7 +24,7 @@ class Parameter:
         default: value where the file gives none.
         doc: one line.
         unit: the unit's symbol, empty for a pure number.
-        minimum, maximum: smallest and largest legal value of each number in it, inclusive; None for no limit.
+        limits: of each number in it, inclusive.
         glsl: the uniform's type where it is not what `type` says.
         open_name: the name under which plugins add choices, empty where they cannot.
         needs: what the include of such a choice may say that it needs.
@@ -37,8 +36,7 @@ class Parameter:
     default: Any
     doc: str = ""
     unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
+    limits: Range = Range()
     glsl: str = ""
     open_name: str = ""
     needs: tuple[str, ...] = ()
@@ -65,20 +63,13 @@ class Parameter:
         Args:
             added: the choices that plugins add.
         """
-        return words_for(self.closed(added), Range(self.minimum, self.maximum), file=True)
+        return words_for(self.closed(added), self.limits, file=True)
 
     def beyond(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
-        for number in value if isinstance(value, tuple) else (value,):
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                continue
-            if not math.isfinite(number):
-                return "must be finite"
-            if isinstance(self.minimum, int | float) and number < self.minimum:
-                return f"must be at least {self.minimum}"
-            if isinstance(self.maximum, int | float) and number > self.maximum:
-                return f"must be at most {self.maximum}"
-        return None
+        parts = value if isinstance(value, tuple) else (value,)
+        wrong = [self.limits.beyond(number) for number in parts if fits(number, float)]
+        return next(filter(None, wrong), None)
 
 
 def _listed(annotation: Any) -> Iterator[Any]:
@@ -108,7 +99,7 @@ def param(
         min, max: smallest and largest legal value, inclusive.
         glsl: the uniform's type where it is not what the annotation says (`vec3` for a number or a colour).
     """
-    return _field(Parameter("param", default, doc, unit, min, max, glsl))
+    return _field(Parameter("param", default, doc, unit, Range(min, max), glsl))
 
 
 def define(
@@ -137,9 +128,9 @@ def define(
         needs: what such an include may say that it needs (`#pragma needs(…)`), which others do without: `NEEDS_…` in
             the shader, `steps.needs(…)` in `record`.
     """
-    return _field(Parameter("define", default, doc, unit, min, max, open_name=choices, needs=needs))
+    return _field(Parameter("define", default, doc, unit, Range(min, max), open_name=choices, needs=needs))
 
 
 def structural(*, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None) -> Any:
     """A parameter that is part of the plan: a resolution, a light's name."""
-    return _field(Parameter("structural", default, doc, unit, min, max))
+    return _field(Parameter("structural", default, doc, unit, Range(min, max)))

@@ -6,7 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
+from rendergraph.annotations import Range, fits, words_for
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import NAME, entries, word
@@ -182,23 +184,17 @@ class Flattener:
             text = f"the parameter '{name}' has no default; write {name}: {{default: VALUE}}"
             self.files.say(declared.problem("RG121", text, key=True))
             return None
-        low, high = _number(declared, "min"), _number(declared, "max")
-        if low is not None and high is not None and low > high:
-            text = f"the parameter '{name}' has a min of {low:g} above its max of {high:g}"
+        limits = Range(_number(declared, "min"), _number(declared, "max"))
+        if limits.empty:
+            text = f"the parameter '{name}' has a min of {limits.low:g} above its max of {limits.high:g}"
             self.files.say(declared.problem("RG121", text, key=True))
             return None
         for part in value.data if isinstance(value.data, list) else [value]:
-            number = part.data
-            if low is None and high is None:
-                continue
-            if isinstance(number, bool) or not isinstance(number, int | float):
-                text = f"the parameter '{name}' takes a number, this is {part.kind}"
-            elif not (low is None or number >= low) or not (high is None or number <= high):
-                text = f"the parameter '{name}' takes {_range(low, high)}, this is {shown(number)}"
-            else:
-                continue
-            self.files.say(value.problem("RG122", text))
-            return None
+            if limits != Range() and not fits(part.data, Annotated[float, limits]):
+                this = shown(part.data) if fits(part.data, float) else part.kind
+                text = f"the parameter '{name}' takes {words_for(float, limits)}, this is {this}"
+                self.files.say(value.problem("RG122", text))
+                return None
         return value
 
     def _replaced(self, value: Value, values: Mapping[str, Value | None], used: set[str]) -> Value | None:
@@ -252,9 +248,3 @@ def _number(declared: Value, key: str) -> float | None:
     value = declared.get(key)
     data = value.data if value is not None else None
     return data if isinstance(data, int | float) else None
-
-
-def _range(low: float | None, high: float | None) -> str:
-    if low is None:
-        return f"at most {high:g}"
-    return f"at least {low:g}" if high is None else f"{low:g} to {high:g}"

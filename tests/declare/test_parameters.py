@@ -7,6 +7,7 @@ from typing import Literal
 import pytest
 from pydantic import ValidationError
 
+from rendergraph.annotations import Range
 from rendergraph.api import Node, define, param, structural
 from rendergraph.declare import declaration_mistakes
 
@@ -32,14 +33,14 @@ def test_a_parameter_is_what_its_node_says() -> None:
     assert list(found) == ["gain", "tint", "curve", "taps", "light"]
     gain, curve = found["gain"], found["curve"]
     assert (gain.name, gain.role, gain.type, gain.default, gain.doc) == ("gain", "param", float, 1.0, "Gain.")
-    assert (gain.unit, gain.minimum, gain.maximum, found["tint"].glsl) == ("EV", 0, 4, "vec3")
+    assert (gain.unit, gain.limits, found["tint"].glsl) == ("EV", Range(0, 4), "vec3")
     assert (curve.open_name, curve.needs, curve.words) == ("curve", ("luma",), ("soft", "hard"))
     assert (found["taps"].choices, found["taps"].words) == ((1, 2, 4), ())
 
 
 def test_a_subclass_says_a_parameter_anew() -> None:
     gain, before = Hard.parameters()["gain"], Curved.parameters()["gain"]
-    assert (gain.default, gain.minimum, gain.maximum, gain.unit) == (2.0, 1, None, "")
+    assert (gain.default, gain.limits, gain.unit) == (2.0, Range(1), "")
     assert before.default == 1.0
     assert Hard.parameters()["taps"] == Curved.parameters()["taps"]
 

@@ -71,10 +71,7 @@ DECLARATIONS = {
     'gain: int = param(default=1.5, doc="D.")  # here': "the default of 'gain', 1.5, is wrong: Input should be a valid integer",
     'gain: float = param(default=float("nan"), doc="D.")  # here': "a default is not finite",
     'gain: float = param(default={1}, doc="D.")  # here': "a default is no value that a file can hold: Object of type set is not JSON serializable",
-    'gain: float = param(default=1.0, min=2, max=1, doc="D.")  # here': (
-        "parameter 'gain' goes from 2 to 1, which is nothing",
-        "the default of 'gain', 1.0, is wrong: must be at least 2",
-    ),
+    'gain: float = param(default=1.0, min=2, max=1, doc="D.")  # here': "parameter 'gain' goes from 2 to 1, which is nothing",
     'gain: float = param(default=1.0, min="0", doc="D.")  # here': "parameter 'gain': min is '0', not a number or None",
     'gain: float = param(default=1.0, glsl="half", doc="D.")  # here': "parameter 'gain' has glsl='half', which is no GLSL type",
     'name: str = param(default="a", doc="D.")  # here': "parameter 'name' is a param of text, which no uniform holds; make it a define with Literal[…]",
