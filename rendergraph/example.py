@@ -17,7 +17,7 @@ from rendergraph.declare import Function, InOut, Input, LightFacts, Port
 from rendergraph.document import parse
 from rendergraph.errors import InputError
 from rendergraph.link import link
-from rendergraph.link.check import kind_of
+from rendergraph.link.check import port_kind
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.resolve import resolve
 from rendergraph.resources import shipped_pipelines
@@ -121,7 +121,7 @@ def _ends(base: Graph) -> Iterator[tuple[Endpoint, str, str]]:
             if isinstance(port, Function):
                 yield end, "function", port.signature.name
             elif (info := base.textures.get(end)) is not None:
-                yield end, kind_of(port, info), info.semantic.name
+                yield end, port_kind(port, info), info.semantic.name
 
 
 def _meaning(port: Port) -> str:

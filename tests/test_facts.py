@@ -10,7 +10,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.api import Facts, LightFacts, Node, ObjectFacts, Output, Radiance, SceneError, Steps, casting_lights
 from rendergraph.scene.model import Mesh
-from rendergraph.scene.selection import is_closed, object_facts
+from rendergraph.scene.objects import is_closed, object_facts
 
 LIGHTS = (
     LightFacts("fill", "directional", casts_shadow=False),

@@ -54,7 +54,7 @@ class Physical:
 
 
 @dataclass(frozen=True)
-class Memory:
+class MemoryFigures:
     """The figures of `run --json` and `plan --json`.
 
     Attributes:
@@ -101,7 +101,7 @@ class ResourcePlan:
     physicals: tuple[Physical, ...]
     placement: Mapping[str, tuple[int, ...]]
     released: Mapping[int, tuple[str, ...]]
-    memory: Memory
+    memory: MemoryFigures
     reasons: Mapping[str, str]
 
     @property
@@ -247,7 +247,7 @@ def _memory(
     shareable: Sequence[str],
     physicals: Sequence[Physical],
     better: Iterable[tuple[Tier, Groups]],
-) -> Memory:
+) -> MemoryFigures:
     resources = schedule.resources
     constant = sum(resources[id].bytes for id in schedule.whole_frame)
     allocated = sum(physical.bytes for physical in physicals)
@@ -263,7 +263,7 @@ def _memory(
         total = constant + heap_bytes(items, schedule.peak_bytes - constant)
         if total < allocated:
             next_tier, next_bytes = "heap", total
-    return Memory(
+    return MemoryFigures(
         no_reuse_bytes=sum(resource.bytes for resource in resources.values()),
         allocated_bytes=allocated,
         lower_bound_bytes=schedule.lower_bound_bytes,

@@ -155,7 +155,7 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
         InputError: with every mistake found on the way.
     """
     try:
-        return options.load(select(name))
+        return options.linked(select(name))
     except InputError as error:
         others = [other for other in names if other != name]
         if not others:
@@ -181,7 +181,7 @@ def load_reference(reference: str | None, select: options.Select) -> Path | Pipe
         return None
     if is_picture(reference):
         return Path(reference)
-    return options.load(replace(select(reference), sets=(), patches=()))
+    return options.linked(replace(select(reference), sets=(), patches=()))
 
 
 def check_page(output: Path) -> None:

@@ -195,7 +195,7 @@ def selection_options(function: F) -> F:
     return decorated  # type: ignore[return-value]
 
 
-def load(selection: Selection) -> Pipeline:
+def linked(selection: Selection) -> Pipeline:
     """The pipeline as Python has it, linked; its warnings are said.
 
     Raises:

@@ -1,7 +1,7 @@
-"""Geometry steps to batches: one indirect multi-draw a batch, whether it draws ten objects or ten thousand.
+"""Geometry steps to indirect multi-draws, which cost the same for ten objects and ten thousand.
 
-A batch is what can be drawn without changing anything: same macros, textures, culling and winding. How finely objects
-must be told apart depends on what the step's shader looks at: a depth pass puts everything opaque into one batch.
+A multi-draw is what can be drawn without changing anything: same macros, textures, culling and winding. How finely
+objects must be told apart depends on what the step's shader looks at: a depth pass puts everything opaque into one.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ COMMAND = np.dtype(
 
 
 @dataclass(frozen=True)
-class BatchKey:
+class MultiDrawKey:
     """What makes two objects drawable together."""
 
     defines: tuple[tuple[str, str], ...]
@@ -47,7 +47,7 @@ class BatchKey:
 
 
 @dataclass(eq=False)
-class Batch:
+class MultiDraw:
     """Objects drawn by one indirect multi-draw.
 
     Attributes:
@@ -73,57 +73,57 @@ class Batch:
 
 @dataclass(eq=False)
 class GeometryCompiler:
-    """Batches of a scene's objects, and what keeps them front to back."""
+    """Multi-draws of a scene's objects, and what keeps them front to back."""
 
     scene: GpuScene
     sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
-    _batches: dict[tuple[Any, ...], list[Batch]] = field(default_factory=dict)
+    _multi_draws: dict[tuple[Any, ...], list[MultiDraw]] = field(default_factory=dict)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
 
-    def draws(self, step: Step, make: Callable[[Batch], Draw]) -> list[Draw] | SortedDraws:
+    def draws(self, step: Step, make: Callable[[MultiDraw], Draw]) -> list[Draw] | SortedDraws:
         """The draws of a step.
 
         Args:
             step: a geometry step.
-            make: compiles a batch's program.
+            make: compiles a multi-draw's program.
         """
         objects = select(self.scene.scene, step)
         if not objects:
             return []
         if step.order == "front_to_back":
-            return [make(batch) for batch in self._grouped(step, objects)]
+            return [make(multi_draw) for multi_draw in self._grouped(step, objects)]
         if step.order == "back_to_front":
             return self._sorted(step, objects, make)
-        runs: list[tuple[BatchKey, list[int]]] = []
+        runs: list[tuple[MultiDrawKey, list[int]]] = []
         for index in objects:
             key = self._key(step, index)
             if runs and runs[-1][0] == key:
                 runs[-1][1].append(index)
             else:
                 runs.append((key, [index]))
-        return [make(self._batch(key, members)) for key, members in runs]
+        return [make(self._multi_draw(key, members)) for key, members in runs]
 
-    def _grouped(self, step: Step, objects: list[int]) -> list[Batch]:
+    def _grouped(self, step: Step, objects: list[int]) -> list[MultiDraw]:
         view = (step.view or CAMERA, step.view_index or 0)
         key = (view, tuple(objects), step.materials, step.state.cull, step.state.front)
-        if key not in self._batches:
-            groups: dict[BatchKey, list[int]] = {}
+        if key not in self._multi_draws:
+            groups: dict[MultiDrawKey, list[int]] = {}
             for index in objects:
                 groups.setdefault(self._key(step, index), []).append(index)
-            self._batches[key] = [self._batch(batch, members) for batch, members in groups.items()]
-            for batch in self._batches[key]:
-                if len(batch.objects) > 1:
-                    self.sorters.append(partial(self._sort, batch, *view))
-        return self._batches[key]
+            self._multi_draws[key] = [self._multi_draw(alike, members) for alike, members in groups.items()]
+            for multi_draw in self._multi_draws[key]:
+                if len(multi_draw.objects) > 1:
+                    self.sorters.append(partial(self._sort, multi_draw, *view))
+        return self._multi_draws[key]
 
-    def _sorted(self, step: Step, objects: list[int], make: Callable[[Batch], Draw]) -> SortedDraws:
+    def _sorted(self, step: Step, objects: list[int], make: Callable[[MultiDraw], Draw]) -> SortedDraws:
         """A part for each kind of object over one list of commands, which is sorted far to near as the view moves."""
         keys = [self._key(step, index) for index in objects]
         parts = {key: number for number, key in enumerate(dict.fromkeys(keys))}
         members = np.array(objects, np.int64)
         part_of = np.array([parts[key] for key in keys], np.int64)
-        everything = Batch({}, {}, "none", False, members, self._command_buffer(members))
-        draws = [make(self._batch(key, objects[:1])) for key in parts]
+        everything = MultiDraw({}, {}, "none", False, members, self._command_buffer(members))
+        draws = [make(self._multi_draw(key, objects[:1])) for key in parts]
 
         def render(part: int, first: int, count: int) -> None:
             draws[part].vertex_array.render_indirect(everything.commands, moderngl.TRIANGLES, count, first)
@@ -141,11 +141,11 @@ class GeometryCompiler:
         self.sorters.append(sort)
         return made
 
-    def _batch(self, key: BatchKey, members: list[int]) -> Batch:
+    def _multi_draw(self, key: MultiDrawKey, members: list[int]) -> MultiDraw:
         self.scene.load_images([texture for _, texture in key.textures])
         objects = np.array(members, np.int64)
         found = {name: self.scene.texture(texture) for name, texture in key.textures}
-        return Batch(dict(key.defines), found, key.cull, key.clockwise, objects, self._command_buffer(objects))
+        return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, objects, self._command_buffer(objects))
 
     def _command_buffer(self, objects: npt.NDArray[np.int64]) -> moderngl.Buffer:
         buffer = self.scene.device.ctx.buffer(self._commands(objects).tobytes() or bytes(COMMAND.itemsize))
@@ -168,12 +168,12 @@ class GeometryCompiler:
         commands["base_instance"] = objects
         return commands
 
-    def _sort(self, batch: Batch, table: str, index: int, views: ViewBuffers) -> None:
-        depths = self._depths(batch.objects, views.current[table][index])
-        batch.objects = batch.objects[np.argsort(depths, kind="stable")]
-        batch.commands.write(self._commands(batch.objects).tobytes())
+    def _sort(self, multi_draw: MultiDraw, table: str, index: int, views: ViewBuffers) -> None:
+        depths = self._depths(multi_draw.objects, views.current[table][index])
+        multi_draw.objects = multi_draw.objects[np.argsort(depths, kind="stable")]
+        multi_draw.commands.write(self._commands(multi_draw.objects).tobytes())
 
-    def _key(self, step: Step, index: int) -> BatchKey:
+    def _key(self, step: Step, index: int) -> MultiDrawKey:
         scene = self.scene.scene
         placed = scene.objects[index]
         material = scene.materials[placed.material]
@@ -182,4 +182,4 @@ class GeometryCompiler:
         clockwise = bool(self.scene.packed.mirrored[index]) if front == "object" else front == "clockwise"
         if cull == "material":
             cull = "none" if material.double_sided else "back"
-        return BatchKey(tuple(defines.items()), tuple(found.items()), cull, clockwise)
+        return MultiDrawKey(tuple(defines.items()), tuple(found.items()), cull, clockwise)

@@ -21,7 +21,7 @@ from rendergraph.compile.checks import (
     layout_for,
 )
 from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, SortedDraws, step_uniforms
-from rendergraph.compile.geometry import Batch, GeometryCompiler
+from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
 from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.limits import check_plan, groups_of
 from rendergraph.compile.memory import ClearTarget, Memory
@@ -209,14 +209,16 @@ class _Compiler:
         self._target(step, compiled, parity)
         defines = {"PASS_VIEW_COUNT": view_count(step, self.view_tables), **self.scene.defines}
 
-        def make(batch: Batch) -> Draw:
-            program, binds, uniforms = self._program(step, {**defines, **batch.defines}, materials=batch.textures)
-            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **batch.defines}))
-            for slot, (texture, sampler) in batch.textures.items():
+        def make(multi_draw: MultiDraw) -> Draw:
+            program, binds, uniforms = self._program(
+                step, {**defines, **multi_draw.defines}, materials=multi_draw.textures
+            )
+            check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **multi_draw.defines}))
+            for slot, (texture, sampler) in multi_draw.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
             vertex_array = self.scene.vertex_array(self.programs, program)
-            state = self._state(step, depth_default=True, cull=batch.cull, clockwise=batch.clockwise)
-            return Draw(program, uniforms, state, batch.call(vertex_array), binds, vertex_array)
+            state = self._state(step, depth_default=True, cull=multi_draw.cull, clockwise=multi_draw.clockwise)
+            return Draw(program, uniforms, state, multi_draw.call(vertex_array), binds, vertex_array)
 
         key = step.key
         if key not in self._geometry_draws:  # one set of command buffers for both parities

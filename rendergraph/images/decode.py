@@ -21,7 +21,7 @@ from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
 from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, finite, name_of
 from rendergraph.images.plugin_image import decode_by_plugin
-from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, kind_of
+from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, image_kind
 from rendergraph.scene.model import ImageSource
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ def _beginning(source: ImageSource) -> tuple[bytes, int]:
 def _kind_of(source: ImageSource, start: bytes) -> str:
     if not start:
         _refuse(source, "RG352", "the image is broken: the file is empty")
-    kind = kind_of(start, "" if source.data is not None else source.path.suffix)
+    kind = image_kind(start, "" if source.data is not None else source.path.suffix)
     if kind is None:
         _refuse(source, "RG351", f"this is no image of a known kind; {READ}")
     return _SUFFIXES[kind]

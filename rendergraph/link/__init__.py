@@ -11,11 +11,11 @@ from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
-from rendergraph.link.check import Checker, kind_of
+from rendergraph.link.check import Checker, port_kind
 from rendergraph.link.disabled import lost, past, take_out
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
-from rendergraph.link.names import Draft, Link, Names, Wrong, line_of
+from rendergraph.link.names import Draft, Link, References, Wrong, line_of
 from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.link.unknown import stand_in, unknown_type
@@ -119,14 +119,14 @@ class _Linker:
 
     def graph(self) -> Graph:
         types = self._types()
-        names = Names(self.spec, types)
+        references = References(self.spec, types)
         nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
         for draft in nodes.values():
-            self._connect(draft, names)
-        written, nodes = nodes, take_out(nodes, names)
+            self._connect(draft, references)
+        written, nodes = nodes, take_out(nodes, references)
         for draft in nodes.values():
             self._complete(draft, written)
-        outputs = self._outputs(names, written)
+        outputs = self._outputs(references, written)
         knots = cycles(nodes)
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
@@ -153,7 +153,7 @@ class _Linker:
             lights=self.lights,
             objects=self.objects,
             textures=textures,
-            aliases=self._aliases(names, written),
+            aliases=self._aliases(references, written),
             disabled=tuple(name for name in written if name not in nodes),
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )
@@ -197,14 +197,14 @@ class _Linker:
 
     # Links ------------------------------------------------------------------------------------------------------------
 
-    def _connect(self, draft: Draft, names: Names) -> None:
+    def _connect(self, draft: Draft, references: References) -> None:
         cls = draft.type.cls
         inputs, groups = draft.inputs, cls.groups()
         for name, value in draft.spec.inputs.items():
             if name in inputs:
-                self._input(draft, names, name, inputs[name], value)
+                self._input(draft, references, name, inputs[name], value)
             elif name in groups:
-                self._group(draft, names, name, groups[name], value)
+                self._group(draft, references, name, groups[name], value)
             else:
                 known = [*inputs, *groups]
                 hint = suggestion(name, known) if known else "; it takes none"
@@ -235,7 +235,7 @@ class _Linker:
         path = ("nodes", draft.spec.id.removeprefix(draft.spec.scope), "inputs")
         return path in self.spec.dropped or (*path, name) in self.spec.dropped
 
-    def _input(self, draft: Draft, names: Names, name: str, port: Input | InOut, value: Value) -> None:
+    def _input(self, draft: Draft, references: References, name: str, port: Input | InOut, value: Value) -> None:
         if isinstance(value.data, list):
             if not (isinstance(port, Input) and port.many):
                 text = f"'{draft.spec.id}.{name}' takes one link, not a list; write one as in node.port"
@@ -243,13 +243,13 @@ class _Linker:
                 draft.failed.add(name)
                 return
             for part in value.data:
-                self._follow(draft, names, name, part, name)
+                self._follow(draft, references, name, part, name)
         elif value.data is not None:
-            self._follow(draft, names, name, value, name)
+            self._follow(draft, references, name, value, name)
 
-    def _follow(self, draft: Draft, names: Names, name: str, value: Value, wanted: str) -> None:
+    def _follow(self, draft: Draft, references: References, name: str, value: Value, wanted: str) -> None:
         try:
-            found = names.follow(draft.spec.scope, value, wanted)
+            found = references.follow(draft.spec.scope, value, wanted)
         except Wrong as wrong:
             draft.failed.add(name)
             if wrong.problem is not None:
@@ -258,7 +258,7 @@ class _Linker:
             if found is not None:
                 draft.links[name].append(found)
 
-    def _group(self, draft: Draft, names: Names, group: str, members: Sequence[str], value: Value) -> None:
+    def _group(self, draft: Draft, references: References, group: str, members: Sequence[str], value: Value) -> None:
         """Connect every member that is not connected on its own to the port of its name."""
         missing = [name for name in members if name not in draft.spec.inputs]
         if value.data is None:
@@ -268,14 +268,14 @@ class _Linker:
         if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
             text = f"'{draft.spec.id}.{group}' is a group, it takes a node's id and no port"
             self._say(value.problem("RG113", text))
-        elif not names.is_known(scope, node):
-            self._say(names.no_node(scope, node, value))
+        elif not references.is_known(scope, node):
+            self._say(references.no_node(scope, node, value))
         else:
-            offered = names.outputs_of(scope, node)
+            offered = references.outputs_of(scope, node)
             lacking = []
             for name in missing:
                 if name in offered:
-                    self._follow(draft, names, name, value, name)
+                    self._follow(draft, references, name, value, name)
                 elif offered:
                     optional = draft.inputs[name].optional
                     lacking += [] if optional else [name]
@@ -304,18 +304,18 @@ class _Linker:
         what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
         return f"; it takes {what}"
 
-    def _outputs(self, names: Names, written: Mapping[str, Draft]) -> dict[str, Link]:
+    def _outputs(self, references: References, written: Mapping[str, Draft]) -> dict[str, Link]:
         found: dict[str, Link] = {}
         for name, value in self.spec.outputs.items():
             try:
-                followed = names.follow("", value, name)
+                followed = references.follow("", value, name)
             except Wrong as wrong:
                 if wrong.problem is not None:
                     self._say(wrong.problem)
                 continue
             if followed is None:
                 continue
-            led = past(followed, written, names)
+            led = past(followed, written, references)
             if written[led.source.node].spec.disabled is None:
                 found[name] = led
             else:
@@ -364,7 +364,7 @@ class _Linker:
                 text = f"output '{name}' shows this frame; leave '@previous' out"
                 self._say(found.value.problem("RG127", text))
             elif info is not None:
-                kind = kind_of(nodes[found.source.node].ports[found.source.port], info)
+                kind = port_kind(nodes[found.source.node].ports[found.source.port], info)
                 if kind not in TEXTURE_KINDS:
                     text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
                     self._say(found.value.problem("RG129", text))
@@ -375,18 +375,18 @@ class _Linker:
                     )
                     self.warnings.append(replace(found.value.problem("RG154", text), severity="warning"))
 
-    def _aliases(self, names: Names, written: Mapping[str, Draft]) -> dict[str, Endpoint]:
+    def _aliases(self, references: References, written: Mapping[str, Draft]) -> dict[str, Endpoint]:
         found: dict[str, Link] = {}
         for scope, inner in self.spec.scopes.items():
             for name, value in inner.outputs.items():
-                followed = names.follow(scope, value, name)
+                followed = references.follow(scope, value, name)
                 if followed is not None:
                     found[f"{scope[:-1]}.{name}"] = followed
         for draft in written.values():
             for name in draft.type.cls.outputs() if draft.spec.disabled is not None else ():
                 end = Endpoint(draft.spec.id, name)
                 found[str(end)] = Link(end, draft.spec.value)
-        led = {name: past(link, written, names).source for name, link in found.items()}
+        led = {name: past(link, written, references).source for name, link in found.items()}
         return {name: end for name, end in led.items() if written[end.node].spec.disabled is None}
 
 

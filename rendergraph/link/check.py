@@ -44,7 +44,7 @@ class Checker:
         if info is None:
             return
         source = self.nodes[link.source.node].ports[link.source.port]
-        given, taken = kind_of(source, info), port.kind
+        given, taken = port_kind(source, info), port.kind
         if isinstance(port, InOut) and port.like is not None and given in TEXTURE_KINDS:
             taken = given  # type: ignore[assignment]
         if link.source.previous and (isinstance(port, InOut) or given in ("function", "view", "buffer")):
@@ -129,7 +129,7 @@ class Checker:
             for name, made in other.type.cls.outputs().items()
             if other is not draft
             and (info := self.infer.info(Endpoint(node, name))) is not None
-            and kind_of(made, info) == port.kind
+            and port_kind(made, info) == port.kind
             and _means(port, info.semantic)
         ]
         return f"; {' or '.join(fit[:3])} would fit" if fit else ""
@@ -144,7 +144,7 @@ class Checker:
             if isinstance(port.semantic, Signature):
                 fits = isinstance(other, Function) and other.signature.name == port.semantic.name
             else:
-                fits = kind_of(other, info) == port.kind and _means(port, info.semantic)
+                fits = port_kind(other, info) == port.kind and _means(port, info.semantic)
             if fits:
                 return f"; '{link.source.node}.{name}' would fit"
         return ""
@@ -234,7 +234,7 @@ class Checker:
         )
 
 
-def kind_of(port: Port, info: TextureInfo) -> str:
+def port_kind(port: Port, info: TextureInfo) -> str:
     """The kind of an output as it has turned out."""
     if isinstance(port, Function):
         return "function"

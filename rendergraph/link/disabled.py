@@ -7,28 +7,28 @@ from dataclasses import replace
 
 from rendergraph.declare import Function, InOut, Port, WrittenPort
 from rendergraph.errors import Problem
-from rendergraph.link.names import Draft, Link, Names, Wrong, line_of
+from rendergraph.link.names import Draft, Link, References, Wrong, line_of
 from rendergraph.read import word
 
 
-def take_out(nodes: Mapping[str, Draft], names: Names) -> dict[str, Draft]:
+def take_out(nodes: Mapping[str, Draft], references: References) -> dict[str, Draft]:
     """The enabled nodes, their links led past the others; what leads nowhere then is in the `lost` of its reader."""
     enabled = {name: draft for name, draft in nodes.items() if draft.spec.disabled is None}
     for draft in enabled.values() if len(enabled) < len(nodes) else ():
         for name, links in draft.links.items():
-            led = [past(link, nodes, names) for link in links]
+            led = [past(link, nodes, references) for link in links]
             draft.links[name] = [link for link in led if link.source.node in enabled]
             if gone := [link for link in led if link.source.node not in enabled]:
                 draft.lost[name] = gone[0]
     return enabled
 
 
-def past(link: Link, nodes: Mapping[str, Draft], names: Names) -> Link:
+def past(link: Link, nodes: Mapping[str, Draft], references: References) -> Link:
     """A link led past disabled nodes; it still ends at one where nothing that goes into it can stand in."""
     seen = set()
     while (draft := nodes[link.source.node]).spec.disabled is not None and link.source.now not in seen:
         seen.add(link.source.now)
-        into = next(_into(draft, link.source.port, names), None)
+        into = next(_into(draft, link.source.port, references), None)
         if into is None:
             break
         source = replace(into.source, previous=into.source.previous or link.source.previous)
@@ -51,7 +51,7 @@ def lost(user: str, link: Link, nodes: Mapping[str, Draft]) -> Problem:
     return link.value.problem("RG132", f"{text}; enable it, or link another node here")
 
 
-def _into(draft: Draft, port: str, names: Names) -> Iterator[Link]:
+def _into(draft: Draft, port: str, references: References) -> Iterator[Link]:
     """What may stand in for an output: the node's own links, then those of the disabled sub-pipelines around it."""
     made = _meant(draft, draft.ports[port])
     meaning = made.signature if isinstance(made, Function) else getattr(made, "semantic", None)
@@ -60,11 +60,11 @@ def _into(draft: Draft, port: str, names: Names) -> Iterator[Link]:
     same = [name for name, one in draft.inputs.items() if one.kind == kind and meaning and one.semantic == meaning]
     yield from _alone(draft.links[name] for name in [*like, *same])
     scope = draft.spec.scope
-    while scope and (found := names.spec.scopes[scope]).disabled is not None:
+    while scope and (found := references.spec.scopes[scope]).disabled is not None:
         for name, declared in found.inputs.items():
             if meaning is not None and word(declared, "semantic") == meaning.name:
                 try:
-                    link = names.follow(scope, declared.with_data(f"inputs.{name}"), name)
+                    link = references.follow(scope, declared.with_data(f"inputs.{name}"), name)
                 except Wrong:  # said at the node
                     continue
                 yield from [link] if link is not None else []

@@ -84,7 +84,7 @@ class Wrong(Exception):
         super().__init__(problem)
 
 
-class Names:
+class References:
     """Follows references through sub-pipelines to ports."""
 
     def __init__(self, spec: PipelineSpec, types: Mapping[str, NodeType]) -> None:

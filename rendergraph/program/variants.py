@@ -10,8 +10,8 @@ import numpy.typing as npt
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.scene import pack
 from rendergraph.scene.model import Material, Mesh, Scene, Texture
+from rendergraph.scene.objects import selected
 from rendergraph.scene.pack import PackedScene
-from rendergraph.scene.selection import selected
 from rendergraph.steps import Step
 
 LARGEST_BLOCK = 65536

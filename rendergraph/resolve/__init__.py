@@ -16,7 +16,7 @@ from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
 from rendergraph.resolve.merge import diff, merge_patch
 from rendergraph.resolve.sets import patch_of, settings
-from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, Parameter, PipelineSpec, Scope
+from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, PipelineParameter, PipelineSpec, Scope
 from rendergraph.resolve.words import is_bare
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.settings import Roots
@@ -200,7 +200,7 @@ def _with_plugins(tree: Value, files: Files) -> Value:
 __all__ = [
     "DEFAULT_SIZE",
     "NodeSpec",
-    "Parameter",
+    "PipelineParameter",
     "PipelineSpec",
     "Scope",
     "diff",

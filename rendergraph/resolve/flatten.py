@@ -14,7 +14,7 @@ from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import NAME, entries, word
 from rendergraph.resolve.files import Files, display
 from rendergraph.resolve.sets import Setting, patch_of
-from rendergraph.resolve.spec import NodeSpec, Parameter, Scope
+from rendergraph.resolve.spec import NodeSpec, PipelineParameter, Scope
 
 MOST_NODES = 10_000
 MOST_NESTED = 32
@@ -225,7 +225,7 @@ class Flattener:
         return value
 
 
-def parameters(tree: Value) -> dict[str, Parameter]:
+def parameters(tree: Value) -> dict[str, PipelineParameter]:
     """The declared parameters with their values as they are now."""
     found = {}
     for name, declared in entries(tree, "parameters").items():
@@ -233,7 +233,7 @@ def parameters(tree: Value) -> dict[str, Parameter]:
         if value is not None:
             low, high = _number(declared, "min"), _number(declared, "max")
             doc = word(declared, "doc") or ""
-            found[name] = Parameter(name, value.plain(), declared.key_place, low, high, doc)
+            found[name] = PipelineParameter(name, value.plain(), declared.key_place, low, high, doc)
     return found
 
 

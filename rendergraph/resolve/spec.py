@@ -67,7 +67,7 @@ class Scope:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class PipelineParameter:
     """A knob of the whole pipeline."""
 
     name: str
@@ -111,7 +111,7 @@ class PipelineSpec:
     roots: Roots
     nodes: Mapping[str, NodeSpec]
     outputs: Mapping[str, Value]
-    parameters: Mapping[str, Parameter]
+    parameters: Mapping[str, PipelineParameter]
     scopes: Mapping[str, Scope]
     tree: Value = field(repr=False)
     notes: tuple[Problem, ...] = ()

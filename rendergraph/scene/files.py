@@ -68,7 +68,7 @@ def named(text: str) -> str:
     return "".join(c if c.isprintable() else "\ufffd" for c in text)
 
 
-class Names:
+class UniqueNames:
     """Hands out names that are unique within a file: `Box`, `Box_1`, `Box_2`."""
 
     def __init__(self) -> None:

@@ -16,10 +16,10 @@ import numpy as np
 
 from rendergraph.api.viewing import unit
 from rendergraph.document import shown
-from rendergraph.scene.files import Names, Reading
+from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, vec3
 from rendergraph.scene.gltf_buffers import Buffers, split_glb
-from rendergraph.scene.gltf_json import Part, parse
+from rendergraph.scene.gltf_json import JsonObject, parse
 from rendergraph.scene.gltf_materials import Materials
 from rendergraph.scene.gltf_meshes import Primitives
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Mesh, Object, Scene, Vec3
@@ -58,7 +58,7 @@ _IDENTITY: Matrix = np.eye(4)
 
 @dataclass(frozen=True)
 class _Node:
-    part: Part
+    part: JsonObject
     name: str
     local: Matrix
     children: list[int]
@@ -71,7 +71,7 @@ class _Node:
 class _Reader:
     """Reads one file's parts in the order they depend on each other."""
 
-    def __init__(self, top: Part, binary: bytes | None, path: Path, reading: Reading) -> None:
+    def __init__(self, top: JsonObject, binary: bytes | None, path: Path, reading: Reading) -> None:
         self._top, self._path, self._reading = top, path, reading
         asset = top.part("asset")
         if asset is None:
@@ -87,7 +87,7 @@ class _Reader:
         self._cameras = [self._camera(part) for part in top.parts("cameras")]
         holder = top.extension("KHR_lights_punctual")
         self._lights = [self._light(part) for part in holder.parts("lights")] if holder else []
-        names, nodes = Names(), top.parts("nodes")
+        names, nodes = UniqueNames(), top.parts("nodes")
         self._node_count, self._skin_count = len(nodes), len(top.parts("skins"))
         self._nodes = [self._node(part, index, names) for index, part in enumerate(nodes)]
 
@@ -113,7 +113,7 @@ class _Reader:
 
     # Parts ------------------------------------------------------------------------------------------------------------
 
-    def _mesh(self, part: Part, number: int) -> list[tuple[int, int]]:
+    def _mesh(self, part: JsonObject, number: int) -> list[tuple[int, int]]:
         """Mesh and material index of each triangle primitive; material -1 is the default one."""
         name = part.text("name") or f"mesh_{number}"
         result = []
@@ -131,7 +131,7 @@ class _Reader:
                 result.append((mesh, -1 if material is None else material))
         return result
 
-    def _camera(self, part: Part) -> Camera:
+    def _camera(self, part: JsonObject) -> Camera:
         kind = part.choice("type", "", ("perspective", "orthographic"))
         facts = part.part(kind)
         if facts is None:
@@ -148,14 +148,14 @@ class _Reader:
             raise facts.wrong("needs 0 <= znear < zfar and ymag other than 0")
         return Camera(name, np.eye(4), "orthographic", height=abs(height), near=near, far=far)
 
-    def _light(self, part: Part) -> Light:
+    def _light(self, part: JsonObject) -> Light:
         kind = part.choice("type", "", ("directional", "point", "spot"))
         intensity, reach = part.number("intensity", 1.0), part.number("range") if part.has("range") else None
         if intensity < 0 or (reach is not None and reach <= 0):
             raise part.wrong("needs intensity >= 0 and range > 0")
         inner, outer = 0.0, math.pi / 4
         if kind == "spot":
-            cone = part.part("spot") or Part({}, part.path, part.fail)
+            cone = part.part("spot") or JsonObject({}, part.path, part.fail)
             inner, outer = cone.number("innerConeAngle", 0.0), cone.number("outerConeAngle", math.pi / 4)
             if not 0 <= inner < outer <= math.pi / 2 + 1e-6:
                 raise cone.wrong("needs 0 <= innerConeAngle < outerConeAngle <= pi/2")
@@ -170,7 +170,7 @@ class _Reader:
             outer=outer,
         )
 
-    def _node(self, part: Part, number: int, names: Names) -> _Node:
+    def _node(self, part: JsonObject, number: int, names: UniqueNames) -> _Node:
         camera = part.index("camera", len(self._cameras), "cameras")
         mesh = part.index("mesh", len(self._meshes), "meshes")
         if part.has("skin"):
@@ -195,7 +195,7 @@ class _Reader:
             self._instances(part),
         )
 
-    def _local(self, part: Part) -> Matrix:
+    def _local(self, part: JsonObject) -> Matrix:
         if part.has("matrix"):
             if part.has("translation") or part.has("rotation") or part.has("scale"):
                 raise part.wrong("has both 'matrix' and translation, rotation or scale")
@@ -213,7 +213,7 @@ class _Reader:
             raise part.wrong("'rotation' is a quaternion of length zero") from None
         return placement(part.numbers("translation", 3, (0, 0, 0)), rotation, part.numbers("scale", 3, (1, 1, 1)))
 
-    def _instances(self, part: Part) -> list[Matrix] | None:
+    def _instances(self, part: JsonObject) -> list[Matrix] | None:
         holder = part.extension("EXT_mesh_gpu_instancing")
         attributes = holder.part("attributes") if holder is not None else None
         if attributes is None:
@@ -256,7 +256,7 @@ class _Reader:
         lights: list[Light] = []
         cameras: dict[str, Camera] = {}
         default = -1
-        names = Names()
+        names = UniqueNames()
         materials: list[Material] = list(self._materials.materials)
         stack = [(index, np.eye(4)) for index in reversed(roots)]
         while stack:
@@ -295,7 +295,13 @@ class _Reader:
         return len(self._meshes[node.mesh]) * (1 if node.instances is None else len(node.instances))
 
     def _place(
-        self, node: _Node, world: Matrix, objects: list[Object], names: Names, materials: list[Material], default: int
+        self,
+        node: _Node,
+        world: Matrix,
+        objects: list[Object],
+        names: UniqueNames,
+        materials: list[Material],
+        default: int,
     ) -> int:
         assert node.mesh is not None  # the caller asked
         primitives = self._meshes[node.mesh]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rendergraph.document import shown
 from rendergraph.scene.files import Reading
-from rendergraph.scene.gltf_json import Part
+from rendergraph.scene.gltf_json import JsonObject
 
 _COMPONENTS: dict[int, np.dtype[np.generic]] = {
     5120: np.dtype("<i1"),
@@ -76,7 +76,7 @@ def split_glb(data: bytes, reading: Reading) -> tuple[bytes, bytes | None]:
     return text, binary
 
 
-def uri_bytes(uri: str, part: Part, reading: Reading, what: str) -> bytes | Path:
+def uri_bytes(uri: str, part: JsonObject, reading: Reading, what: str) -> bytes | Path:
     """The bytes of a data URI, or the path of a file inside the roots."""
     if uri[:5].lower() == "data:":
         head, comma, body = uri.partition(",")
@@ -105,7 +105,7 @@ class View:
 class Accessor:
     """A checked accessor's description."""
 
-    part: Part
+    part: JsonObject
     view: View | None
     offset: int
     component: int
@@ -126,7 +126,7 @@ class Accessor:
         return _element_bytes(self.type, self.component)
 
     def need(
-        self, part: Part, use: str, types: Sequence[str], components: Sequence[int], normalized: bool = False
+        self, part: JsonObject, use: str, types: Sequence[str], components: Sequence[int], normalized: bool = False
     ) -> None:
         """Check that the accessor has the type a use asks for.
 
@@ -151,7 +151,7 @@ def _element_bytes(kind: str, component: int) -> int:
 class Buffers:
     """All accessors of a file, decoded on demand and kept."""
 
-    def __init__(self, top: Part, binary: bytes | None, reading: Reading) -> None:
+    def __init__(self, top: JsonObject, binary: bytes | None, reading: Reading) -> None:
         self._reading = reading
         self.buffers = [self._buffer(part, index, binary) for index, part in enumerate(top.parts("buffers"))]
         self.total = sum(len(buffer) for buffer in self.buffers)
@@ -193,7 +193,7 @@ class Buffers:
             raise self._reading.over(f"images inside the file take {self._copied:,} bytes", "memory_bytes")
         return bytes(self.buffers[view.buffer][view.offset : view.offset + view.length])
 
-    def _buffer(self, part: Part, index: int, binary: bytes | None) -> memoryview:
+    def _buffer(self, part: JsonObject, index: int, binary: bytes | None) -> memoryview:
         length = part.integer("byteLength", low=1)
         if not part.has("uri"):
             if index or binary is None:
@@ -206,7 +206,7 @@ class Buffers:
             raise part.wrong(f"is truncated: 'byteLength' is {length:,}, but there are {len(data):,} bytes")
         return memoryview(data)[:length]
 
-    def _view(self, part: Part) -> View:
+    def _view(self, part: JsonObject) -> View:
         buffer = part.index("buffer", len(self.buffers), "buffers")
         if buffer is None:
             raise part.wrong("'buffer' is missing")
@@ -218,7 +218,7 @@ class Buffers:
             raise part.wrong(f"'byteStride' is {stride}, not a multiple of 4")
         return View(buffer, offset, length, stride)
 
-    def _accessor(self, part: Part) -> Accessor:
+    def _accessor(self, part: JsonObject) -> Accessor:
         component = part.integer("componentType")
         kind = part.text("type")
         if component not in _COMPONENTS:
@@ -244,7 +244,7 @@ class Buffers:
         table = None if sparse is None else self._sparse(sparse, count, component, kind)
         return Accessor(part, view, offset, component, kind, count, normalized, table)
 
-    def _fits(self, part: Part, view: View | None, offset: int, component: int, kind: str, count: int) -> None:
+    def _fits(self, part: JsonObject, view: View | None, offset: int, component: int, kind: str, count: int) -> None:
         """Check that `count` elements at `offset` lie inside a view and are aligned."""
         size, item = _element_bytes(kind, component), _COMPONENTS[component].itemsize
         if view is None:
@@ -265,7 +265,7 @@ class Buffers:
             raise part.wrong(f"accessors overlap: together they read {self._declared:,} of {self.total:,} bytes")
 
     def _sparse(
-        self, part: Part, count: int, component: int, kind: str
+        self, part: JsonObject, count: int, component: int, kind: str
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.generic]]:
         number = part.integer("count", low=1, high=count)
         where, what = part.part("indices"), part.part("values")
@@ -279,7 +279,7 @@ class Buffers:
             raise where.wrong(f"indices must rise and stay below {count}")
         return places, self._run(what, component, kind, number)
 
-    def _run(self, part: Part, component: int, kind: str, count: int) -> npt.NDArray[np.generic]:
+    def _run(self, part: JsonObject, component: int, kind: str, count: int) -> npt.NDArray[np.generic]:
         number = part.index("bufferView", len(self.views), "buffer views")
         if number is None:
             raise part.wrong("'bufferView' is missing")

@@ -22,7 +22,7 @@ class _Wrong(Exception):
     """What a JSON hook found; turned into an error with the file's name."""
 
 
-def parse(text: bytes, fail: Fail) -> Part:
+def parse(text: bytes, fail: Fail) -> JsonObject:
     """The top object of strict JSON.
 
     Raises:
@@ -67,14 +67,14 @@ def parse(text: bytes, fail: Fail) -> Part:
         raise fail(f"its JSON is wrong: {problem}") from None
     if not isinstance(value, dict):
         raise fail("its JSON is no object")
-    return Part(value, "", fail)
+    return JsonObject(value, "", fail)
 
 
 _TYPES: dict[type, str] = {dict: "an object", list: "a list", str: "text", bool: "true or false"}
 
 
 @dataclass(frozen=True)
-class Part:
+class JsonObject:
     """A JSON object with its path in the file (`meshes[2].primitives[0]`)."""
 
     value: dict[str, Any]
@@ -113,21 +113,21 @@ class Part:
         """A boolean, false where it is missing."""
         return bool(self._typed(key, bool))
 
-    def part(self, key: str) -> Part | None:
+    def part(self, key: str) -> JsonObject | None:
         """An object, or None."""
         found = self._typed(key, dict)
-        return None if found is None else Part(found, f"{self.path}.{key}" if self.path else key, self.fail)
+        return None if found is None else JsonObject(found, f"{self.path}.{key}" if self.path else key, self.fail)
 
-    def parts(self, key: str) -> list[Part]:
+    def parts(self, key: str) -> list[JsonObject]:
         """A list of objects, empty where it is missing."""
         found = self._typed(key, list) or []
         base = f"{self.path}.{key}" if self.path else key
         for index, entry in enumerate(found):
             if not isinstance(entry, dict):
                 raise self.wrong(f"'{key}[{index}]' must be an object")
-        return [Part(entry, f"{base}[{index}]", self.fail) for index, entry in enumerate(found)]
+        return [JsonObject(entry, f"{base}[{index}]", self.fail) for index, entry in enumerate(found)]
 
-    def extension(self, name: str) -> Part | None:
+    def extension(self, name: str) -> JsonObject | None:
         """An extension's object on this one."""
         found = self.part("extensions")
         return None if found is None else found.part(name)

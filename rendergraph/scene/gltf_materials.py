@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from rendergraph.scene.files import Names, Reading
+from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.gltf_buffers import Buffers, uri_bytes
-from rendergraph.scene.gltf_json import Part
+from rendergraph.scene.gltf_json import JsonObject
 from rendergraph.scene.model import ImageSource, Material, Texture, Vec3
 
 Wrap: TypeAlias = Literal["repeat", "mirror", "clamp"]
@@ -29,17 +29,17 @@ _OTHER_IMAGES = ("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "
 class Materials:
     """Every material of a file, with its images checked; `default` is glTF's for primitives without one."""
 
-    def __init__(self, top: Part, buffers: Buffers, reading: Reading) -> None:
+    def __init__(self, top: JsonObject, buffers: Buffers, reading: Reading) -> None:
         self._reading, self._buffers = reading, buffers
         self._embedded: dict[int, ImageSource] = {}
         self._images = [self._image(part) for part in top.parts("images")]
         self._samplers = [self._sampler(part) for part in top.parts("samplers")]
         self._textures = [self._texture(part) for part in top.parts("textures")]
-        names = Names()
+        names = UniqueNames()
         self.materials = [self._material(part, names) for part in top.parts("materials")]
         self.default = Material(names.unique("default", "default"), metallic=1.0)
 
-    def _image(self, part: Part) -> ImageSource:
+    def _image(self, part: JsonObject) -> ImageSource:
         view = part.index("bufferView", len(self._buffers.views), "buffer views")
         if part.has("uri") == (view is not None):
             raise part.wrong("needs either 'uri' or 'bufferView'")
@@ -52,7 +52,7 @@ class Materials:
             return self._reading.image(found, "image")
         return self._reading.embedded_image(found, part.path)
 
-    def _sampler(self, part: Part) -> tuple[Wrap, Wrap, Literal["nearest", "linear"], str]:
+    def _sampler(self, part: JsonObject) -> tuple[Wrap, Wrap, Literal["nearest", "linear"], str]:
         values = []
         for key, table, default in (
             ("wrapS", _WRAPS, 10497),
@@ -66,7 +66,7 @@ class Materials:
             values.append(number)
         return _WRAPS[values[0]], _WRAPS[values[1]], _MAG[values[2]], _MIN[values[3]]
 
-    def _texture(self, part: Part) -> tuple[ImageSource | None, int | None]:
+    def _texture(self, part: JsonObject) -> tuple[ImageSource | None, int | None]:
         sampler = part.index("sampler", len(self._samplers), "samplers")
         source = part.index("source", len(self._images), "images")
         for name in _OTHER_IMAGES:
@@ -75,7 +75,7 @@ class Materials:
                 self._reading.warn("RG333", name, f"textures of {name} are left out; that format is not read")
         return None if source is None else self._images[source], sampler
 
-    def _use(self, material: Part, key: str, srgb: bool = False) -> tuple[Part, Texture | None] | None:
+    def _use(self, material: JsonObject, key: str, srgb: bool = False) -> tuple[JsonObject, Texture | None] | None:
         part = material.part(key)
         if part is None:
             return None
@@ -102,7 +102,7 @@ class Materials:
             return part, Texture(image, srgb, uv=uv, transform=transform)
         return part, Texture(image, srgb, *self._samplers[sampler], uv, transform)
 
-    def _clamped(self, part: Part, key: str, value: float, high: float = 1.0) -> float:
+    def _clamped(self, part: JsonObject, key: str, value: float, high: float = 1.0) -> float:
         if not 0 <= value <= high:
             self._reading.warn(
                 "RG332", "range", f"{part.path}: '{key}' is {value:g}, outside 0 to {high:g}; it is clamped"
@@ -110,17 +110,17 @@ class Materials:
         return min(max(value, 0.0), high)
 
     def _colors(
-        self, part: Part, key: str, count: int, default: tuple[float, ...], high: float = 1.0
+        self, part: JsonObject, key: str, count: int, default: tuple[float, ...], high: float = 1.0
     ) -> tuple[float, ...]:
         return tuple(self._clamped(part, key, value, high) for value in part.numbers(key, count, default))
 
-    def _factor(self, part: Part, key: str, default: float) -> float:
+    def _factor(self, part: JsonObject, key: str, default: float) -> float:
         return self._clamped(part, key, part.number(key, default), 1.0)
 
-    def _material(self, part: Part, names: Names) -> Material:
+    def _material(self, part: JsonObject, names: UniqueNames) -> Material:
         textures: dict[str, Texture] = {}
 
-        def use(holder: Part, key: str, slot: str, srgb: bool = False) -> Part | None:
+        def use(holder: JsonObject, key: str, slot: str, srgb: bool = False) -> JsonObject | None:
             found = self._use(holder, key, srgb)
             if found is None:
                 return None
@@ -128,7 +128,7 @@ class Materials:
                 textures[slot] = found[1]
             return found[0]
 
-        nothing = Part({}, part.path, part.fail)
+        nothing = JsonObject({}, part.path, part.fail)
         pbr = part.part("pbrMetallicRoughness") or nothing
         use(pbr, "baseColorTexture", "base_color", srgb=True)
         use(pbr, "metallicRoughnessTexture", "metallic_roughness")

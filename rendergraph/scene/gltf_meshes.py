@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.api.viewing import unit
-from rendergraph.scene.files import Names, Reading
+from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
 from rendergraph.scene.gltf_buffers import Accessor, Buffers
-from rendergraph.scene.gltf_json import Part
+from rendergraph.scene.gltf_json import JsonObject
 from rendergraph.scene.model import Floats, Mesh
 
 _FLOAT = (5126,)
@@ -25,12 +25,12 @@ class Primitives:
 
     def __init__(self, buffers: Buffers, reading: Reading, quantized: bool) -> None:
         self._buffers, self._reading, self._quantized = buffers, reading, quantized
-        self._names = Names()
+        self._names = UniqueNames()
         self._made: dict[tuple[object, ...], int | None] = {}
         self._bytes = 0
         self.meshes: list[Mesh] = []
 
-    def mesh(self, part: Part, name: str) -> int | None:
+    def mesh(self, part: JsonObject, name: str) -> int | None:
         """Index of the primitive's mesh in `meshes`; None where it is left out (points, lines, no positions)."""
         attributes = part.part("attributes")
         if attributes is None:
@@ -46,7 +46,9 @@ class Primitives:
                 self.meshes.append(mesh)
         return self._made[key]
 
-    def _make(self, part: Part, numbers: dict[str, int], indices: int | None, mode: int, name: str) -> Mesh | None:
+    def _make(
+        self, part: JsonObject, numbers: dict[str, int], indices: int | None, mode: int, name: str
+    ) -> Mesh | None:
         accessors = {key: self._buffers.accessors[number] for key, number in numbers.items()}
         for key, accessor in accessors.items():
             self._check(part, key, accessor)
@@ -77,7 +79,7 @@ class Primitives:
         self._sane_bounds(accessors["POSITION"], self._buffers.floats(numbers["POSITION"]))
         return self._assemble(part, numbers, triangles, self._names.unique(name, "mesh"))
 
-    def _assemble(self, part: Part, numbers: dict[str, int], triangles: Indices, name: str) -> Mesh:
+    def _assemble(self, part: JsonObject, numbers: dict[str, int], triangles: Indices, name: str) -> Mesh:
         def values(key: str) -> Floats | None:
             return self._buffers.floats(numbers[key]) if key in numbers else None
 
@@ -97,7 +99,7 @@ class Primitives:
             tangents = np.concatenate([unit(tangents[:, :3]), hand], axis=1).astype(np.float32)
         return Mesh(name, positions, triangles, fixed, tangents, uv0, uv1, colors)
 
-    def _check(self, part: Part, key: str, accessor: Accessor) -> None:
+    def _check(self, part: JsonObject, key: str, accessor: Accessor) -> None:
         quantized = self._quantized
         if key == "POSITION":
             accessor.need(part, key, ("VEC3",), _QUANTIZED if quantized else _FLOAT)
@@ -112,7 +114,7 @@ class Primitives:
         if key not in _KNOWN and not key.startswith(("_", "JOINTS_", "WEIGHTS_")):
             self._reading.warn("RG333", f"attribute {key}", f"{part.path}: attribute '{key}' is left out")
 
-    def _corners(self, part: Part, indices: int | None, count: int) -> Indices:
+    def _corners(self, part: JsonObject, indices: int | None, count: int) -> Indices:
         if indices is None:
             return np.arange(count, dtype=np.uint32)
         accessor = self._buffers.accessors[indices]
@@ -137,7 +139,7 @@ class Primitives:
                 "RG332", "bounds", f"{accessor.part.path}: positions pass 'min' or 'max'; the data is used"
             )
 
-    def _colors(self, part: Part, colors: Floats | None) -> Floats | None:
+    def _colors(self, part: JsonObject, colors: Floats | None) -> Floats | None:
         if colors is None:
             return None
         if ((colors < 0) | (colors > 1)).any():
@@ -146,7 +148,7 @@ class Primitives:
         full[:, : colors.shape[1]] = np.clip(colors, 0, 1)
         return full
 
-    def _grow(self, part: Part, size: int) -> None:
+    def _grow(self, part: JsonObject, size: int) -> None:
         """Count what meshes need; primitives that say the same bytes over and over end here."""
         self._bytes += size
         if self._bytes > 64 * self._buffers.total + self._reading.limits.memory_bytes:

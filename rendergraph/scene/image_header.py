@@ -50,7 +50,7 @@ class Header:
         return self.width * self.height * 4 * self.channel_bytes
 
 
-def kind_of(start: bytes, suffix: str = "") -> str | None:
+def image_kind(start: bytes, suffix: str = "") -> str | None:
     """The kind of image that begins like this, None where none does; TGA has no mark and goes by its extension."""
     for magic, kind in _MAGIC.items():
         if start.startswith(magic):
@@ -86,7 +86,7 @@ def read(head: bytes, suffix: str = "") -> Header:
     """
     if not head:
         raise ValueError("is empty")
-    kind = kind_of(head, suffix)
+    kind = image_kind(head, suffix)
     if kind is None:
         raise NoImageError(f"is no image of a known kind; {READ}")
     try:

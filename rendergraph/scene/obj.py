@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from rendergraph.api.viewing import unit
 from rendergraph.document import shown
-from rendergraph.scene.files import Names, Reading, file_kind, named
+from rendergraph.scene.files import Reading, UniqueNames, file_kind, named
 from rendergraph.scene.geometry import Doubles, face_normals, mean_normals
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
 from rendergraph.scene.mtl import read_mtl
@@ -176,7 +176,7 @@ def _assemble(
     order = np.argsort(part, kind="stable")
     triangles = vertex.reshape(-1, 3)[order]
     triangle_starts = np.searchsorted(part[order], np.arange(len(owners) + 1))
-    names, parts_of = Names(), Counter[str]()
+    names, parts_of = UniqueNames(), Counter[str]()
     materials: dict[str, tuple[int, Material]] = {}
     meshes, objects = [], []
     for k, (node, hidden, casts) in enumerate(_owners(found, owners)):

@@ -12,7 +12,7 @@ from rendergraph.declare import Added, MeshData
 from rendergraph.declare.extension import MeshLoader
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.scene.files import Names, Reading
+from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import face_normals, filled_normals
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
 
@@ -35,7 +35,7 @@ def read_plugin_mesh(path: Path, loader: Added[MeshLoader], reading: Reading) ->
         raise _unusable(loader, what, f"gave {type(given).__name__}, not MeshData or a list of it")
     if not parts:
         reading.warn("RG332", "empty", "holds no triangle; nothing is drawn")
-    names = Names()
+    names = UniqueNames()
     objects, meshes, materials = [], [], []
     vertices = 0
     for number, part in enumerate(parts):

@@ -30,7 +30,7 @@ from rendergraph.scene.model import (
     Scene,
     Texture,
 )
-from rendergraph.scene.shapes import SHAPES, Part, build
+from rendergraph.scene.shapes import SHAPES, ShapePart, build
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
 _SRGB = ("base_color", "emissive", "specular_color")
@@ -69,7 +69,7 @@ class _Made:
     lights: list[Light] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     placements: dict[str, Placement] = field(default_factory=dict)
-    shapes: dict[tuple[Any, ...], tuple[int, list[Part]]] = field(default_factory=dict)
+    shapes: dict[tuple[Any, ...], tuple[int, list[ShapePart]]] = field(default_factory=dict)
     files: dict[Path, _File] = field(default_factory=dict)
     numbers: dict[str | None, int] = field(default_factory=dict)
     vertices: int = 0

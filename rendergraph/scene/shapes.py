@@ -25,7 +25,7 @@ Doubles = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ShapePart:
     """One mesh of a shape.
 
     Attributes:
@@ -47,11 +47,11 @@ class Shape:
 
     doc: str
     keys: tuple[Key, ...]
-    make: Callable[..., Mesh | list[Part]]
+    make: Callable[..., Mesh | list[ShapePart]]
     vertices: Callable[[Mapping[str, Any]], int] = lambda values: 100
 
 
-def build(shape: str, **values: Any) -> list[Part]:
+def build(shape: str, **values: Any) -> list[ShapePart]:
     """The parts of a shape; parameters that are not given have their defaults.
 
     Raises:
@@ -59,7 +59,7 @@ def build(shape: str, **values: Any) -> list[Part]:
     """
     kind = SHAPES[shape]
     made = kind.make(**{key.name: key.default for key in kind.keys} | values)
-    return made if isinstance(made, list) else [Part(made, np.eye(4))]
+    return made if isinstance(made, list) else [ShapePart(made, np.eye(4))]
 
 
 def mesh(shape: str, **values: Any) -> Mesh:
@@ -312,7 +312,7 @@ def sphere_grid(
     metallic: Sequence[float],
     segments: int,
     rings: int,
-) -> list[Part]:
+) -> list[ShapePart]:
     """Spheres in the XY plane: roughness grows from left to right, metallic from bottom to top."""
     ball = sphere(radius, segments, rings)
     parts = []
@@ -320,7 +320,7 @@ def sphere_grid(
         for column, rough in enumerate(np.linspace(roughness[0], roughness[1], columns)):
             at = ((column - (columns - 1) / 2) * spacing, (row - (rows - 1) / 2) * spacing, 0.0)
             changes = (("roughness", float(rough)), ("metallic", float(metal)))
-            parts.append(Part(ball, translation(at), f"/{column}_{row}", changes))
+            parts.append(ShapePart(ball, translation(at), f"/{column}_{row}", changes))
     return parts
 
 

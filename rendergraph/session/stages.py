@@ -22,7 +22,7 @@ from rendergraph.errors import InputError, Problem
 from rendergraph.scene.animate import complete
 from rendergraph.scene.cameras import light_facts
 from rendergraph.scene.model import Scene
-from rendergraph.scene.selection import object_facts
+from rendergraph.scene.objects import object_facts
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
