@@ -136,7 +136,8 @@ class WrittenPort(Port):
         format: a name in `textures.FORMATS`; `rgba16f` by default.
         size: see `SizeRule`; the viewport by default.
         mips: levels; 0 means the full chain.
-        layers: array layers, 1 by default; a cube always has 6.
+        layers: array layers; a cube always has 6. By default an array has one a light, where its `lights` are a rule or
+            it is drawn with a table of views that says its own, and everything else 1.
         samples: samples per texel.
         bytes: size of a `buffer`.
         clear: what it first holds; None discards, which is right where every texel is written.
@@ -215,13 +216,13 @@ class Views(Port):
     """A table of views that the node computes in `update`, one a layer of what it draws.
 
     Attributes:
-        count: number of views.
+        count: number of views; by default that of its lights, 1 where it has none declared.
         lights: the scene's light index of each view, empty where views are not lights'.
         public: whether others may connect it (it is then an output of kind `view`).
         doc: one line.
     """
 
-    count: Ruled[Count] = 1
+    count: Ruled[Count] | None = None
     lights: Rule[tuple[int, ...]] | None = None
     public: bool = True
     doc: str = ""

@@ -11,10 +11,6 @@ def _lights(node: ShadowMapNode, facts: Facts) -> tuple[int, ...]:
     return layer_lights(node.light, facts.lights)
 
 
-def _layers(node: ShadowMapNode, facts: Facts) -> int:
-    return len(_lights(node, facts))
-
-
 class ShadowMapNode(Node):
     """Depth seen from lights: what every shadow-map technique starts from.
 
@@ -23,12 +19,11 @@ class ShadowMapNode(Node):
     layers, the faces of a cube. The layers stand in the scene's order of lights.
     """
 
-    views = Views(count=_layers, lights=_lights, doc="The lights' views, one a layer.")
+    views = Views(lights=_lights, doc="The lights' views, one a layer.")
     shadow_map = Output(
         ShadowMap,
         kind="texture2d_array",
         format="depth32f",
-        layers=_layers,
         view="views",
         clear=1.0,
         size=lambda node, facts: (node.resolution, node.resolution),

@@ -186,8 +186,11 @@ class Infer:
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):
-            count = self._fitting(end, "count", port.count, Count)
-            return TextureInfo(None, View, view=str(end), lights=self._view_lights(end, port), views=count)
+            count = self._fitting(end, "count", port.count, Count | None)
+            lights = self._view_lights(end, port)
+            if count is None:
+                count = len(lights) if port.lights else 1
+            return TextureInfo(None, View, view=str(end), lights=lights, views=count)
         if isinstance(port, InOut) and draft.links.get(port.name):
             return self.info(draft.links[port.name][0].source)
         return self._made(end, draft, port) if isinstance(port, WrittenPort) else None
@@ -244,9 +247,12 @@ class Infer:
         if port.kind == "buffer":
             size = self._fitting(end, "bytes", port.bytes, Positive)
             return TextureInfo(None, port.semantic or textures.Any, bytes=size)
-        desc = self._desc(end, port, like.desc if like is not None else None)
         semantic = port.semantic or (like.semantic if like is not None else textures.Any)
         view, lights = self._view(end, draft, port, semantic)
+        table = draft.ports.get(port.view) if port.view else None
+        lit = callable(port.lights) or (isinstance(table, Views) and table.lights is not None)
+        layers = len(lights) if lit and port.kind == "texture2d_array" else 1
+        desc = self._desc(end, port, like.desc if like is not None else None, layers)
         if like is not None:
             view, lights = view or like.view, lights or like.lights
         return TextureInfo(desc, semantic, view, lights)
@@ -255,14 +261,14 @@ class Infer:
         links = draft.links.get(name, []) if name else []
         return self.known(links[0].source) if links else None
 
-    def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> TextureDesc:
+    def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None, usual: int) -> TextureDesc:
         size = self._size(end, port, like)
         name = self._fitting(end, "format", port.format, FormatName | None, "RG211")
         name = name or (like.format if like is not None else DEFAULT_FORMAT)
         kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
         layers = self._fitting(end, "layers", port.layers, Count | None)
         if layers is None:
-            layers = like.layers if like is not None else 1
+            layers = like.layers if like is not None else usual
         layers = 6 if kind == "texture_cube" else layers
         full = full_mip_count(*size)
         mips = self._fitting(end, "mips", port.mips, Count) or full

@@ -53,7 +53,7 @@ DECLARATIONS = {
     'more = Output(Radiance, kind="buffer", bytes=8, clear=1.0, doc="D.")  # here': "port 'more' is a buffer, which is cleared to 0 alone, not to 1.0",
     'more = History(kind="buffer", bytes=8)  # here': "'more' is a History of a buffer; only textures keep last frame's values",
     'more = History(Radiance, first="white")  # here': "port 'more': first is 'white', not a number or None",
-    'more = Views(count=-1, doc="D.")  # here': "port 'more': count is -1, not a whole number from 0 up or a function of node and facts",
+    'more = Views(count=-1, doc="D.")  # here': "port 'more': count is -1, not a whole number from 0 up, a function of node and facts or None",
     'more = Views(lights=(0,), doc="D.")  # here': "port 'more': lights is (0,), not a function of node and facts or None",
     'more = Function("shadow", "a.glsl", doc="D.")  # here': "port 'more': signature is 'shadow', not a Signature such as ShadowLookup",
     'more = Function(ShadowLookup, None, doc="D.")  # here': "port 'more': shader is None, not the name of a file",

@@ -36,7 +36,7 @@ RULES = {
     "attribute 'dark'; there is color",
     'color = Output(Radiance, clear=lambda node, facts: "black", doc="D.")': "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four of them or None",
     'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")': "'a.more' (wrong): the rule for its lights gives 3, not the indices of lights",
-    'more = Views(count=lambda node, facts: None, doc="D.")': "'a.more' (wrong): the rule for its count gives None, not a whole number from 0 up",
+    'more = Views(count=lambda node, facts: "all", doc="D.")': "'a.more' (wrong): the rule for its count gives 'all', not a whole number from 0 up or None",
     'more = Views(count=lambda node, facts: facts.lamps, doc="D.")  # here': "'a.more' (wrong): the rule for its count fails: wrong.py:{line}: AttributeError: 'Facts' object has no "
     "attribute 'lamps'",
     'more = Views(lights=lambda node, facts: facts.lights[9], doc="D.")  # here': "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",

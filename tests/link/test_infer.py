@@ -81,6 +81,27 @@ def test_every_rule_is_asked_once_until_the_schedule() -> None:
     assert {read.sampler for read in reads} == {Sampler("linear", "border")}
 
 
+class Counted(Node):
+    """Shadow maps whose lights alone are said."""
+
+    views = Views(lights=LIGHTS, doc="The lights' views.")
+    maps = Output(ShadowMap, kind="texture2d_array", format="depth32f", view="views", doc="Depth.")
+    lit = Output(ShadowMap, kind="texture2d_array", lights=rule("lit", (0, 1, 1)), doc="Lit.")
+    plain = Output(Radiance, kind="texture2d_array", doc="No light's.")
+    single = Views(doc="One view.")
+
+
+def test_there_is_a_view_and_a_layer_for_each_light() -> None:
+    catalog = Catalog.of(Counted)
+    text = "nodes: {m: {type: counted}}\noutputs: {m: m.maps}"
+    lights = (LightFacts("sun", "directional"), LightFacts("lamp", "spot"))
+    asked.clear()
+    graph = link(resolve(read(None, text), catalog=catalog), catalog, lights)
+    assert asked == {"lights": 1, "lit": 1}
+    found = {end.port: info.desc.layers if info.desc else info.views for end, info in graph.textures.items()}
+    assert found == {"views": 2, "maps": 2, "lit": 3, "plain": 1, "single": 1}
+
+
 def test_a_port_without_a_rule_is_as_it_says() -> None:
     class Plain(Node):
         """A node."""
