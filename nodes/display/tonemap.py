@@ -1,4 +1,8 @@
-"""Tone mapping."""
+"""Tone mapping.
+
+A class, though one shader and no decision: a header cannot declare choices that plugins add to, and as every pipeline
+ends here, each start would import the reader of headers.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""What a G-buffer holds of a surface: the one list of its textures, as they are drawn and as they are read."""
+"""What a G-buffer holds of a surface: the one list of its textures, as they are drawn and as they are read.
+
+The classes at both ends still name each texture, in one line: type checkers and editors see a port only where a class
+body assigns it. A test holds both against this list.
+"""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -80,8 +80,6 @@ VIEW = np.dtype(
 )
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
-Attribute: TypeAlias = Literal["tangent", "uv0", "uv1", "color"]
-
 
 @dataclass(frozen=True, eq=False)
 class PackedScene:
@@ -93,7 +91,6 @@ class PackedScene:
             and `colors` (v, 4), white for meshes without.
         indices: uint32 (i,), relative to the mesh's base vertex, three a triangle.
         meshes: `MESH` records, indexed as `Scene.meshes`.
-        mesh_attributes: for each mesh which optional attributes it really has.
         instances: `INSTANCE` records, one an object in the scene's order; a draw of objects that are not neighbours
             gathers their records into its own order.
         materials: `MATERIAL` records.
@@ -104,7 +101,7 @@ class PackedScene:
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
         casts_shadow, hidden, double_sided: bool (n,).
         alpha_mode: `opaque`, `mask` or `blend` for each object.
-        centers, radii: float32 (n, 3) and (n,), world-space bounding spheres, for sorting by depth.
+        centers: float32 (n, 3), of world-space bounding boxes, for sorting by depth.
         names: of the objects.
     """
 
@@ -116,7 +113,6 @@ class PackedScene:
     colors: Floats | None
     indices: npt.NDArray[np.uint32]
     meshes: Records
-    mesh_attributes: tuple[frozenset[Attribute], ...]
     instances: Records
     materials: Records
     material_uvs: Floats
@@ -129,7 +125,6 @@ class PackedScene:
     double_sided: Bools
     alpha_mode: tuple[str, ...]
     centers: Floats
-    radii: Floats
     names: tuple[str, ...]
 
 
@@ -169,7 +164,6 @@ def pack(scene: Scene) -> PackedScene:
         streams["colors"],
         indices,
         records,
-        tuple(_attributes(mesh) for mesh in scene.meshes),
         **_placed(scene, records),
     )
 
@@ -196,7 +190,6 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
     instances["ids"] = np.stack([material, np.arange(len(objects), dtype=np.int32)], axis=1)
     low, high = meshes["low"][mesh].astype(np.float64), meshes["high"][mesh].astype(np.float64)
     center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
-    extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
     uvs, moved = pack_material_uvs(scene.materials)
     return {
         "instances": instances,
@@ -211,19 +204,8 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
         "double_sided": np.array([scene.materials[entry.material].double_sided for entry in objects], bool),
         "alpha_mode": tuple(scene.materials[entry.material].alpha_mode for entry in objects),
         "centers": center.astype(np.float32),
-        "radii": np.linalg.norm(extent, axis=1).astype(np.float32),
         "names": tuple(entry.name for entry in objects),
     }
-
-
-def _attributes(mesh: Mesh) -> frozenset[Attribute]:
-    pairs: tuple[tuple[Attribute, Floats | None], ...] = (
-        ("tangent", mesh.tangents),
-        ("uv0", mesh.uv0),
-        ("uv1", mesh.uv1),
-        ("color", mesh.colors),
-    )
-    return frozenset(name for name, values in pairs if values is not None)
 
 
 def _stream(

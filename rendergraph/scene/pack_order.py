@@ -58,18 +58,6 @@ def batch_acmr(triangles: Indices) -> float:
     return float(1 + (np.diff(table, axis=1) != 0).sum(axis=1).mean()) / _BATCH
 
 
-def fifo_acmr(triangles: Indices, size: int = 16) -> float:
-    """Cache misses for each triangle of a first-in first-out vertex cache; a slow, exact count for measurements."""
-    entered: dict[int, int] = {}
-    misses = 0
-    for vertex in triangles.reshape(-1).tolist():
-        when = entered.get(vertex)
-        if when is None or misses - when >= size:
-            entered[vertex] = misses
-            misses += 1
-    return misses / max(1, len(triangles))
-
-
 def morton(points: Floats) -> npt.NDArray[np.uint64]:
     """30-bit Morton code of each point within the box of all."""
     low, high = points.min(axis=0), points.max(axis=0)

@@ -12,7 +12,7 @@ import pytest
 from rendergraph.scene import animate, pack, phong
 from rendergraph.scene.load import load
 from rendergraph.scene.model import ImageSource, Light, Material, Mesh, Object, Scene, Texture
-from rendergraph.scene.pack_order import batch_acmr, fifo_acmr, first_use, morton, ordered, parts
+from rendergraph.scene.pack_order import batch_acmr, first_use, morton, ordered, parts
 from rendergraph.scene.shapes import mesh
 
 
@@ -67,7 +67,6 @@ def test_streams_exist_where_any_mesh_has_them() -> None:
     base = int(packed.meshes["base_vertex"][1])
     assert not packed.uv0[:base].any()
     assert packed.uv0[base:].any()
-    assert packed.mesh_attributes == (frozenset(), frozenset({"tangent", "uv0"}))
     assert pack.pack(scene_of([plain])).tangents is None
 
 
@@ -94,7 +93,6 @@ def test_instances_and_object_facts() -> None:
     assert packed.double_sided.tolist() == [True, False]
     assert packed.alpha_mode == ("blend", "opaque")
     assert np.allclose(packed.centers[0], (1, 2, 3))
-    assert packed.radii[0] >= np.linalg.norm((1, 0.5, 0.5)) - 1e-6
 
 
 def test_update_changes_what_moves_and_shares_the_rest(tmp_path: Path) -> None:
@@ -159,6 +157,18 @@ def test_phong_of_an_obj_material_is_its_own() -> None:
 
 def shuffled(found: Mesh, seed: int = 0) -> np.ndarray:
     return found.indices[np.random.default_rng(seed).permutation(len(found.indices))]
+
+
+def fifo_acmr(triangles: np.ndarray, size: int) -> float:
+    """Cache misses for each triangle of a first-in first-out vertex cache."""
+    entered: dict[int, int] = {}
+    misses = 0
+    for vertex in triangles.reshape(-1).tolist():
+        when = entered.get(vertex)
+        if when is None or misses - when >= size:
+            entered[vertex] = misses
+            misses += 1
+    return misses / max(1, len(triangles))
 
 
 def test_order_lowers_cache_misses() -> None:
