@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -18,9 +19,13 @@ FILES = {
 LAZY = ("rendergraph.cli", "rendergraph.session")  # each verb and each stage is loaded when it is first wanted
 
 
-def imports(name: str, text: str) -> Iterator[tuple[str, int, bool]]:
+@cache
+def imports(name: str) -> list[tuple[str, int, bool]]:
     """Every module of ours and every library that a module imports, with its line and whether a function does it."""
-    tree = ast.parse(text)
+    return list(_imports(name, ast.parse(FILES[name].read_text())))
+
+
+def _imports(name: str, tree: ast.Module) -> Iterator[tuple[str, int, bool]]:
     inside = {
         id(statement)
         for function in ast.walk(tree)
@@ -47,12 +52,7 @@ def circles(edges: set[tuple[str, str]]) -> list[list[str]]:
 
 def test_no_module_reaches_itself() -> None:
     """What a function imports is left out: the next test asks a reason of each."""
-    edges = {
-        (name, other)
-        for name, file in FILES.items()
-        for other, _, within in imports(name, file.read_text())
-        if other in FILES and not within
-    }
+    edges = {(name, other) for name in FILES for other, _, within in imports(name) if other in FILES and not within}
     assert len(edges) > 500
     assert circles(edges) == []
 
@@ -64,6 +64,6 @@ def test_a_circle_is_found() -> None:
 @pytest.mark.parametrize("name", [name for name in FILES if not name.startswith(LAZY)])
 def test_an_import_within_a_function_says_why(name: str) -> None:
     lines = FILES[name].read_text().splitlines()
-    late = [line for _, line, within in imports(name, FILES[name].read_text()) if within]
+    late = [line for _, line, within in imports(name) if within]
     silent = [lines[line - 1].strip() for line in late if "  # " not in lines[line - 1].replace("# type: ignore", "")]
     assert silent == []

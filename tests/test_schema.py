@@ -109,6 +109,7 @@ class Fog(Node):
 """
 
 
+@pytest.mark.slow
 def test_check_says_when_the_schema_beside_the_file_is_out_of_date(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -266,6 +266,7 @@ def test_orders_are_legal_and_plans_valid(base: Expansion, way: str, seed: int, 
     assert_valid(allocate(found, alias=alias, views=views))
 
 
+@pytest.mark.slow
 @given(expansions(most=8))
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_the_least_peak_is_that_of_all_orders(base: Expansion) -> None:
@@ -275,6 +276,7 @@ def test_the_least_peak_is_that_of_all_orders(base: Expansion) -> None:
     assert found.lower_bound_bytes == min(peaks)
 
 
+@pytest.mark.slow
 @given(expansions(most=7))
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_what_is_allocated_is_near_the_least_of_all_orders(base: Expansion) -> None:

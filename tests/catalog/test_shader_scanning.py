@@ -223,6 +223,7 @@ def test_any_text_is_scanned_to_an_end(text: str) -> None:
 SIZE = 300_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

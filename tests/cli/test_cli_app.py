@@ -178,6 +178,7 @@ def test_sigterm_ends_with_143_and_leaves_no_files(
     assert os.listdir(tmp_path) == ["x.png"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_signals_end_the_process_cleanly(tmp_path: Path, name: str) -> None:
     code = (
@@ -211,6 +212,7 @@ def test_a_closed_pipe_is_no_error() -> None:
     process.stderr.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 def test_a_full_disk_behind_stdout_is_exit_1() -> None:
     with open("/dev/full", "w") as full:
@@ -219,12 +221,14 @@ def test_a_full_disk_behind_stdout_is_exit_1() -> None:
     assert done.stderr == "RG509 No space left on device\n"
 
 
+@pytest.mark.slow
 def test_without_stdout_and_stderr_it_still_works() -> None:
     for redirect in (">&-", "2>&-", ">&- 2>&-"):
         done = subprocess.run(f"exec '{sys.executable}' -m rendergraph.cli nodes {redirect}", shell=True)
         assert done.returncode == 0, redirect
 
 
+@pytest.mark.slow
 def test_narrow_encodings_do_not_break_messages(tmp_path: Path) -> None:
     done = subprocess.run(
         [*PROGRAM, "check", "ö𝄞.yaml"],

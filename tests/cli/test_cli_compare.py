@@ -36,6 +36,7 @@ def test_compare_speaks_json(cli: Any) -> None:
         assert "software rasteriser" not in json.dumps(variant)
 
 
+@pytest.mark.slow
 def test_beyond_a_threshold_is_exit_code_4(cli: Any) -> None:
     words = ("compare", "forward", "shading-unlit", *SMALL, "-n", "1")
     within = cli(*words, "--fail-above", "flip=0.9")
@@ -108,6 +109,7 @@ def test_sweep_draws_keeps_and_resumes(cli: Any, tmp_path: Path) -> None:
     assert sum(run["pareto"] for run in again["runs"]) >= 1
 
 
+@pytest.mark.slow
 def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
     (tmp_path / "study.yaml").write_text(
         "sweep: 1\npipeline: forward\nsize: [48, 27]\nframes: 1\nset: {sun.resolution: 64}\n"

@@ -25,7 +25,7 @@ def examples(cli: Any, *verb: str) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in text.splitlines() if line.strip().startswith("rendergraph ")]
 
 
-LONG = ("sweep", "compare", "check-node")  # their examples take seconds
+LONG = ("sweep", "compare", "check-node", "run", "doctor", "bench")  # their examples take seconds
 
 
 @pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=pytest.mark.slow if v in LONG else ()) for v in VERBS)])
@@ -104,6 +104,7 @@ def test_taps_of_parts_become_pictures_and_keep_values(cli: Any) -> None:
     assert images.read("s.exr").shape == (2048, 2048, 1)
 
 
+@pytest.mark.slow
 def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_path: Path) -> None:
     result = cli("run", "bloom", *SMALL, "--tap-all", "a/inside", "-o", "b.exr")
     assert result.code == 0
@@ -118,6 +119,7 @@ def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_pa
     assert images.read("a/inside/contact.png").max() > 0.9
 
 
+@pytest.mark.slow
 def test_all_ports_of_several_frames_are_numbered(cli: Any, tmp_path: Path) -> None:
     assert cli("run", "forward", *SMALL, "--tap-all", "in", "--frames", "1-2").code == 0
     assert {"contact.0001.png", "contact.0002.png"} < {path.name for path in (tmp_path / "in").iterdir()}

@@ -131,6 +131,7 @@ def test_little_memory_means_several_batches(make: Any, gl: rg.Session) -> None:
         np.testing.assert_array_equal(together, own)
 
 
+@pytest.mark.slow
 def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> None:
     base = rg.load("forward-prepass", size=(48, 27))
     variants = [base.set("sun.resolution", size).set("shadows.taps", taps) for size in (64, 256) for taps in (1, 3)]

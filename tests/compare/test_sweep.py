@@ -77,6 +77,7 @@ def test_resuming_draws_what_is_missing_and_nothing_else(base: rg.Pipeline, gl: 
     assert sweep(base, few, tmp_path, frames=1, resume=True, session=gl).resumed == 1
 
 
+@pytest.mark.slow
 def test_another_study_does_not_write_over_the_pictures_of_this_one(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:
@@ -102,6 +103,7 @@ def test_another_study_does_not_write_over_the_pictures_of_this_one(
     assert {file: file.read_bytes() for file in out.rglob("*") if file.is_file()} == before
 
 
+@pytest.mark.slow
 def test_more_frames_are_measured_and_no_picture_is_drawn_again(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:
@@ -120,6 +122,7 @@ def test_more_frames_are_measured_and_no_picture_is_drawn_again(
     assert (again.resumed, again.timed, again.executed) == (2, 0, 0)
 
 
+@pytest.mark.slow
 def test_runs_are_kept_before_they_are_measured(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,6 +144,7 @@ def test_runs_are_kept_before_they_are_measured(
     assert [json.loads(line)["frames"] for line in (tmp_path / RESULTS).read_text().splitlines()] == [1, 1]
 
 
+@pytest.mark.slow
 def test_what_is_drawn_together_is_few_enough_to_lose(base: rg.Pipeline) -> None:
     many = pipelines(base, combinations([Axis("display.exposure", tuple(map(str, range(20))))]))
     assert [len(batch.numbers) for batch in batches([each.check() for each in many], range(20))] == [16, 4]
@@ -214,6 +218,7 @@ def test_results_are_kept_only_as_long_as_what_they_were_drawn_from(gl: rg.Sessi
         assert drawn() == 0, name
 
 
+@pytest.mark.slow
 def test_a_reference_picture_counts_by_its_content(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
     axes = (Axis("display.curve", ("aces", "none")),)
     picture = tmp_path / "reference.png"

@@ -239,6 +239,7 @@ def mutants(value: Any) -> list[Any]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["scene", "sweep"])
 def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str) -> None:
     table, validate, checked = table_of(kind), compiled(kind), 0

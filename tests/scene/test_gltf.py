@@ -113,6 +113,7 @@ def test_asset_agrees_with_another_reader(shared: Path, name: str) -> None:
         assert np.isfinite(entry.transform).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["DamagedHelmet.glb", "WaterBottle/WaterBottle.gltf", "NormalTangentTest.glb"])
 def test_geometry_agrees_with_trimesh(shared: Path, name: str) -> None:
     trimesh = pytest.importorskip("trimesh")

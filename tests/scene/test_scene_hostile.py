@@ -204,6 +204,7 @@ SCENE_LINES = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @CALM
 @given(lines=st.lists(SCENE_LINES, max_size=5, unique=True))
 def test_any_scene_file(tmp_path: Path, lines: list[str]) -> None:
@@ -218,6 +219,7 @@ def test_json_of_any_depth(tmp_path: Path, depth: int) -> None:
     survives(tmp_path / "a.gltf")
 
 
+@pytest.mark.slow
 def test_a_long_chain_of_nodes_is_no_recursion(tmp_path: Path) -> None:
     top = {
         **BASE,

@@ -107,6 +107,7 @@ def test_an_obj_with_its_own_coefficients(radiance: Any, steps_off: Any, shared:
     same(steps_off(radiance("deferred", file, FULL, model), radiance("forward-prepass", file, model)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("term", ["ambient", "diffuse", "specular", "emissive"])
 def test_each_term_alone(radiance: Any, steps_off: Any, tmp_path: Path, term: str) -> None:
     scene, terms = mixture(tmp_path), f"light.terms={term}"

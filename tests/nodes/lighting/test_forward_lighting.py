@@ -134,6 +134,7 @@ def test_gouraud_is_phong_on_a_flat_white_wall_and_near_it_elsewhere(gl: Any) ->
     assert not np.array_equal(fragment, vertex)
 
 
+@pytest.mark.slow
 def test_gouraud_and_flat_keep_shadows(gl: Any) -> None:
     """Shadows are looked up at fragments whatever light is evaluated at, in both forms."""
     for evaluate in ("vertex", "face"):

@@ -78,6 +78,7 @@ def test_panes_lie_over_each_other_by_distance(
     np.testing.assert_allclose(row[-0.75], [*(over(POST, RED) if red_nearer else over(POST)), 1], atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pipeline", PIPELINES)
 def test_shadows_fall_on_panes(radiance: Any, tmp_path: Path, pipeline: str) -> None:
     """A pane takes its own shadow, and not that of the surface behind it."""

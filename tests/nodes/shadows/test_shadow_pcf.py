@@ -130,6 +130,7 @@ def test_a_point_light_has_six_layers(gl: Any, shared: Path) -> None:
     assert wrong_share(shared, "point_room", "sun.light=point", "sun.resolution=1024") <= 0.02
 
 
+@pytest.mark.slow
 def test_wider_kernels_make_no_acne(gl: Any, shared: Path) -> None:
     """Away from shadows a lit surface is wholly lit, also at a slope and through 16×16 taps."""
     here = shared / "reference" / "b2_shadows" / "dir_basic"
@@ -150,6 +151,7 @@ def test_wider_kernels_make_no_acne(gl: Any, shared: Path) -> None:
 # --- both forms ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study", "spheres"])
 def test_both_forms_give_the_same_picture(gl: Any, scene: str) -> None:
     pictures = [

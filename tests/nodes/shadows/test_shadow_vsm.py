@@ -36,6 +36,7 @@ def test_the_filter_is_the_reference(shared: Path, boxed: Callable[[Floats, int]
         np.testing.assert_allclose(boxed(maps["vsm_depth"] ** power, 7), expected, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "radius"), [("shadow_study", 7), ("shadow_study", 2), ("shadow_study", 0), ("cornell_box", 4)]
 )
