@@ -8,6 +8,7 @@ from pathlib import Path
 TESTS = Path(__file__).parent
 ROWS = [line.split("|")[1:-1] for line in (TESTS / "README.md").read_text().splitlines() if line.startswith("| ")]
 PACKAGE = TESTS.parent / "rendergraph"
+NODES = TESTS.parent / "nodes"
 
 
 def named(column: int) -> list[str]:
@@ -30,3 +31,11 @@ def test_every_test_has_a_row_and_every_row_a_test() -> None:
 def test_a_packages_tests_are_in_a_folder_of_its_name() -> None:
     packages = {file.parent.name for file in PACKAGE.glob("*/__init__.py")}
     assert {name for name in packages if not list((TESTS / name).glob("test_*.py"))} == set()
+
+
+def test_tests_of_a_node_are_in_the_folder_of_its_family() -> None:
+    families = {file.parent.name for file in NODES.glob("*/*.py")}
+    family = {file.stem: file.parent.name for file in NODES.glob("*/*.py")}
+    tests = {file.stem.removeprefix("test_"): file.parent.name for file in TESTS.glob("nodes/*/test_*.py")}
+    assert set(tests.values()) <= families
+    assert {stem: folder for stem, folder in tests.items() if family.get(stem, folder) != folder} == {}
