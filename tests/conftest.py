@@ -161,3 +161,13 @@ def author(tmp_path: Path) -> Author:
     made = Author(tmp_path)
     made.write(wrong__frag=WHITE)
     return made
+
+
+@pytest.fixture
+def shaders(tmp_path: Path) -> Path:
+    """A folder for an author's shaders, with a shared include folder beside it."""
+    (tmp_path / "include").mkdir()
+    (tmp_path / "include" / "view.glsl").write_text("struct View { mat4 view; };\n")
+    (tmp_path / "include" / "fullscreen.vert").write_text("void main() {}\n")
+    (tmp_path / "own").mkdir()
+    return tmp_path / "own"

@@ -19,16 +19,6 @@ from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
 
 
-@pytest.fixture
-def shaders(tmp_path: Path) -> Path:
-    """A folder for an author's shaders, with a shared include folder beside it."""
-    (tmp_path / "include").mkdir()
-    (tmp_path / "include" / "view.glsl").write_text("struct View { mat4 view; };\n")
-    (tmp_path / "include" / "fullscreen.vert").write_text("void main() {}\n")
-    (tmp_path / "own").mkdir()
-    return tmp_path / "own"
-
-
 def write(folder: Path, **files: str) -> None:
     for name, text in files.items():
         file = folder / name.replace("__", ".")
