@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rendergraph.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from rendergraph.errors import RendergraphError
     from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load
 
 __all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load"]
-__version__ = "0.1.0"
 
 
 def __getattr__(name: str) -> Any:

@@ -51,8 +51,13 @@ def circles(edges: set[tuple[str, str]]) -> list[list[str]]:
 
 
 def test_no_module_reaches_itself() -> None:
-    """What a function imports is left out: the next test asks a reason of each."""
-    edges = {(name, other) for name in FILES for other, _, within in imports(name) if other in FILES and not within}
+    """What functions import counts too, but for the package's own, by which its names are there when they are wanted."""
+    edges = {
+        (name, other)
+        for name in FILES
+        for other, _, within in imports(name)
+        if other in FILES and not (within and name == "rendergraph")
+    }
     assert len(edges) > 500
     assert circles(edges) == []
 

@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 from types import FrameType
 from typing import NoReturn
 
-from rendergraph import __version__
 from rendergraph.cli.output import print_error, say
 from rendergraph.cli.words import click
 from rendergraph.errors import Problem, RendergraphError, suggestion
+from rendergraph.version import __version__
 
 VERBS = (
     "run",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rendergraph import __version__, metrics
+from rendergraph import metrics
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import CHECKSUM, Ledger
 from rendergraph.compare.sources import sources_digest
@@ -18,6 +18,7 @@ from rendergraph.compare.timing import Spread, Times
 from rendergraph.compare.values import Pixels, Result, machine
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.metrics import Encoding, Metrics
+from rendergraph.version import __version__
 
 if TYPE_CHECKING:
     from rendergraph.session.values import Planned

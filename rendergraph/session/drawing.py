@@ -16,6 +16,7 @@ from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
 from rendergraph.session.values import Expanded, Wanted
 from rendergraph.textures import FORMATS, Semantic, TextureDesc
+from rendergraph.version import __version__
 
 
 @dataclass(eq=False)
@@ -40,10 +41,6 @@ class Drawing:
     number: int = 0
 
     def __post_init__(self) -> None:
-        if self.executable is not self.gpu.cache.active:
-            self.executable.fresh = True  # another pipeline may have written other values into shared programs
-        self.gpu.cache.active = self.executable
-        self.gpu.cache.drawing = self
         self.runner = Runner(self.executable, self.expanded.linked.graph)
 
     def begin(self) -> None:
@@ -115,13 +112,12 @@ class Drawing:
         import numpy
         import OpenImageIO
 
-        import rendergraph
-
-        libraries = (rendergraph, moderngl, numpy, OpenImageIO)  # they know; asking for their metadata takes 20 ms
+        libraries = (moderngl, numpy, OpenImageIO)  # they know; asking for their metadata takes 20 ms
+        versions = {"rendergraph": __version__} | {library.__name__: library.__version__ for library in libraries}
         device = self.gpu.device
         return {
             "rendergraph:pipeline": self.expanded.linked.spec.to_yaml(origins=False),
-            "rendergraph:versions": ", ".join(f"{library.__name__} {library.__version__}" for library in libraries),
+            "rendergraph:versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
             "rendergraph:device": f"{device.renderer}, OpenGL {device.as_json()['version']}",
         }
 

@@ -146,7 +146,11 @@ def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
     if executable is None:
         planned = expanded if isinstance(expanded, Planned) else plan(expanded)
         executable = gpu.cache.make(key, planned, scene)
-    return Drawing(expanded, executable, scene, gpu)
+    if executable is not gpu.cache.active:
+        executable.fresh = True  # another pipeline may have written other values into shared programs
+    drawing = Drawing(expanded, executable, scene, gpu)
+    gpu.cache.active, gpu.cache.drawing = executable, drawing
+    return drawing
 
 
 def draw(expanded: Expanded, gpu: Gpu) -> Iterator[Frame]:

@@ -1,0 +1,3 @@
+"""Which rendergraph this is."""
+
+__version__ = "0.1.0"
