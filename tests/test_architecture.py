@@ -31,7 +31,7 @@ def test_the_framework_names_no_standard_node() -> None:
         assert not {word for word in words if isinstance(word, str) and word in names} - {"shadow_map"}, file
 
 
-@pytest.mark.parametrize("verb", ["check", "plan", "graph"])
+@pytest.mark.parametrize("verb", ["check", *(pytest.param(verb, marks=pytest.mark.slow) for verb in ("plan", "graph"))])
 def test_everything_before_compile_works_without_gl(verb: str, tmp_path: Path) -> None:
     """The GL and image libraries are made unimportable, as on a machine that has none."""
     script = (

@@ -114,6 +114,7 @@ def _run_console(text: str, where: str, capsys: pytest.CaptureFixture[str]) -> N
             assert re.fullmatch(pattern, printed, re.DOTALL), f"{where}: {command}\n{printed}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["spheres", "stairs"])
 def test_lines_of_the_geometry_guide_are_hidden_nowhere_in_sight(
     scene: str, gl: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -25,23 +25,19 @@ def imports(name: str) -> list[tuple[str, int, bool]]:
     return list(_imports(name, ast.parse(FILES[name].read_text())))
 
 
-def _imports(name: str, tree: ast.Module) -> Iterator[tuple[str, int, bool]]:
-    inside = {
-        id(statement)
-        for function in ast.walk(tree)
-        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
-        for statement in ast.walk(function)
-    }
-    for statement in ast.walk(tree):
-        if isinstance(statement, ast.Import):
-            for alias in statement.names:
-                yield alias.name, statement.lineno, id(statement) in inside
-        elif isinstance(statement, ast.ImportFrom):
-            assert statement.level == 0, f"{name}:{statement.lineno}: a relative import"
-            base = statement.module or ""
-            for alias in statement.names:
+def _imports(name: str, node: ast.AST, within: bool = False) -> Iterator[tuple[str, int, bool]]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import):
+            for alias in child.names:
+                yield alias.name, child.lineno, within
+        elif isinstance(child, ast.ImportFrom):
+            assert child.level == 0, f"{name}:{child.lineno}: a relative import"
+            base = child.module or ""
+            for alias in child.names:
                 whole = f"{base}.{alias.name}"
-                yield whole if whole in FILES else base, statement.lineno, id(statement) in inside
+                yield whole if whole in FILES else base, child.lineno, within
+        elif isinstance(child, ast.stmt | ast.excepthandler | ast.match_case):  # expressions hold none
+            yield from _imports(name, child, within or isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef))
 
 
 def circles(edges: set[tuple[str, str]]) -> list[list[str]]:

@@ -254,6 +254,7 @@ def topological_orders(steps: tuple[Step, ...], expansion: Expansion) -> Iterato
 # --- properties ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(expansions(), st.sampled_from(["best", "shuffled", "program"]), st.integers(0, 9), st.booleans(), st.booleans())
 @settings(max_examples=300, deadline=None)
 def test_orders_are_legal_and_plans_valid(base: Expansion, way: str, seed: int, alias: bool, views: bool) -> None:

@@ -52,6 +52,7 @@ def test_the_list_of_verbs_is_not_cut_off(cli: Any) -> None:
         assert f"\n  {verb} " in result.out
 
 
+@pytest.mark.slow
 def test_the_terminal_gets_boxes_and_a_pipe_does_not() -> None:
     script = "import pty, sys; sys.exit(pty.spawn(sys.argv[1:]) >> 8)"
     shown = subprocess.run(
@@ -202,6 +203,7 @@ def test_signals_end_the_process_cleanly(tmp_path: Path, name: str) -> None:
     assert err == {"SIGINT": "interrupted\n", "SIGTERM": "terminated\n"}[name]
 
 
+@pytest.mark.slow
 def test_a_closed_pipe_is_no_error() -> None:
     process = subprocess.Popen([*PROGRAM, "nodes", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None

@@ -80,6 +80,7 @@ def test_a_picture_that_says_nothing_is_told(cli: Any) -> None:
     assert cli("config", "none.png").err == "none.png: RG350 there is no such image\n"
 
 
+@pytest.mark.slow
 def test_test_modes_change_no_pixel(cli: Any) -> None:
     cli("run", "forward-prepass", *SMALL, "-o", "a.exr")
     for mode in (["--no-alias"], ["--poison"], ["--shuffle", "3"]):
@@ -171,6 +172,7 @@ def test_several_mistakes_are_told_at_once(cli: Any) -> None:
     assert [problem["code"] for problem in result.json["error"]["problems"]] == ["RG103", "RG102"]
 
 
+@pytest.mark.slow
 def test_bench_shows_the_steps_of_a_pass(cli: Any) -> None:
     told = cli("bench", "bloom", *SMALL, "-n", "2", "--steps", "--json").json
     nodes = [step["node"] for step in told["steps"]]
@@ -260,6 +262,7 @@ def test_the_wrong_line_of_a_page_prints_its_message(cli: Any, tmp_path: Path, p
 # --- doctor ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_doctor_finds_a_device_here(cli: Any) -> None:
     result = cli("doctor", "--json")
     assert result.code == 0

@@ -41,6 +41,7 @@ def test_nodes_lists_every_type(cli: Any) -> None:
         assert entry["doc"].partition("\n")[0] in listed.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CATALOG.names())
 def test_every_node_can_be_explained(cli: Any, name: str) -> None:
     text = cli("explain", name).out
@@ -52,6 +53,7 @@ def test_every_node_can_be_explained(cli: Any, name: str) -> None:
     assert f"type: {name}" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", CODES)
 def test_every_code_can_be_explained(cli: Any, code: str) -> None:
     text = cli("explain", code.lower()).out

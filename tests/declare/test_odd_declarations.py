@@ -126,6 +126,7 @@ class Stranger(Node):
     color = Output(Radiance, doc="Colour.")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("port", "name"), FIELDS)
 def test_nothing_is_a_traceback(tmp_path: Path, port: str, name: str) -> None:
     cls, given = PORTS[port]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rendergraph.images import contact_sheet
 
 
+@pytest.mark.slow
 def test_pictures_stand_in_rows_fitted_to_their_tiles_with_names_beneath() -> None:
     grown = np.array([[[255], [0]]], np.uint8)  # one row of two texels, which grow into squares
     shrunk = np.full((900, 1600, 3), (200, 10, 90), np.uint8)

@@ -201,6 +201,7 @@ def test_without_its_bloom_a_pipeline_draws_as_if_there_were_none(gl: rg.Session
     assert not np.array_equal(without["image"], bloom.render(session=gl)["image"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_pipelines())
 def test_every_node_goes_or_is_named(name: str) -> None:
     catalog = Catalog.discover()

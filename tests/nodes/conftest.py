@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import rendergraph as rg
 from rendergraph.glsl import Includes
 from rendergraph.glsl.source import needs
 from rendergraph.resources import folder
@@ -28,6 +29,13 @@ def gl() -> Iterator[Any]:
         pytest.skip(f"no OpenGL 4.5: {error}")
     yield context
     context.release()
+
+
+@pytest.fixture(scope="session")
+def session(gl: Any) -> Iterator[rg.Session]:
+    """The session that pictures of nodes are drawn in; `gl` is a bare context here."""
+    with rg.Session() as made:
+        yield made
 
 
 @pytest.fixture

@@ -82,6 +82,7 @@ def test_each_run_of_lines_says_where_it_stands() -> None:
     assert "// include/view.glsl:" in shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "glass", "shadow_study"])
 def test_variants_are_those_that_are_compiled(scene: str, gl: rg.Session) -> None:
     pipeline = rg.load("forward", scene=scene, size=(32, 32))

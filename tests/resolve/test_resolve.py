@@ -369,6 +369,7 @@ def test_sub_pipelines_in_sub_pipelines(folder: Path, toy_catalog: Catalog) -> N
     assert list(spec.scopes) == ["glow/", "glow/a/", "glow/b/"]
 
 
+@pytest.mark.slow
 def test_too_many_nodes_from_small_files(folder: Path, toy_catalog: Catalog) -> None:
     for level in range(1, 6):
         inner = f"./level{level - 1}.yaml" if level > 1 else "blur"
@@ -450,11 +451,13 @@ def rfc_7386(target: Any, patch: Any) -> Any:
     return patch
 
 
+@pytest.mark.slow
 @given(json_values, patches)
 def test_merging_is_the_rfc(target: Any, patch: Any) -> None:
     assert merge_patch(tree_of(target), tree_of(patch)).plain() == rfc_7386(target, patch)
 
 
+@pytest.mark.slow
 @given(json_values, json_values)
 def test_a_difference_applied_gives_the_new(old: Any, new: Any) -> None:
     assert merge_patch(tree_of(old), tree_of(diff(old, new))).plain() == new

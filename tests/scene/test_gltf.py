@@ -90,6 +90,7 @@ ASSETS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ASSETS)
 def test_asset_agrees_with_another_reader(shared: Path, name: str) -> None:
     pygltflib = pytest.importorskip("pygltflib")

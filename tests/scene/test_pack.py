@@ -37,6 +37,7 @@ def unpacked(packed: pack.PackedScene, number: int) -> Mesh:
     return Mesh("m", packed.positions[rows], indices, packed.normals[rows])
 
 
+@pytest.mark.slow
 def test_triangles_survive_the_new_order() -> None:
     meshes = [mesh("sphere"), mesh("torus_knot"), mesh("box"), mesh("plane")]
     packed = pack.pack(scene_of(meshes))

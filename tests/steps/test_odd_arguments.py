@@ -198,6 +198,7 @@ def pipeline(tmp_path_factory: pytest.TempPathFactory) -> rg.Pipeline:
     return replace(rg.load(file), catalog=Catalog.of(Stranger, Odd, shaders=file.parent))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "argument"), list(cases()))
 def test_nothing_is_a_traceback(pipeline: rg.Pipeline, gl: rg.Session, method: str, argument: str) -> None:
     refused = 0

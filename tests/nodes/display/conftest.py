@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -57,13 +57,6 @@ out vec4 radiance;
 void main() { radiance = given[int(gl_FragCoord.y) * width + int(gl_FragCoord.x)]; }
 """
 NODES = (Picture, FloatTonemap, Tonemap, Exposure, GaussianBlur, Bloom)
-
-
-@pytest.fixture(scope="session")
-def session() -> Iterator[rg.Session]:
-    """A session for this folder; `gl` is a bare context here."""
-    with rg.Session() as made:
-        yield made
 
 
 @pytest.fixture

@@ -72,9 +72,9 @@ def srgb(c: Floats) -> Floats:
 
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("exposure", [-2.0, 0.0, 3.0])
-def test_curve(gl: Any, curve: str, exposure: float) -> None:
+def test_curve(session: rg.Session, curve: str, exposure: float) -> None:
     sets = [f"display.curve={curve}", f"display.exposure={exposure}", "light.ambient=0.4"]
-    frame = rg.load("forward", scene="spheres", size=(64, 48), sets=sets).render()
+    frame = rg.load("forward", scene="spheres", size=(64, 48), sets=sets).render(session=session)
     scene = frame["radiance"][..., :3].astype(np.float64)
     expected = srgb(CURVES[curve](np.maximum(scene, 0) * 2.0**exposure)) * 255
     assert np.abs(frame["image"][..., :3] - expected).max() <= 0.51

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,13 +12,6 @@ import pytest
 import rendergraph as rg
 
 Floats = npt.NDArray[np.float64]
-
-
-@pytest.fixture(scope="session")
-def session(gl: Any) -> Iterator[rg.Session]:
-    """A session that all pictures are drawn in; tests skip where there is no GL."""
-    with rg.Session() as made:
-        yield made
 
 
 @pytest.fixture

@@ -91,6 +91,7 @@ def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shad
     same(steps_off(radiance("deferred", scene, FULL, model), radiance("forward-prepass", scene, model)))
 
 
+@pytest.mark.slow
 def test_the_fast_visibility(radiance: Any, steps_off: Any) -> None:
     pictures = [
         radiance(name, "spheres", "light.smith=fast", *more)
@@ -114,6 +115,7 @@ def test_each_term_alone(radiance: Any, steps_off: Any, tmp_path: Path, term: st
     same(steps_off(radiance("deferred", scene, FULL, terms), radiance("forward-prepass", scene, terms)))
 
 
+@pytest.mark.slow
 def test_shadows_looked_up_in_place_or_in_screen_space(radiance: Any) -> None:
     """The geometric normal comes from depth in both; against forward, where it is the triangle's, edges are aside."""
     screen = radiance("deferred", "shadow_study", size=(320, 180))
@@ -189,6 +191,7 @@ def test_compact_is_off_by_half_a_step_of_eight_bit_base_colour(session: rg.Sess
     assert np.percentile(relative, 99) <= 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["stairs", "shadow_study"])
 def test_compact_coefficients_of_the_empirical_models_are_finer(radiance: Any, scene: str) -> None:
     """Roots in 10 bits: a coefficient k is off by at most 1/1023 of its root, 0.5 % where k is 0.04."""

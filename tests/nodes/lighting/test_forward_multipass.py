@@ -10,6 +10,7 @@ import pytest
 import rendergraph as rg
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "spheres", "many_lights"])
 def test_it_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
     """Where two surfaces lie at exactly the same depth, both are added: a pixel of the columns' rims may be off."""

@@ -56,6 +56,7 @@ def settings(pipeline: str, *values: str) -> list[str]:
     return [*full, *(f"{node}.{value}" for value in values for node in nodes)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pipeline", PIPELINES)
 @pytest.mark.parametrize("red_first", [True, False])
 @pytest.mark.parametrize("red_nearer", [True, False])
@@ -136,6 +137,7 @@ def test_every_shading_model_draws_the_forward_picture(radiance: Any, steps_off:
     assert (steps_off(deferred, forward) > 4).mean() <= 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("evaluate", ["vertex", "face"])
 def test_forward_draws_blended_surfaces_however_light_is_evaluated(radiance: Any, evaluate: str) -> None:
     picture = radiance("forward", "glass", f"light.evaluate={evaluate}")

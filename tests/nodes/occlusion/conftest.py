@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,6 @@ import rendergraph as rg
 
 Floats = npt.NDArray[np.float64]
 Occlusion = Callable[..., Floats]
-
-
-@pytest.fixture(scope="session")
-def session() -> Iterator[rg.Session]:
-    """A session for this folder; `gl` is a bare context here."""
-    with rg.Session() as made:
-        yield made
 
 
 @pytest.fixture

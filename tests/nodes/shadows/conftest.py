@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,13 +21,6 @@ from rendergraph.scene.model import Scene
 
 Floats = npt.NDArray[np.float64]
 SHADERS = folder("rendergraph.shaders") / "shadows"
-
-
-@pytest.fixture(scope="session")
-def session() -> Iterator[rg.Session]:
-    """A session for this folder; `gl` is a bare context here."""
-    with rg.Session() as made:
-        yield made
 
 
 class Stage:

@@ -18,6 +18,7 @@ def test_given_values(glsl_function: Callable[..., float], shared: Path) -> None
         assert found == pytest.approx(case["value"], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scene", "radius"), [("shadow_study", 7), ("shadow_study", 0), ("cornell_box", 3)])
 def test_the_whole_chain_in_numpy(look: Any, boxed: Any, bilinear: Any, scene: str, radius: int) -> None:
     seen = look("shadow-esm", f"shadows.radius={radius}", "shadows.exponent=60", scene=scene, resolution=512)

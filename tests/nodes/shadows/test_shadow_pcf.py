@@ -105,14 +105,16 @@ def test_points_on_the_disc_are_spread(poisson_disc: Floats) -> None:
 # --- pictures against ray casting ------------------------------------------------------------------------------------
 
 
-def wrong_share(shared: Path, case: str, *sets: str, pipeline: str = "forward") -> float:
+def wrong_share(session: rg.Session, shared: Path, case: str, *sets: str, pipeline: str = "forward") -> float:
     """Per cent of the pixels away from shadow edges whose lit state is not the ray-cast one."""
     here = shared / "reference" / "b2_shadows" / case
     camera = json.loads((here / "case.json").read_text())["camera"]
     masks = np.load(here / "masks.npz")
     sets = ("light.ambient=0", "light.terms=diffuse", "shadows.taps=1", *sets)
     size = (camera["width"], camera["height"])
-    frame = rg.load(pipeline, scene=here / "scene.glb", size=size, sets=sets).render(outputs=["radiance"])
+    frame = rg.load(pipeline, scene=here / "scene.glb", size=size, sets=sets).render(
+        session=session, outputs=["radiance"]
+    )
     lit = frame["radiance"][..., :3].sum(-1) > 1e-6
     judged = (masks["cls"] > 0) & ~masks["edge"].astype(bool)
     return float(100 * (lit != (masks["cls"] == 1))[judged].mean())
@@ -120,26 +122,28 @@ def wrong_share(shared: Path, case: str, *sets: str, pipeline: str = "forward") 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["dir_basic", "dir_camera_in_shadow", "dir_cascades", "spot_basic"])
-def test_hard_shadows_are_the_ray_cast_ones(gl: Any, shared: Path, case: str) -> None:
-    assert wrong_share(shared, case) <= 0.02
-    assert wrong_share(shared, case, pipeline="forward-prepass") <= 0.02
-    assert wrong_share(shared, case, "sun.resolution=64") > 0.02
+def test_hard_shadows_are_the_ray_cast_ones(session: rg.Session, shared: Path, case: str) -> None:
+    assert wrong_share(session, shared, case) <= 0.02
+    assert wrong_share(session, shared, case, pipeline="forward-prepass") <= 0.02
+    assert wrong_share(session, shared, case, "sun.resolution=64") > 0.02
 
 
-def test_a_point_light_has_six_layers(gl: Any, shared: Path) -> None:
-    assert wrong_share(shared, "point_room", "sun.light=point", "sun.resolution=1024") <= 0.02
+def test_a_point_light_has_six_layers(session: rg.Session, shared: Path) -> None:
+    assert wrong_share(session, shared, "point_room", "sun.light=point", "sun.resolution=1024") <= 0.02
 
 
 @pytest.mark.slow
-def test_wider_kernels_make_no_acne(gl: Any, shared: Path) -> None:
+def test_wider_kernels_make_no_acne(session: rg.Session, shared: Path) -> None:
     """Away from shadows a lit surface is wholly lit, also at a slope and through 16×16 taps."""
     here = shared / "reference" / "b2_shadows" / "dir_basic"
     masks = np.load(here / "masks.npz")
     for taps in (1, 3, 16):
         sets = ("light.ambient=0", "light.terms=diffuse", f"shadows.taps={taps}")
-        shadowed = rg.load("forward", scene=here / "scene.glb", size=(384, 384), sets=sets).render()["radiance"]
+        shadowed = rg.load("forward", scene=here / "scene.glb", size=(384, 384), sets=sets).render(session=session)[
+            "radiance"
+        ]
         bare = rg.load("forward", scene=here / "scene.glb", size=(384, 384), sets=(*sets, "light.lookup=null"))
-        ratio = shadowed[..., 1] / np.maximum(bare.render()["radiance"][..., 1], 1e-6)
+        ratio = shadowed[..., 1] / np.maximum(bare.render(session=session)["radiance"][..., 1], 1e-6)
         far = (masks["cls"] == 1) & ~masks["edge"].astype(bool)
         for _ in range(14):  # pixels farther from any edge than the kernel is wide
             grown = np.pad(far, 1, mode="edge")
@@ -153,9 +157,9 @@ def test_wider_kernels_make_no_acne(gl: Any, shared: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study", "spheres"])
-def test_both_forms_give_the_same_picture(gl: Any, scene: str) -> None:
+def test_both_forms_give_the_same_picture(session: rg.Session, scene: str) -> None:
     pictures = [
-        rg.load(name, scene=scene, size=(640, 360)).render()["image"].astype(int)
+        rg.load(name, scene=scene, size=(640, 360)).render(session=session)["image"].astype(int)
         for name in ("forward", "forward-prepass")
     ]
     assert np.mean(np.abs(pictures[0] - pictures[1]).max(-1) > 1) <= 1e-3
@@ -188,10 +192,10 @@ def _maps(scene: Path) -> list[Any]:
     return [info for end, info in graph.textures.items() if str(end) == "sun.shadow_map"]
 
 
-def test_without_a_light_that_casts_visibility_is_one(gl: Any, shared: Path) -> None:
+def test_without_a_light_that_casts_visibility_is_one(session: rg.Session, shared: Path) -> None:
     """Only a point light: `auto` finds nothing, the pass is culled, and the picture is the unshadowed one."""
     scene = shared / "reference" / "b2_shadows" / "point_room" / "scene.glb"
-    frame = rg.load("forward", scene=scene, size=(64, 64)).render()
-    bare = rg.load("forward", scene=scene, size=(64, 64), sets=["light.lookup=null"]).render()
+    frame = rg.load("forward", scene=scene, size=(64, 64)).render(session=session)
+    bare = rg.load("forward", scene=scene, size=(64, 64), sets=["light.lookup=null"]).render(session=session)
     assert "sun" in frame.culled
     np.testing.assert_array_equal(frame["radiance"], bare["radiance"])
