@@ -67,7 +67,7 @@ class Parameter:
 
     def beyond(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
-        parts = value if isinstance(value, tuple) else (value,)
+        parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
         wrong = [self.limits.beyond(number) for number in parts if fits(number, float)]
         return next(filter(None, wrong), None)
 
