@@ -159,13 +159,13 @@ class Infer:
         return value
 
     def _fitting(self, end: Endpoint, what: str, rule: Any, annotation: Any, code: str = "RG209") -> Any:
-        """A constant, or what the author's function gives where that is what an annotation says.
+        """A constant, which its declaration has been held to, or what the author's function gives where that fits.
 
         Raises:
-            _Unknown: it is not, which is said.
+            _Unknown: it does not, which is said.
         """
         value = self._ruled(end, what, rule)
-        if not fits(value, annotation):
+        if callable(rule) and not fits(value, annotation):
             self._stop(end, code, f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}")
         return value
 

@@ -133,11 +133,12 @@ def once(path: Path) -> dict[str, Any]:
 
     pipeline = timed("load", made)
     resolved = timed("resolve", pipeline.resolve)
-    timed("scene", lambda: scene_of(resolved))
+    scene = timed("scene", lambda: scene_of(resolved))  # held, so that linking finds it
     timed("link", pipeline.link)
     expansion = timed("expand", pipeline.expand).expansion
     ordered = timed("schedule", lambda: schedule(expansion))
     plan = timed("allocate", lambda: allocate(ordered))
+    assert scene is pipeline.link().scene
     assert len(plan.schedule.steps) == 40, len(plan.schedule.steps)
     return {"ms": sum(stages.values()), "stages": stages, "proven": plan.memory.as_json()["proven"]}
 
