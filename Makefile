@@ -1,11 +1,13 @@
 # What a change must pass: pip install -e ".[dev]" && make check
-# The quick ones come first; the tests come last, so that pytest's own closing line is the last one.
+# What runs on one core goes two at a time; the tests come last, so that pytest's own closing line is the last one.
 
 WORKERS ?= 2
 
-.PHONY: check format lint types imports docs test quick clean
+.PHONY: check format lint types imports docs pages test quick clean
 
-check: lint types imports docs test
+check:
+	$(MAKE) --jobs=2 --output-sync --no-print-directory lint types imports pages
+	$(MAKE) --no-print-directory test
 
 format:
 	ruff check --fix .
@@ -24,6 +26,10 @@ imports:
 
 docs:
 	sphinx-build -q -W --keep-going -b html docs docs/_build/html
+
+# The same without drawing pictures for the reference: that what is shipped draws, the tests find.
+pages:
+	sphinx-build -q -W --keep-going -D pictures=0 -b html docs docs/_build/pages
 
 test:
 	pytest -n $(WORKERS)

@@ -7,6 +7,7 @@ frame["image"]
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.version import __version__ as __version__
@@ -14,8 +15,17 @@ from rendergraph.version import __version__ as __version__
 if TYPE_CHECKING:
     from rendergraph.errors import RendergraphError
     from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load
+    from rendergraph.viewer import view
 
-__all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load"]
+_around = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.path.join(_around, "nodes")):
+    __path__.append(_around)  # a checkout has its own nodes, shaders and pipelines, wherever another one is installed
+
+__all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load", "view"]
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]  # what `rg.<TAB>` offers
 
 
 def __getattr__(name: str) -> Any:
@@ -23,6 +33,10 @@ def __getattr__(name: str) -> Any:
         from rendergraph.errors import RendergraphError  # `rendergraph --help` needs none of it
 
         return RendergraphError
+    if name == "view":
+        from rendergraph.viewer import view  # pages are another matter
+
+        return view
     if name in __all__:
         import rendergraph.session  # nor of this
 

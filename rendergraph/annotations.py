@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     T = TypeVar("T", bound=DataclassInstance)
 
 
+LARGEST = 3.4028235e38
+"""What 32 bits hold of a number; GPUs compute with those."""
+
+
 @dataclass(frozen=True)
 class Range:
     """Limits of a number, which is then finite; `above` leaves `low` itself out."""
@@ -43,8 +47,8 @@ class Range:
 
     def beyond(self, value: float) -> str | None:
         """What a number that lies outside must be; None where it lies inside."""
-        if not -math.inf < value < math.inf:
-            return "must be finite"
+        if not abs(value) <= LARGEST:
+            return f"must be from -{LARGEST} to {LARGEST}" if -math.inf < value < math.inf else "must be finite"
         if self.low is not None and (value < self.low or (self.above and value == self.low)):
             return f"must be {'above' if self.above else 'at least'} {self.low}"
         return f"must be at most {self.high}" if self.high is not None and value > self.high else None

@@ -1,8 +1,8 @@
 """A pipeline that shows a node type at work: for `explain` and the reference, complete and ready to run.
 
-A type that shipped pipelines use is shown by the shortest of those files. For any other a patch on a shipped pipeline
-is put together: every input it must have gets a port that fits, and its first output goes to a node that can take it.
-Whatever is put together is linked, so that what is shown is legal.
+A type that shipped pipelines use is shown by the shortest of those files in which one takes part. For any other a patch
+on a shipped pipeline is put together: every input it must have gets a port that fits, and its first output goes to a
+node that can take it. Whatever is put together is linked, so that what is shown is legal.
 """
 
 from __future__ import annotations
@@ -36,32 +36,50 @@ def example(found: NodeType, catalog: Catalog) -> str | None:
         catalog: where the type and the shipped pipelines' types are found.
     """
     uses = re.compile(rf"\btype: {re.escape(found.name)}\b")
-    texts = [file.read_text(encoding="utf-8") for file in shipped_pipelines().values()]
-    if shown := [text for text in texts if uses.search(text)]:
-        return min(shown, key=len)
+    texts = {file.read_text(encoding="utf-8"): name for name, file in shipped_pipelines().items()}
+    if shown := sorted((text for text in texts if uses.search(text)), key=len):
+        text = next((text for text in shown if _takes_part(found, text, catalog)), shown[0])
+        # What a shipped file names beside it does not lie beside a copy.
+        return f"extends: {texts[text]}\n" if "type: ./" in text else text
     for base in _bases():
         for text in _patches(found, base):
-            if _links_up(text, catalog):
+            if _linked(text, catalog) is not None:
                 return text
     return None
 
 
 @cache
 def _bases() -> tuple[Graph, ...]:
-    """The shipped pipelines, the smallest first; of equal ones those that others extend."""
+    """The shipped pipelines: those that stand alone first, then the smallest, then those that others extend most."""
     catalog = Catalog.discover()
     graphs = [link(resolve(name, catalog=catalog), catalog, _LIGHTS) for name in shipped_pipelines()]
-    texts = "\n".join(file.read_text(encoding="utf-8") for file in shipped_pipelines().values())
-    heirs = {graph.name: len(re.findall(rf"^extends: {graph.name}$", texts, re.MULTILINE)) for graph in graphs}
-    return tuple(sorted(graphs, key=lambda graph: (len(graph.nodes), -heirs[graph.name])))
+    texts = {name: file.read_text(encoding="utf-8") for name, file in shipped_pipelines().items()}
+    extended = re.findall(r"^extends: (.*)$", "\n".join(texts.values()), re.MULTILINE)
+    stands = {name: "\nextends: " not in text for name, text in texts.items()}
+    return tuple(
+        sorted(graphs, key=lambda graph: (not stands[graph.name], len(graph.nodes), -extended.count(graph.name)))
+    )
 
 
-def _links_up(text: str, catalog: Catalog) -> bool:
+def _linked(text: str, catalog: Catalog) -> Graph | None:
+    """The pipeline that a text is; None where it is wrong."""
     try:
-        link(resolve(parse(text, "example.yaml"), catalog=catalog), catalog, _LIGHTS)
+        return link(resolve(parse(text, "example.yaml"), catalog=catalog), catalog, _LIGHTS)
     except InputError:
+        return None
+
+
+def _takes_part(found: NodeType, text: str, catalog: Catalog) -> bool:
+    """Whether an output of the pipeline depends on a node of the type; one may stand there for a user to link."""
+    graph = _linked(text, catalog)
+    if graph is None:
         return False
-    return True
+    used, stack = set[str](), [end.node for end in graph.outputs.values()]
+    while stack:
+        if (node := stack.pop()) not in used:
+            used.add(node)
+            stack += [end.node for ends in graph[node].inputs.values() for end in ends]
+    return any(graph[node].type.name == found.name for node in used)
 
 
 # --- putting one together --------------------------------------------------------------------------------------------
@@ -109,6 +127,8 @@ def _end_for(base: Graph, name: str, port: Input | InOut) -> str | None:
     kind, meaning = getattr(port, "kind", "texture2d"), _meaning(port)
     shown = base.outputs.get("radiance")
     ends = [end for end, given, means in _ends(base) if given == kind and meaning in ("any", means)]
+    if isinstance(port, Input) and port.samples == "multi":
+        ends = [end for end in ends if (desc := base.textures[end].desc) is not None and desc.samples > 1]
     ends.sort(key=lambda end: (end.port != name, end != shown))
     return str(ends[0]) if ends else None
 

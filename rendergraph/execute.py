@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any, Optional, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.annotations import Range
+from rendergraph.api.viewing import shifted
 from rendergraph.compile import Executable
+from rendergraph.compile.executable import source_of_buffer, source_of_region, source_of_view
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import happened
-from rendergraph.errors import InputError, Misuse, Problem, RenderError, node_named
+from rendergraph.document import shown
+from rendergraph.errors import InputError, Misuse, Problem, RenderError, SceneError, is_interruption, node_named
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
 from rendergraph.gl.saved_state import settle
 from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
-from rendergraph.scene.animate import bounds
+from rendergraph.ports import Count
 from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
 from rendergraph.steps import Step, ViewMatrices
+from rendergraph.steps.checks import argument, own_port
 from rendergraph.steps.checks import buffer as buffer_of
-from rendergraph.steps.checks import own_port
+from rendergraph.steps.state import DepthBounds
 from rendergraph.textures import BufferDesc
+
+_Scissor: TypeAlias = Annotated[tuple[int, int, Count, Count], "x, y, width and height in texels"]
+_Part: TypeAlias = Annotated[float, Range(-1, 1)]
+_Offset: TypeAlias = Annotated[tuple[_Part, _Part], "x and y in texels, from -1 to 1"]
 
 
 @dataclass(frozen=True)
@@ -44,18 +54,28 @@ class StepTime:
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """What one frame took: wall time until the device was done, and each step in order."""
+    """What one frame took: wall time until the device was done, each step in order where steps were measured, and how
+    many steps were run of those that there are."""
 
     frame_ms: float
     steps: tuple[StepTime, ...]
+    ran: int = 0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class FrameScene:
-    """The scene of one frame as `update` sees it; see `steps.FrameScene`."""
+    """The scene as `update` sees it, the same for as long as no object moves; see `steps.FrameScene`.
+
+    Attributes:
+        scene: of this frame.
+        placed: of the frame in which the objects came to where they are; it knows their bounds.
+    """
 
     scene: Scene
-    _bounds: list[tuple[Vec3, Vec3]] = field(default_factory=list)
+    placed: Scene = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.placed = self.scene
 
     @property
     def lights(self) -> tuple[Light, ...]:
@@ -80,9 +100,7 @@ class FrameScene:
     @property
     def bounds(self) -> tuple[Vec3, Vec3]:
         """Least and greatest corner of what is drawn, found once."""
-        if not self._bounds:
-            self._bounds.append(bounds(self.scene))
-        return self._bounds[0]
+        return self.placed.bounds
 
 
 @dataclass(eq=False)
@@ -90,6 +108,7 @@ class FrameContext:
     """What a node's `update` sees and does in one frame (`steps.Frame`)."""
 
     executable: Executable
+    graph: Graph
     node: GraphNode
     index: int
     time: float
@@ -100,6 +119,12 @@ class FrameContext:
         """Whether anything is linked to an input."""
         return bool(self.node.inputs.get(own_port(self.node.node.ports(), port, "connected's argument").name))
 
+    def views(self, port: Port) -> Sequence[ViewMatrices]:
+        """The views that what is linked to an input was drawn with."""
+        links = self.node.inputs.get(own_port(self.node.node.ports(), port, "views' argument").name, ())
+        tables = [self.graph.textures[end.now].view or CAMERA for end in links]
+        return [view for table in tables for view in self.executable.views.current[table]]
+
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
         if not isinstance(own_port(self.node.node.ports(), port, "set_views"), Views):
@@ -108,6 +133,26 @@ class FrameContext:
             if not isinstance(view, ViewMatrices):
                 raise Misuse(f"set_views is given {type(view).__name__}, not ViewMatrices", "RG433")
         self.executable.views.set(f"{self.node.id}.{port.name}", views)
+
+    def set_region(
+        self,
+        number: int,
+        scissor: tuple[int, int, int, int] | None = None,
+        depth_bounds: tuple[float, float] | None = None,
+    ) -> None:
+        """Draw the steps of a `region` in a part of the picture from now on."""
+        for name, value, annotation in (
+            ("number", number, Count),
+            ("scissor", scissor, Optional[_Scissor]),  # noqa: UP045  # pyright knows no `|` of Annotated
+            ("depth_bounds", depth_bounds, Optional[DepthBounds]),  # noqa: UP045  # nor of this
+        ):
+            argument(name, value, annotation)
+        region = self.executable.memory.regions.get((self.node.id, number))
+        if region is not None:  # else nobody reads what its steps make
+            before = region.scissor, region.depth_bounds
+            region.scissor, region.depth_bounds = scissor, depth_bounds or (0.0, 1.0)
+            if before != (region.scissor, region.depth_bounds):
+                self.executable.touched.add(source_of_region(self.node.id, number))
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload into a declared buffer."""
@@ -125,6 +170,9 @@ class FrameContext:
         if len(data) > buffer.size:
             raise Misuse(f"it writes {len(data)} bytes into '{port.name}', which holds {buffer.size}", "RG432")
         buffer.write(data)
+        if self.executable.filled.get(name) != data:
+            self.executable.filled[name] = data
+            self.executable.touched.add(source_of_buffer(name))
 
 
 @dataclass(eq=False)
@@ -134,34 +182,57 @@ class Runner:
     Attributes:
         executable: what runs.
         graph: for the nodes that compute something each frame.
+        drawn: frames since history began.
+        reuse: leave out steps whose values are there and would be the same.
+        ran: how many steps the last frame ran.
     """
 
     executable: Executable
     graph: Graph
+    reuse: bool = False
+    ran: int = 0
     _updating: list[GraphNode] = field(default_factory=list)
     _scene: FrameScene | None = None
     _parity: int = 0
     _active: set[str] = field(default_factory=set)
     _complete: bool = False
+    _jittering: GraphNode | None = None
+    _seen: tuple[Scene, ViewMatrices] | None = None
+    _still: int = 0
+    drawn: int = 0
 
     def __post_init__(self) -> None:
         active = {step.node for step in self.executable.plan.schedule.steps}
         active |= {f.node for step in self.executable.plan.schedule.steps for f in step.functions}
         active |= {str(step.view).rpartition(".")[0] for step in self.executable.plan.schedule.steps}  # makers of views
+        for node in reversed(nodes := _views_first(self.graph)):
+            if node.id in active:  # it may ask for the views of what it reads
+                active |= set(_view_makers(self.graph, node))
         self._active = active
-        self._updating = [
-            node for node in self.graph.nodes if node.id in active and type(node.node).update is not Node.update
-        ]
+        self._updating = [node for node in nodes if node.id in active and type(node.node).update is not Node.update]
+        jittering = (n for n in nodes if type(n.node).camera_jitter is not Node.camera_jitter)
+        self._jittering = next((node for node in jittering if node.id in active), None)
         self.reset()
 
+    @property
+    def updating(self) -> list[str]:
+        """The nodes that compute something each frame."""
+        return [node.id for node in self._updating]
+
+    @property
+    def jittering(self) -> str | None:
+        """The node that moves the camera's picture from frame to frame."""
+        return self._jittering.id if self._jittering is not None else None
+
     def reset(self) -> None:
-        """Start history afresh: both copies hold the port's first value."""
+        """Start history afresh: all of it holds the port's first value."""
+        self.drawn, self._seen = 0, None
         memory, plan = self.executable.memory, self.executable.plan
         for name, places in plan.placement.items():
             resource = plan.resources[name]
-            if len(places) < 2 or isinstance(resource.desc, BufferDesc):
+            if resource.role != "history" or isinstance(resource.desc, BufferDesc):
                 continue
-            for parity in (0, 1):
+            for parity in range(len(places)):
                 textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
 
     def run(
@@ -182,12 +253,17 @@ class Runner:
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
-        if executable.reads_frame:
-            views.set_frame(time, delta, index)
+        self._count_still(scene, camera)
+        if executable.reads_frame and views.set_frame(time, delta, index, self._still):
+            executable.touched.add("frame_block")
+        if self.drawn:
+            views.advance()
+        camera = self._jittered(camera)
         views.set(CAMERA, (camera,))
         moved = False
-        if self._scene is None or self._scene.scene is not scene:
+        if self._scene is None or self._scene.placed.objects is not scene.objects:
             self._scene, moved = FrameScene(scene), True
+        self._scene.scene = scene
         updates: dict[str, float] = {}
         for node in self._updating:
             before = perf_counter()
@@ -195,47 +271,57 @@ class Runner:
             updates[node.id] = perf_counter() - before
         if not self._complete:
             self._check_views()
+        if not self.drawn:
+            views.advance()  # nothing has moved before the first frame
+        self.drawn += 1
         if views.changed or moved:
             for sort in executable.sorters:
                 sort(views)
-            views.changed = False
+            executable.touched |= {source_of_view(table) for table in views.changed}
+            views.changed.clear()
+        if views.moved_before:
+            executable.touched |= {source_of_view(table, before=True) for table in views.moved_before}
+            views.moved_before.clear()
         fresh = executable.fresh or not executable.device.owned
         if fresh:
             self.activate()
-        # Counted by frames drawn, not by their numbers: of every second frame, too, each has the one before as history.
+        # Counted by frames drawn, not by their numbers.
         parity = self._parity = (self._parity + 1) % len(executable.steps)
         if fresh or len(executable.binds) > 1:  # else everything is still bound from the frame before
             for call in executable.binds[parity]:
                 call()
-        listed = executable.lists[parity]
-        if not timed:
-            for step in listed:
-                for call in step.calls:
-                    call()
-            executable.done()
-            return None
+        listed = executable.next(parity, reuse=self.reuse)
+        self.ran = len(listed)
         taken: list[tuple[Step, float, Timer]] = []
         measured = executable.device.can_time
-        for step in listed:
-            before = perf_counter()
-            if measured:
-                step.timer.start()
-            for call in step.calls:
-                call()
-            if measured:
-                step.timer.stop()
-            node_id = step.step.node
-            taken.append((step.step, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
+        try:
+            for step in listed if not timed else ():
+                for call in step.calls:
+                    call()
+            for step in listed if timed else ():
+                before = perf_counter()
+                if measured:
+                    step.timer.start()
+                for call in step.calls:
+                    call()
+                if measured:
+                    step.timer.stop()
+                node_id = step.step.node
+                taken.append((step.step, perf_counter() - before + updates.pop(node_id, 0.0), step.timer))
+        except BaseException:
+            executable.break_off()
+            raise
         executable.done()
+        if not timed:
+            return None
         executable.device.ctx.finish()
         frame_ms = (perf_counter() - start) * 1e3
-        steps = [
-            StepTime(node_id, cpu * 1e3, None, -1, "update") for node_id, cpu in updates.items()
-        ]  # those that draw nothing
+        # What is left are nodes that draw nothing.
+        steps = [StepTime(node_id, cpu * 1e3, None, -1, "update") for node_id, cpu in updates.items()]
         for done, cpu, timer in taken:
             gpu = timer.milliseconds() if measured else None
             steps.append(StepTime(done.node, cpu * 1e3, gpu, done.index, done.label))
-        return FrameTimes(frame_ms, tuple(steps))
+        return FrameTimes(frame_ms, tuple(steps), self.ran)
 
     def activate(self) -> None:
         """Write what holds for all frames; needed once, and again when another pipeline used the programs."""
@@ -245,16 +331,29 @@ class Runner:
         self.executable.fresh = False
 
     def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: FrameScene) -> None:
-        frame = FrameContext(self.executable, node, index, time, camera, scene)
-        try:
-            node.node.update(frame)
-        except RenderError:
-            raise
-        except (Exception, SystemExit) as error:  # a stranger's code
-            code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
-            mistake = happened(error, type(node.node), node.type.file)
-            doing = f"{node_named(node.id, node.type.name)} failed in update"
-            raise InputError(mistake.problem(code, doing, node.place)) from error
+        with _blamed(node, "update"):
+            node.node.update(FrameContext(self.executable, self.graph, node, index, time, camera, scene))
+
+    def _count_still(self, scene: Scene, camera: ViewMatrices) -> None:
+        """How many frames nothing has moved: neither scene nor camera, nor a parameter that was changed meanwhile."""
+        before, self._seen = self._seen, (scene, camera)
+        still = before is not None and before[0] is scene and not self.executable.fresh
+        if still and before is not None:
+            still = all(
+                np.array_equal(getattr(before[1], name), getattr(camera, name)) for name in ("view", "projection")
+            )
+        self._still = self._still + 1 if still else 0
+
+    def _jittered(self, camera: ViewMatrices) -> ViewMatrices:
+        """The camera with its picture moved as far as a node asks for."""
+        node = self._jittering
+        if node is None:
+            return camera
+        with _blamed(node, "camera_jitter"):
+            moved = node.node.camera_jitter(self.drawn)
+            argument("what camera_jitter returns", moved, _Offset)
+        x, y = (value / side for value, side in zip(moved, camera.size, strict=True))
+        return replace(camera, projection=shifted(camera.projection, 2 * x, 2 * y), jitter=(x, y))
 
     def _check_views(self) -> None:
         """Every table of a node that runs has been filled by its `update`."""
@@ -290,6 +389,49 @@ class Runner:
         texture = executable.memory.texture(resource, self._parity)
         texels = textures.read(executable.device, texture, mip=mip, layer=layer, stencil=stencil)
         return texels[0] if desc.kind == "texture2d" or layer is not None else texels
+
+
+def _view_makers(graph: Graph, node: GraphNode) -> Iterator[str]:
+    """The nodes whose views what a node reads was drawn with."""
+    for ends in node.inputs.values():
+        views = (graph.textures[end.now].view for end in ends if not end.previous)
+        yield from (maker for maker in (view.rpartition(".")[0] for view in views if view) if maker in graph)
+
+
+def _views_first(graph: Graph) -> list[GraphNode]:
+    """The nodes in the file's order, but those behind the nodes whose views they may ask for."""
+    found: dict[str, GraphNode] = {}
+
+    def visit(node: GraphNode) -> None:
+        if node.id in found:
+            return
+        found[node.id] = node
+        for maker in _view_makers(graph, node):
+            visit(graph[maker])
+        found[node.id] = found.pop(node.id)
+
+    for node in graph.nodes:
+        visit(node)
+    return list(found.values())
+
+
+@contextmanager
+def _blamed(node: GraphNode, method: str) -> Iterator[None]:
+    """Say of what fails in a stranger's method where it stands."""
+    try:
+        yield
+    except RenderError:
+        raise
+    except SceneError as error:  # the author means the user
+        text = f"{node_named(node.id, node.type.name)}: {shown(error, 200)}"
+        raise InputError(Problem("RG209", text, node.place)) from error
+    except BaseException as error:
+        if is_interruption(error):
+            raise
+        code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
+        mistake = happened(error, type(node.node), node.type.file)
+        doing = f"{node_named(node.id, node.type.name)} failed in {method}"
+        raise InputError(mistake.problem(code, doing, node.place)) from error
 
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:

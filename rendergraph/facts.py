@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from rendergraph.errors import SceneError, suggestion
-from rendergraph.textures import Semantic, TextureDesc
+from rendergraph.textures import EnvironmentMap, Semantic, TextureDesc
 
 SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
     "all": lambda casts, blended: True,
@@ -59,8 +59,8 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) ->
     """The lights that cast, as indices into the scene's lights, in its order.
 
     Args:
-        wanted: `auto` for the first directional, else the first spot light, and `all`, both of those that cast shadows;
-            or a light's name, or several.
+        wanted: `auto` for the first directional, else the first spot, else the first point light, and `all`, both of
+            those that cast shadows; or a light's name, or several.
         lights: the scene's lights.
 
     Raises:
@@ -68,7 +68,7 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) ->
     """
     if wanted == "auto":
         kinds = [light.type if light.casts_shadow else None for light in lights]
-        return tuple([kinds.index(kind) for kind in ("directional", "spot") if kind in kinds][:1])
+        return tuple([kinds.index(kind) for kind in ("directional", "spot", "point") if kind in kinds][:1])
     if wanted == "all":
         return tuple(number for number, light in enumerate(lights) if light.casts_shadow)
     names = [light.name for light in lights]
@@ -92,6 +92,8 @@ class ObjectFacts:
         blended: its material is laid over what is behind it (`alpha_mode: blend`).
         double_sided: its material shows from both sides.
         hidden: it is drawn only where a step names it.
+        grain: its material is rougher along one direction than across (`anisotropy_strength`), at some time at least.
+        mesh: the name of its mesh.
     """
 
     name: str
@@ -101,12 +103,38 @@ class ObjectFacts:
     blended: bool = False
     double_sided: bool = False
     hidden: bool = False
-    _closed: Callable[[], bool] = field(default=bool, compare=False, repr=False)
+    grain: bool = False
+    mesh: str = field(default="", compare=False)
+    _gap: Callable[[], str] = field(default=str, compare=False, repr=False)
+    _plane: Callable[[], object] = field(default=lambda: None, compare=False, repr=False)
+    _convex: Callable[[], bool] = field(default=bool, compare=False, repr=False)
 
     @property
     def closed(self) -> bool:
         """Whether its mesh, welded where positions are equal, has two triangles at each edge that run it both ways."""
-        return self._closed()
+        return not self._gap()
+
+    @property
+    def flat(self) -> bool:
+        """Whether all its triangles lie in one plane."""
+        return self._plane() is not None
+
+    @property
+    def most_layers(self) -> int:
+        """How many of its surfaces, as they are drawn, a line of sight can meet: a bound, from its shape.
+
+        One of what is flat, one of what is convex and shows its outside alone, two where it shows both sides; else as
+        many as it has triangles.
+        """
+        if self.flat:
+            return 1
+        return 1 + self.double_sided if self._convex() else self.triangles
+
+    @property
+    def gap(self) -> str:
+        """Where its mesh is not closed, as a sentence that names object, mesh and edge; empty where it is closed."""
+        gap = self._gap()
+        return gap and f"object '{self.name}' is not closed: in its mesh '{self.mesh}' {gap}"
 
 
 @dataclass(frozen=True)
@@ -144,12 +172,19 @@ class Facts:
         lights: the scene's lights in its order.
         inputs: what each connected input carries; a `many` input has one entry a link.
         objects: the scene's objects in its order.
+        environment: the picture around the scene as it is uploaded; None where the scene has none.
     """
 
     viewport: tuple[int, int]
     lights: tuple[LightFacts, ...] = ()
     inputs: Mapping[str, tuple[TextureInfo, ...]] = field(default_factory=dict)
     objects: tuple[ObjectFacts, ...] = ()
+    environment: TextureDesc | None = None
+
+    @property
+    def of_scene(self) -> tuple[TextureInfo, ...]:
+        """What an input of an environment carries that nothing is linked to; empty where the scene has none."""
+        return (TextureInfo(self.environment, EnvironmentMap),) if self.environment is not None else ()
 
     def casting(self, wanted: str | Sequence[str]) -> tuple[int, ...]:
         """The lights that cast, as indices: `auto`, `all`, a light's name or several; see `casting_lights`.
@@ -168,7 +203,7 @@ class Facts:
         return tuple(one for one in self.objects if one.name in names)
 
     def connected(self, name: str) -> bool:
-        """Whether anything is linked to the input."""
+        """Whether anything is linked to the input, or it takes the scene's environment and there is one."""
         return bool(self.inputs.get(name))
 
     def input(self, name: str) -> TextureInfo:

@@ -7,6 +7,9 @@
 | SSIM | of the encoded values, the mean of R, G and B | of the values clipped to 0…1 and encoded |
 | FLIP | LDR-FLIP, the mean over pixels | HDR-FLIP, exposures from the reference |
 
+Of textures that are neither, such as occlusion or depth (`values`): RMSE of the values as they are; the others of
+values 0…1, stretched by the reference's least and greatest where those lie outside.
+
 Alpha does not count. SSIM is Wang et al., "Image Quality Assessment", 2004: an 11×11 Gaussian window of standard
 deviation 1.5, K1 = 0.01, K2 = 0.03. FLIP is Andersson et al., "FLIP: A Difference Evaluator for Alternating Images",
 2020, and "Visualizing Errors in Rendered High Dynamic Range Images", 2021, as OpenImageIO computes them.
@@ -29,7 +32,7 @@ from rendergraph.images import from_srgb, to_srgb
 
 Pixels: TypeAlias = npt.NDArray[Any]
 Floats: TypeAlias = npt.NDArray[np.float64]
-Encoding: TypeAlias = Literal["display", "linear"]
+Encoding: TypeAlias = Literal["display", "linear", "values"]
 
 PIXELS_PER_DEGREE = 67.0206
 """FLIP's default viewer: 0.7 m before a screen 0.7 m wide with 3840 pixels."""
@@ -68,24 +71,31 @@ def measure(
     """All figures of a picture against a reference, and FLIP's map of where they differ.
 
     Args:
-        image, reference: (height, width, 3 or more), uint8 or 0…1 where `display`, linear light where `linear`.
+        image, reference: (height, width, channels), uint8 or 0…1 where `display`, linear light where `linear`, anything
+            where `values`.
         encoding: what the values of both are.
         names: what messages call them.
         plugins: metrics that plugins add.
 
     Returns:
-        The figures, and FLIP at each pixel: (height, width), 0…1.
+        The figures, and FLIP at each pixel: (height, width), 0…1. The figures are NaN where a picture holds NaN or
+        infinity.
 
     Raises:
         InputError: the sizes differ, or a plugin's metric fails.
     """
-    a, b = colors(image), colors(reference)
+    a, b = _values(image, reference) if encoding == "values" else (colors(image), colors(reference))
     check_sizes(a, b, names)
     more = {metric.name: _figure(metric, a, b, names) for metric in plugins}
     error = rmse(a, b)
-    shown = (a, b) if encoding == "display" else (to_srgb(a), to_srgb(b))
-    map_ = flip(a, b, encoding=encoding)
-    return Metrics(error, psnr(error), ssim(*shown), float(map_.mean(dtype=np.float64)), more), map_
+    shown: tuple[Pixels, Pixels] = (_unit(a, b), _unit(b, b)) if encoding == "values" else (a, b)
+    map_ = flip(*shown, encoding=encoding)
+    if not math.isfinite(error):  # FLIP and SSIM clip their pictures, and would make something of NaN and infinity
+        return Metrics(math.nan, math.nan, math.nan, math.nan, more), map_
+    if encoding == "linear":
+        shown = (to_srgb(a), to_srgb(b))
+    peaked = rmse(*shown) if encoding == "values" else error
+    return Metrics(error, psnr(peaked), ssim(*shown), float(map_.mean(dtype=np.float64)), more), map_
 
 
 def same(pixels: Pixels, plugins: Sequence[Added[Metric]] = ()) -> Metrics:
@@ -130,9 +140,29 @@ def colors(pixels: Pixels) -> Floats:
     return shaped.astype(np.float64) / scale
 
 
+def _values(*pixels: Pixels) -> tuple[Floats, ...]:
+    """The channels that all have, a fourth left out, as floats; those of 8 and 16 bits as 0…1."""
+    shaped = [each[..., np.newaxis] if each.ndim == 2 else each for each in pixels]
+    count = min(3, *(each.shape[-1] for each in shaped))
+    scales = [np.iinfo(each.dtype).max if each.dtype in (np.uint8, np.uint16) else 1 for each in shaped]
+    return tuple(each[..., :count].astype(np.float64) / scale for each, scale in zip(shaped, scales, strict=True))
+
+
+def _unit(values: Floats, reference: Floats) -> Floats:
+    """Values as a picture of 0…1: as they are where the reference's are, else stretched by its least and greatest."""
+    known = reference[np.isfinite(reference)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    if low < 0 or high > 1:
+        values = (values - low) / max(high - low, 1e-12)
+    more = [(0, 0), (0, 0), (0, 3 - values.shape[-1])]
+    return np.pad(np.clip(values, 0.0, 1.0), more, mode="edge" if values.shape[-1] == 1 else "constant")
+
+
 def rmse(a: Pixels, b: Pixels) -> float:
-    """Root of the mean squared difference over pixels and channels."""
-    return math.sqrt(float(np.mean(np.square(a.astype(np.float64) - b))))
+    """Root of the mean squared difference over pixels and channels; NaN where a value is NaN or infinite."""
+    with np.errstate(invalid="ignore"):  # infinity against infinity
+        error = float(np.mean(np.square(a.astype(np.float64) - b)))
+    return math.sqrt(error) if math.isfinite(error) else math.nan
 
 
 def psnr(error: float) -> float | None:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from rendergraph.annotations import Known, Length, Range, right
 from rendergraph.facts import Facts
-from rendergraph.textures import FORMATS, Filter, Kind, Sampler, Semantic, Signature, Wrap
+from rendergraph.textures import FORMATS, EnvironmentMap, Filter, Kind, Sampler, Semantic, Signature, Wrap
 
 T = TypeVar("T")
 Rule: TypeAlias = Annotated[Callable[[Any, Facts], T], "a function of node and facts"]
@@ -34,7 +34,7 @@ SizeRule: TypeAlias = Annotated[
     _Factor | tuple[Positive, Positive] | str | tuple[str, _Factor] | Rule[Sides],
     "a factor of the viewport above 0, width and height from 1 up, an input's name, that with a factor, a function",
 ]
-"""A factor of the viewport; width and height; an input's name; an input's name with a factor; a function."""
+"""A factor of the viewport, or of a view's own size; width and height; an input, also with a factor; a function."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,10 @@ class Port:
 
 @dataclass(frozen=True)
 class Part:
-    """A port's texture, or one mip or layer of it; `previous` is last frame's value of a history texture."""
+    """A port's texture, or one mip or layer of it; `previous` is last frame's value of a history texture.
+
+    Of an input that takes a list, `link` is the number of one of them.
+    """
 
     port: Port
     mip: Count | None = None
@@ -75,6 +78,7 @@ class Part:
     previous: bool = False
     sampler: Sampler | None = None
     use: Literal["depth_test"] | None = None
+    link: Count | None = None
 
     def __post_init__(self) -> None:
         right(self, f"a part of '{getattr(self.port, 'name', '')}'")
@@ -101,7 +105,7 @@ class Input(Port):
         kind: kind of port; `function` takes a `Signature` as its semantic.
         size: `same` as the pass's target, or `any`.
         filter, wrap, compare, anisotropy: the sampler.
-        samples: `single`, `multi` (a multisampled texture) or `any`.
+        samples: `single`, `multi` (a multisampled texture) or `any`; what is attached for the depth test has any.
         optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
         many: it takes a list.
         use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
@@ -123,6 +127,15 @@ class Input(Port):
     group: str | None = None
     doc: str = ""
 
+    def link(self, number: int) -> Part:
+        """One texture of an input that takes a list, counted from 0; a shader has it under a name without a number."""
+        return Part(self, link=number)
+
+    @property
+    def takes_scene(self) -> bool:
+        """Whether it reads the scene's environment where nothing is linked to it."""
+        return self.semantic == EnvironmentMap
+
 
 @dataclass(frozen=True, eq=False)
 class WrittenPort(Port):
@@ -138,7 +151,8 @@ class WrittenPort(Port):
         mips: levels; 0 means the full chain.
         layers: array layers; a cube always has 6. By default an array has one a light, where its `lights` are a rule or
             it is drawn with a table of views that says its own, and everything else 1.
-        samples: samples per texel.
+        samples: samples per texel; by default those of `like`, else of an input of the same size that is attached for
+            the `depth_test`, else 1.
         bytes: size of a `buffer`.
         clear: what it first holds; None discards, which is right where every texel is written.
         first: value of every channel in the first frame, where somebody reads `@previous`; 0 by default, and for a
@@ -156,7 +170,7 @@ class WrittenPort(Port):
     size: SizeRule | None = None
     mips: Ruled[Count] = 1
     layers: Ruled[Count] | None = None
-    samples: Ruled[Samples] = 1
+    samples: Samples | Rule[int] | None = None
     bytes: Ruled[Count] = 0
     clear: Ruled[Texel | None] = None
     first: float | None = None
@@ -217,12 +231,15 @@ class Views(Port):
 
     Attributes:
         count: number of views; by default that of its lights, 1 where it has none declared.
+        size: see `SizeRule`; the size of what is drawn with it and of what is made of that, texel by texel, where those
+            say nothing else or a factor. The viewport by default.
         lights: the scene's light index of each view, empty where views are not lights'.
         public: whether others may connect it (it is then an output of kind `view`).
         doc: one line.
     """
 
     count: Ruled[Count] | None = None
+    size: SizeRule | None = None
     lights: Rule[tuple[int, ...]] | None = None
     public: bool = True
     doc: str = ""
@@ -235,8 +252,9 @@ class Function(Port):
     Attributes:
         signature: the function it provides.
         shader: the file with the function's text, beside the node's shaders.
-        reads: the inputs and internals its text samples: names, or `port.sampled(…)`. An input that is not connected
-            and an internal that the node has not written are left out, and the text goes without `HAS_<NAME>`.
+        reads: the inputs, internals and outputs its text samples: names, or `port.sampled(…)`, as what is no input is
+            read unfiltered and from its first mip else. An input that is not connected and an internal that the node
+            has not written are left out, and the text goes without `HAS_<NAME>`.
         doc: one line.
     """
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
+from itertools import takewhile
 from pathlib import Path
 
 
@@ -17,11 +18,21 @@ def folder(package: str) -> Path:
     return Path(str(resources.files(package)))
 
 
+def opening(path: Path) -> str:
+    """The comment that a shipped file begins with, in one line: what it shows."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return " ".join(line.lstrip("# ").strip() for line in takewhile(lambda line: line.startswith("#"), lines))
+
+
 def shipped_pipelines() -> dict[str, Path]:
     """Name to file of every shipped pipeline."""
-    return {path.stem: path for path in sorted(folder("rendergraph.pipelines").glob("*.yaml"))}
+    return _by_name(folder("rendergraph.pipelines"))
 
 
 def shipped_scenes() -> dict[str, Path]:
     """Name to file of every shipped scene."""
-    return {path.stem: path for path in sorted((folder("rendergraph.pipelines") / "scenes").glob("*.yaml"))}
+    return _by_name(folder("rendergraph.pipelines") / "scenes")
+
+
+def _by_name(home: Path) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(home.glob("*.yaml"), key=lambda path: path.stem)}

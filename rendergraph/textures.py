@@ -46,6 +46,11 @@ class Format:
         """Whether a texture of this format is a depth attachment."""
         return self.family in ("depth", "depth_stencil")
 
+    @property
+    def is_bytes(self) -> bool:
+        """Whether each channel is a byte from 0 to 1."""
+        return self.family == "unorm" and self.bytes == self.components and self.name != "rgb10_a2"
+
 
 def _formats() -> dict[str, Format]:
     rows: list[tuple[str, int, int, int, Family]] = [
@@ -109,7 +114,7 @@ Albedo = Semantic("albedo", "Linear base colour, 0 to 1.", encoding="linear")
 Emissive = Semantic("emissive", "Emitted radiance, scene-linear.", encoding="linear")
 Normal = Semantic("normal", "Unit normal in world space.", space="world")
 Material = Semantic("material", "Metallic, roughness, occlusion and model data, 0 to 1.")
-Depth = Semantic("depth", "Window depth, 0 near to 1 far.")
+Depth = Semantic("depth", "Window depth, 1 at the near plane to 0 at the far one or where nothing is.")
 LinearDepth = Semantic("linear_depth", "Distance along the view axis, -z in view space, metres.")
 ShadowMap = Semantic("shadow_map", "Window depth seen from lights, one layer a view.")
 Visibility = Semantic("visibility", "1 lit, 0 shadowed, one layer a shadowed light.")
@@ -117,6 +122,11 @@ Occlusion = Semantic("occlusion", "Ambient visibility: 1 open, 0 closed.")
 Luminance = Semantic("luminance", "Scene luminance, relative to white at 1.")
 ExposureGain = Semantic("exposure_gain", "Factor that brings scene radiance to the display's range; one texel.")
 IrradianceSH = Semantic("irradiance_sh", "L2 spherical harmonics of the environment's radiance.")
+EnvironmentMap = Semantic(
+    "environment_map",
+    "Equirectangular radiance all around: +X in the middle, +Z at 3/4 of the width, +Y at v = 0.",
+    encoding="linear",
+)
 Any = Semantic("any", "Whatever is connected.")
 View = Semantic("view", "Matrices and size that geometry is drawn with.")
 
@@ -135,6 +145,7 @@ SEMANTICS: tuple[Semantic, ...] = (
     Luminance,
     ExposureGain,
     IrradianceSH,
+    EnvironmentMap,
     Any,
     View,
 )
@@ -174,7 +185,17 @@ ShadowLookup = Signature(
     texture="visibility",
 )
 
-SIGNATURES: tuple[Signature, ...] = (ShadowLookup,)
+EnvironmentLight = Signature(
+    name="light_from",
+    declaration="vec3 light_from(vec3 direction, float lobe)",
+    arguments=("direction", "lobe"),
+    combine="+",
+    neutral="vec3(0.0)",
+    doc="Radiance from around a world-space direction, averaged over a lobe: 0 to 1 that of GGX of this perceptual "
+    "roughness, seen along the normal; 2 the cosine lobe of a diffuse surface; below 0 a cone of so many radians.",
+)
+
+SIGNATURES: tuple[Signature, ...] = (ShadowLookup, EnvironmentLight)
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Physical:
         index: its number.
         desc: what it is created from; members of another format of the same texel class look at it through a view.
         members: resources that live in it, in time order; a history resource has two physicals to itself.
-        bytes: by formula.
+        bytes: by formula; none for what is the scene's.
     """
 
     index: int
@@ -60,9 +60,10 @@ class MemoryFigures:
     Attributes:
         no_reuse_bytes: every resource its own texture.
         allocated_bytes: what the plan allocates.
-        lower_bound_bytes: the least peak of live bytes over all orders that was found.
+        lower_bound_bytes: no legal order has a lower peak of live bytes.
         peak_node: the node whose step is the peak of this order; None without steps.
-        proven: no order has a lower peak than `lower_bound_bytes`.
+        proven: an order was found whose peak is that bound.
+        least_peak_bytes: the least peak of live bytes of an order that was found.
         tier: how textures are shared: `view` only where some share needs a view.
         next_tier: the next way of sharing; None where everything shares all it can already.
         next_tier_bytes: what that would allocate, in this order.
@@ -73,6 +74,7 @@ class MemoryFigures:
     lower_bound_bytes: int
     peak_node: str | None
     proven: bool
+    least_peak_bytes: int
     tier: Tier
     next_tier: Tier | None = None
     next_tier_bytes: int | None = None
@@ -104,10 +106,21 @@ class ResourcePlan:
     memory: MemoryFigures
     reasons: Mapping[str, str]
 
+    def __repr__(self) -> str:
+        memory = self.memory
+        return (
+            f"<ResourcePlan: {len(self.schedule.steps)} steps, {memory.allocated_bytes} bytes, "
+            f"{memory.no_reuse_bytes} without reuse>"
+        )
+
     @property
     def resources(self) -> Mapping[str, Resource]:
         """The schedule's resources."""
         return self.schedule.resources
+
+    def bytes(self, id: str) -> int:
+        """Bytes of a resource by formula: of both textures where it has two."""
+        return sum(self.physicals[place].bytes for place in self.placement[id])
 
 
 def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> ResourcePlan:
@@ -133,17 +146,20 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> R
     else:
         groups = by_desc
         better = (("view", by_class),)
-    physicals, placement = _physicals(schedule, groups)
+    # With a texture of its own for everything, history has two in any order.
+    copies = schedule.history_copies if alias else dict.fromkeys(schedule.history_copies, 2)
+    physicals, placement = _physicals(schedule, groups, copies)
     released: dict[int, list[str]] = defaultdict(list)
     for id in shareable:
-        released[lifetimes[id].last].append(id)
+        if id not in schedule.shown:
+            released[lifetimes[id].last].append(id)
     return ResourcePlan(
         schedule=schedule,
         lifetimes=lifetimes,
         physicals=physicals,
         placement=placement,
         released={position: tuple(ids) for position, ids in sorted(released.items())},
-        memory=_memory(schedule, lifetimes, shareable, physicals, better),
+        memory=_memory(schedule, lifetimes, shareable, physicals, placement, better),
         reasons=_reasons(schedule, lifetimes, physicals, placement, alias=alias, views=views),
     )
 
@@ -157,7 +173,9 @@ def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
             first_touch.setdefault(id, position)
             last_touch[id] = position
     return {
-        id: Lifetime(0, last) if id in schedule.whole_frame else Lifetime(first_touch[id], last_touch[id])
+        id: Lifetime(0, last)
+        if id in schedule.whole_frame
+        else Lifetime(first_touch[id], last if id in schedule.shown else last_touch[id])
         for id in schedule.resources
     }
 
@@ -226,18 +244,20 @@ def _fewest_views(schedule: Schedule, ids: Iterable[str], by_desc: Groups, by_cl
     return sorted(chosen, key=lambda group: order[group[0]])
 
 
-def _physicals(schedule: Schedule, groups: Groups) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
+def _physicals(
+    schedule: Schedule, groups: Groups, copies: Mapping[str, int]
+) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
     physicals: list[Physical] = []
     placement: dict[str, tuple[int, ...]] = {}
     whole = [id for id in schedule.resources if id in schedule.whole_frame]
     for members in (*groups, *([id] for id in whole)):
         resource = schedule.resources[members[0]]
         first = len(physicals)
-        copies = 2 if resource.role == "history" else 1
-        for _ in range(copies):
-            physicals.append(Physical(len(physicals), resource.desc, tuple(members), resource.desc.bytes))
+        taken = 0 if resource.role == "scene" else resource.desc.bytes
+        for _ in range(copies.get(resource.id, 1)):
+            physicals.append(Physical(len(physicals), resource.desc, tuple(members), taken))
         for id in members:
-            placement[id] = tuple(range(first, first + copies))
+            placement[id] = tuple(range(first, len(physicals)))
     return tuple(physicals), placement
 
 
@@ -246,10 +266,11 @@ def _memory(
     lifetimes: Mapping[str, Lifetime],
     shareable: Sequence[str],
     physicals: Sequence[Physical],
+    placement: Mapping[str, tuple[int, ...]],
     better: Iterable[tuple[Tier, Groups]],
 ) -> MemoryFigures:
     resources = schedule.resources
-    constant = sum(resources[id].bytes for id in schedule.whole_frame)
+    constant = sum(physicals[place].bytes for id in schedule.whole_frame for place in placement[id])
     allocated = sum(physical.bytes for physical in physicals)
     viewed = any(resources[id].desc != physical.desc for physical in physicals for id in physical.members)
     next_tier: Tier | None = None
@@ -269,6 +290,7 @@ def _memory(
         lower_bound_bytes=schedule.lower_bound_bytes,
         peak_node=schedule.peak_node,
         proven=schedule.proven,
+        least_peak_bytes=schedule.least_peak_bytes,
         tier="view" if viewed else "descriptor",
         next_tier=next_tier,
         next_tier_bytes=next_bytes,
@@ -295,13 +317,16 @@ def _reasons(
     for id, resource in schedule.resources.items():
         physical = physicals[placement[id][0]]
         word = "texture" if isinstance(resource.desc, TextureDesc) else "buffer"
-        if resource.role == "history":
+        if resource.role == "history" and len(placement[id]) == 2:
             reasons[id] = f"the next frame reads it: two {word}s take turns and nothing shares them"
+        elif resource.role == "history":
+            reasons[id] = f"the next frame reads it, before it is written anew: one {word}, and nothing shares it"
+        elif resource.role == "scene":
+            reasons[id] = "it is uploaded with the scene, and all pipelines that draw that read it"
         elif resource.role == "kept":
             reasons[id] = f"it outlives the frame: its {word} is its own, and written when it is new or out of date"
         elif id in schedule.whole_frame:
-            why = f"output '{outputs[id]}' is kept" if id in outputs else "it is filled before the first step"
-            reasons[id] = f"{why}: its {word} is its own for the whole frame"
+            reasons[id] = f"it is filled before the first step: its {word} is its own for the whole frame"
         elif not alias:
             reasons[id] = "aliasing is off"
         elif len(physical.members) == 1:
@@ -321,6 +346,8 @@ def _reasons(
             else:
                 start = names[schedule.steps[lifetimes[other].first].key]
                 reasons[id] = f"shares {word} {physical.index} with {other}, which takes it over at {start}"
+        if id in schedule.shown:
+            reasons[id] = f"output '{outputs[id]}', kept to the frame's end: {reasons[id]}"
     return reasons
 
 

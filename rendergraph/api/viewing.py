@@ -8,6 +8,7 @@ float64 of shape (4, 4); clip space has z in -w…w. Angles are radians, distanc
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,8 @@ Points = npt.NDArray[np.float64]
 INFINITE_EPSILON = 2.4e-7
 """How far an infinite far plane stays inside the clip volume: two steps of a float32 at 1."""
 
-_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))  # of `box_corners`
+BOX_FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+"""The corners of each side of a box, as `box_corners` has them, all around."""
 
 
 # --- projections: view space to clip space ---------------------------------------------------------------------------
@@ -191,6 +193,24 @@ def cone_view(
     return ViewMatrices(view_along(direction, eye=eye), projection, (resolution, resolution), near, far)
 
 
+def narrowed_view(
+    view: ViewMatrices, low: npt.ArrayLike, high: npt.ArrayLike, near: float, far: float, margin: float = 0.0
+) -> ViewMatrices:
+    """A perspective view from the same place that holds less: a rectangle of slopes, with texels around it.
+
+    Args:
+        view: along an axis, which may now lie beside the rectangle.
+        low, high: least and greatest x and y of what it holds, over the distance along the axis, shape (2,).
+        near, far: metres.
+        margin: texels around it.
+    """
+    low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
+    middle = (low + high) / 2
+    half = np.maximum(high - middle, 1e-6) * guard_band(view.size[0], margin)
+    (left, bottom), (right, top) = (middle - half) * near, (middle + half) * near
+    return ViewMatrices(view.view, frustum(left, right, bottom, top, near, far), view.size, near, far)
+
+
 def cube_views(
     eye: npt.ArrayLike, near: float, far: float, resolution: int, margin: float = 0.0
 ) -> tuple[ViewMatrices, ...]:
@@ -211,6 +231,61 @@ def frustum_planes(view: ViewMatrices) -> Points:
     planes = np.array([rows[3] + sign * rows[axis] for axis in (0, 1, 2) for sign in (1.0, -1.0)])
     planes = planes[:5] if math.isinf(view.far) else planes
     return np.array([plane / float(np.linalg.norm(plane[:3])) for plane in planes])
+
+
+def box_planes(box: npt.ArrayLike) -> Points:
+    """Planes (a, b, c, d) of a box, as `frustum_planes` has a view's, shape (6, 4)."""
+    low, high = np.asarray(box, np.float64)
+    axes = np.eye(3)
+    return np.concatenate([np.column_stack([axes, -low]), np.column_stack([-axes, high])])
+
+
+def region_corners(planes: Points) -> Points:
+    """Corners of the convex region that lies inside all planes, shape (n, 3): each where three of them meet.
+
+    A corner in more than three planes stands there more than once; a region without end has few corners, or none.
+    """
+    triples = np.array(list(combinations(range(len(planes)), 3)))
+    systems, right = planes[triples, :3], -planes[triples, 3]
+    meet = np.abs(np.linalg.det(systems)) > 1e-9
+    points: Points = np.asarray(np.linalg.solve(systems[meet], right[meet][..., np.newaxis])[..., 0], np.float64)
+    slack = 1e-9 * (1.0 + np.abs(points).max(axis=1, initial=0.0) + np.abs(planes[:, 3]).max(initial=0.0))
+    return points[np.all(points @ planes[:, :3].T + planes[:, 3] >= -slack[:, np.newaxis], axis=1)]
+
+
+def sphere_bounds(
+    view: ViewMatrices, center: npt.ArrayLike, radius: float
+) -> tuple[tuple[int, int, int, int], tuple[float, float]]:
+    """What part of a view's picture a ball covers: x, y, width and height in texels, least and greatest window depth.
+
+    A plane of the view's x = k w touches the ball where `(P - k Q)² = r² |A - k B|²`, with P, Q the rows of x and w
+    applied to its centre and A, B their directions: two values of k, between which the ball lies. They are exact for
+    any projection. A ball that reaches behind the eye may cover everything; one that lies beside the picture has no
+    width or height.
+    """
+    rows = view.projection @ view.view
+    reversed_z = (rows[3] - rows[2]) / 2  # as it is stored
+    point = np.append(np.asarray(center, np.float64), 1.0)
+    w, b = rows[3] @ point, rows[3, :3]
+    if w < -radius * np.linalg.norm(b):
+        return (0, 0, 0, 0), (0.0, 1.0)
+    a2 = w * w - radius * radius * (b @ b)
+    found = []
+    for row, least in ((rows[0], -1.0), (rows[1], -1.0), (reversed_z, 0.0)):
+        low, high = least, 1.0
+        if w > 0 and a2 > 0:  # wholly before the eye
+            p, a = row @ point, row[:3]
+            half = p * w - radius * radius * (a @ b)
+            root = math.sqrt(max(half * half - a2 * (p * p - radius * radius * (a @ a)), 0.0))
+            low, high = max(low, (half - root) / a2), min(high, (half + root) / a2)
+        found.append((low, high))
+    (left, right), (bottom, top), (farthest, nearest) = found
+    if left >= right or bottom >= top or farthest >= nearest:
+        return (0, 0, 0, 0), (0.0, 1.0)
+    width, height = view.size
+    x, y = math.floor((left + 1) / 2 * width), math.floor((bottom + 1) / 2 * height)
+    rectangle = x, y, math.ceil((right + 1) / 2 * width) - x, math.ceil((top + 1) / 2 * height) - y
+    return rectangle, (farthest * (1 - 1e-6), min(nearest * (1 + 1e-6), 1.0))
 
 
 def frustum_corners(view: ViewMatrices, near: float | None = None, far: float | None = None) -> Points:
@@ -269,7 +344,7 @@ def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
     box = np.asarray(box, np.float64)
     planes = frustum_planes(view)
     corners = box_corners(box)
-    found = [polygon for face in _FACES if len(polygon := clip_polygon(corners[list(face)], planes))]
+    found = [polygon for face in BOX_FACES if len(polygon := clip_polygon(corners[list(face)], planes))]
     points = [*found, *_frustum_edges_inside(planes, box)]
     return np.concatenate(points) if points else np.empty((0, 3))
 

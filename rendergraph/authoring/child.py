@@ -17,7 +17,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from rendergraph.declare.blame import causes, raised_at
+from rendergraph.declare.blame import causes, raised_at, told
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 
 ENDED, OUT_OF_MEMORY = "RG450", "RG453"
@@ -42,7 +42,7 @@ def main() -> None:
     pipe = os.fdopen(asked["pipe"], "w", buffering=1, encoding="utf-8")
 
     def send(**event: Any) -> None:
-        pipe.write(json.dumps(event) + "\n")
+        pipe.write("\n" + json.dumps(event) + "\n")  # a node may have written half a line
         pipe.flush()
 
     file = Path(asked["file"])
@@ -82,5 +82,4 @@ def _other(file: Path, error: BaseException) -> dict[str, Any]:
     place = raised_at(error, file)
     if place is None:
         return {"mistake": "".join(traceback.format_exception(error))}
-    text = f"it raises {type(error).__name__}: {' '.join(str(error).split())[:300]}"
-    return {"failed": [asdict(Problem(ENDED, text, place))], "exit_code": 3}
+    return {"failed": [asdict(Problem(ENDED, f"it raises {told(error)}", place))], "exit_code": 3}

@@ -58,7 +58,7 @@ def unused(node: NodeType, seen: Collection[str], files: Iterable[Path]) -> Iter
         files: the shaders that its steps use.
     """
     text = _python_text(node)
-    shaders = "".join(shader_text(file) for file in files)
+    shaders = "".join(shader_text(file, node.inherited) for file in files)
     cls = node.cls
     for name, parameter in cls.parameters().items():
         word = name.upper() if parameter.role == "define" else name
@@ -74,11 +74,11 @@ def unused(node: NodeType, seen: Collection[str], files: Iterable[Path]) -> Iter
             yield name
 
 
-def shader_text(file: Path) -> str:
-    """A shader with its includes, comments left out."""
+def shader_text(file: Path, inherited: tuple[Path, ...]) -> str:
+    """A shader with its includes, some of which may lie where the extended nodes have theirs, comments left out."""
     if not file.is_file():
         return ""
-    origins = expand(file, shared_includes(), root=file.parent, versions=True).origins
+    origins = expand(file, shared_includes(), root=file.parent, versions=True, inherited=inherited).origins
     files = dict.fromkeys(origin.file for origin in origins if origin.file is not None)
     return "\n".join(strip_comments(read_text(one)) for one in files)  # `#include <CURVE>` with them
 

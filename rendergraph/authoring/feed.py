@@ -8,6 +8,7 @@ whatever a reader may be given is there.
 from __future__ import annotations
 
 import json
+import re
 import types
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,17 +59,25 @@ class Surrounded:
         checked: what is checked.
         folder: where shaders and pipelines of the surroundings are written.
         sources: input to the type that feeds it.
+        multisampled: input that takes one sample a texel or several, to the type that feeds it several.
         readers: output to the type that reads it.
     """
 
     checked: NodeType
     folder: Path
     sources: dict[str, NodeType] = field(default_factory=dict)
+    multisampled: dict[str, NodeType] = field(default_factory=dict)
     readers: dict[str, NodeType] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, port in self.checked.cls.inputs().items():
-            self.sources[name] = self._added("feed", name, _source(name, port, self.folder))
+            if isinstance(port, Input) and port.takes_scene:
+                continue  # the scene has one
+            samples = _samples(port)
+            single: Samples = 4 if samples == "multi" else 1
+            self.sources[name] = self._added("feed", name, _source(name, port, self.folder, single))
+            if samples == "any" and port.kind in TEXTURE_KINDS:
+                self.multisampled[name] = self._added("feed_samples", name, _source(name, port, self.folder, 4))
         for name, output in self.checked.cls.outputs().items():
             reader = _reader(name, output, self.folder)
             if reader is not None:
@@ -78,16 +87,15 @@ class Surrounded:
     def fed(self) -> list[str]:
         """The inputs that are fed a texture which can be read back."""
         ports = self.checked.cls.inputs()
-        return [name for name in self.sources if ports[name].kind in TEXTURE_KINDS and ports[name].samples != "multi"]
+        return [name for name in self.sources if ports[name].kind in TEXTURE_KINDS and _samples(ports[name]) != "multi"]
 
     def _added(self, word: str, name: str, cls: type[Node]) -> NodeType:
         return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
 
     def catalog(self) -> Catalog:
         """The node's type and those around it."""
-        return Catalog(
-            {}, {entry.name: entry for entry in (self.checked, *self.sources.values(), *self.readers.values())}
-        )
+        around = (*self.sources.values(), *self.multisampled.values(), *self.readers.values())
+        return Catalog({}, {entry.name: entry for entry in (self.checked, *around)})
 
     def pipeline(self, variant: Variant, scene: str) -> dict[str, Any]:
         """A pipeline file of one variant, as plain values; outputs are what feeds the node, then the node's.
@@ -102,10 +110,12 @@ class Surrounded:
             if name in variant.left_out:
                 continue
             port = cls.inputs()[name]
+            several = variant.multisampled and name in self.multisampled
+            source = self.multisampled[name] if several else source
             nodes[source.name] = {"type": source.name}
             link = f"{source.name}.made"
             inputs[name] = [link] if isinstance(port, Input) and port.many else link
-            if name in self.fed:
+            if name in self.fed and not several:
                 outputs[_FROM + name] = link
         if variant.outputs:
             nodes[node] = {"type": node, "inputs": inputs, "params": dict(variant.params)}
@@ -132,7 +142,12 @@ class Surrounded:
 # --- sources ---------------------------------------------------------------------------------------------------------
 
 
-def _source(name: str, port: Input | InOut, folder: Path) -> type[Node]:
+def _samples(port: Input | InOut) -> str:
+    """Which numbers of samples a port takes: `single`, `multi`, `any`."""
+    return port.samples if isinstance(port, Input) else "single"
+
+
+def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> type[Node]:
     """The class of a node that feeds a port."""
     semantic = port.semantic
     if isinstance(semantic, Signature):
@@ -149,7 +164,6 @@ def _source(name: str, port: Input | InOut, folder: Path) -> type[Node]:
     depth = meaning.name in _DEPTHS or (given is not None and FORMATS[given].is_depth)
     format = given or ("depth32f" if depth else "rgba16f" if image else "rgba32f")
     layers = {"texture2d": 1, "texture_cube": 6}.get(port.kind, 1 if _has_lights(meaning) else 2)
-    samples: Samples = 4 if getattr(port, "samples", "single") == "multi" else 1
     shader = f"feed_{name}.frag"
     (folder / shader).write_text(_pattern(meaning, format), encoding="utf-8")
 
@@ -187,7 +201,7 @@ def _pattern(semantic: Semantic, format: str) -> str:
     body = "vec2 at = v_uv; float wave = 0.5 + 0.5 * sin(11.0 * at.x + 7.0 * at.y);"
     family = FORMATS[format].family
     if FORMATS[format].is_depth:
-        return f"{head}void main() {{ {body} gl_FragDepth = wave > 0.9 ? 1.0 : 0.6 + 0.35 * wave; }}\n"
+        return f"{head}void main() {{ {body} gl_FragDepth = wave > 0.9 ? 0.0 : 0.4 - 0.35 * wave; }}\n"
     kind = {"uint": "uvec4", "int": "ivec4"}.get(family, "vec4")
     scaled = f"{kind}(100.0 * {value})" if kind != "vec4" else value
     return f"{head}out {kind} made;\nvoid main() {{ {body} made = {scaled}; }}\n"
@@ -203,10 +217,16 @@ def _camera(port: str, count: int = 1) -> Any:
 
 
 def _function_source(signature: Signature, folder: Path) -> type[Node]:
-    shader = f"{signature.name}_neutral.glsl"
-    text = f"{signature.declaration} {{ return {signature.neutral}; }}\n"
-    (folder / shader).write_text(text, encoding="utf-8")
-    return _node("Neutral", made=Function(signature, shader=shader, doc="Neutral everywhere."))
+    """A function that is neutral where a texture may stand for it, and else differs with each of its arguments."""
+    shader = f"{signature.name}_fed.glsl"
+    kind, value = signature.declaration.split()[0], signature.neutral
+    if signature.texture is None and kind.startswith("vec"):
+        takes = re.findall(r"(\w+)\s+(\w+)\s*[,)]", signature.declaration)
+        parts = [f"dot({name}, {of}(0.3))" for of, name in takes if of in ("vec2", "vec3", "vec4")]
+        parts += [f"0.3 * float({name})" for of, name in takes if of in ("float", "int", "uint", "bool")]
+        value = f"{value} + 0.5 + 0.5 * sin({' + '.join(parts) or '0.3'})"
+    (folder / shader).write_text(f"{signature.declaration} {{ return {value}; }}\n", encoding="utf-8")
+    return _node("Called", made=Function(signature, shader=shader, doc="A pattern."))
 
 
 # --- readers ---------------------------------------------------------------------------------------------------------
@@ -222,9 +242,9 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
         return _node("Caller", read=read, made=value, shader=shader)
     if isinstance(port, Views):
         seen = Input(View, kind="view", doc="What is drawn with.")
-        depth = Output(Depth, format="depth32f", clear=1.0, doc="The scene's depth.")
+        depth = Output(Depth, format="depth32f", clear=0.0, doc="The scene's depth.")
         return _node("Drawer", read=seen, made=depth, record=_draw)
-    if getattr(port, "samples", 1) != 1:
+    if getattr(port, "samples", None) not in (None, 1):
         read = Input(AnyTexel, samples="any", doc="What is read.")
         text = "uniform SAMPLER read;\nout vec4 made;\n"
         text += "void main() { made = vec4(texelFetch(read, ivec2(gl_FragCoord.xy), 0)); }\n"

@@ -19,7 +19,7 @@ import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -31,6 +31,8 @@ from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderEr
 _ERRORS = {1: RenderError, 3: InputError, 5: DeviceError}
 _OVERHEAD = 20.0
 """Seconds for what is not the node's: starting Python, importing the framework, opening a context."""
+_LONGEST = 16 << 20
+"""Bytes of a line that the child may send; a report has far fewer."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ class _Child:
 
     def __enter__(self) -> _Child:
         self._trace: IO[bytes] = tempfile.TemporaryFile()
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)  # ours: the child may not come to it
         self._events, child_end = os.pipe()
         words = json.dumps(self.asked | {"pipe": child_end, "trace": self._trace.fileno()})
         program = "from rendergraph.authoring.child import main; main()"
@@ -103,6 +106,7 @@ class _Child:
                 start_new_session=True,
                 text=True,
                 errors="replace",
+                env=os.environ | {"TMPDIR": self._folder.name},
             )
         finally:
             os.close(child_end)
@@ -114,6 +118,7 @@ class _Child:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
+        self._folder.cleanup()
         os.close(self._events)
         self._trace.close()
         self._reader.join(1)
@@ -137,19 +142,20 @@ class _Child:
             InputError: see `check_node`.
         """
         for event in self._heard():
-            if "stage" in event:
-                self.stage, self.what = event["stage"], event["what"]
-            elif "report" in event:
-                found = event["report"]
-                problems = tuple(map(_problem, found["problems"]))
-                return Report(found["node"], tuple(found["variants"]), problems)
-            elif "mistake" in event:
-                raise RuntimeError(event["mistake"])  # ours
-            elif "failed" in event:
-                raise _ERRORS.get(event["exit_code"], RenderError)([_problem(entry) for entry in event["failed"]])
+            match event:
+                case {"stage": str(stage), "what": str(what)}:
+                    self.stage, self.what = stage, what
+                case {"report": {"node": str(node), "variants": list(variants), "problems": list(problems)}}:
+                    if (found := _problems(problems)) is not None:
+                        return Report(node, tuple(variants), found)
+                case {"mistake": str(text)}:
+                    raise RuntimeError(text)  # ours
+                case {"failed": [*problems], "exit_code": int(code)}:
+                    if found := _problems(problems):
+                        raise _ERRORS.get(code, RenderError)(found)
         raise InputError(self._ended())
 
-    def _heard(self) -> Iterator[dict[str, Any]]:
+    def _heard(self) -> Iterator[object]:
         """Events until the process ends.
 
         Raises:
@@ -164,6 +170,7 @@ class _Child:
                 if not chunk:
                     return
                 *lines, rest = (rest + chunk).split(b"\n")
+                rest = rest[-_LONGEST:]
                 for line in lines:
                     yield _event(line)
                     end = time.monotonic() + self._seconds()
@@ -210,15 +217,17 @@ class _Child:
         return Place(shown_file(file), int(found[1]) if found else 0, 1 if found else 0)
 
 
-def _event(line: bytes) -> dict[str, Any]:
+def _event(line: bytes) -> object:
     """What the child says; what a node writes into the pipe itself says nothing."""
     try:
-        event = json.loads(line)
-    except ValueError:
-        return {}
-    return event if isinstance(event, dict) else {}
+        return json.loads(line)
+    except (ValueError, RecursionError):
+        return None
 
 
-def _problem(entry: Mapping[str, Any]) -> Problem:
-    place = entry["place"]
-    return Problem(**{**entry, "place": Place(**place) if place else None})
+def _problems(entries: Sequence[Any]) -> tuple[Problem, ...] | None:
+    """What the child tells; None where somebody else has written."""
+    try:
+        return tuple(Problem(**{**entry, "place": entry["place"] and Place(**entry["place"])}) for entry in entries)
+    except (TypeError, KeyError):
+        return None

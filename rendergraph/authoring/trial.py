@@ -21,7 +21,6 @@ from rendergraph.errors import InputError, Mistake, Place, Problem, RendergraphE
 from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
-from rendergraph.gl.textures import Clear
 from rendergraph.program import prefix
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.session import RenderOptions, Selection, stages
@@ -97,36 +96,38 @@ class Trial:
                 if rest:
                     self.run(replace(variant, outputs=rest))
                 return
-            if variant.end and all(problem.code == "RG435" for problem in error.problems):
-                self.tried.pop()  # more than this device has
+            if variant.name and _is_beyond(error):
+                self.tried.pop()
                 return
-            optional = self._inherited(variant)
+            own = self._own_names()
+            ports = self.type.cls.inputs().items()
+            optional = [n for n, port in ports if port.optional and n not in own and n not in variant.left_out]
             unfit = next((name for name in optional if self._goes(variant.without(self.type.cls, {name}))), None)
+            if unfit is not None and variant.params and not own & variant.params.keys():
+                return  # a parameter and an input of the base's: whether they go together is not the author's matter
             for problem in error.problems:
-                own = self._own(problem, error)
+                here = self._own(problem, error)
                 if unfit is not None:
-                    text = f"{own.text}; tried without '{unfit}', which is inherited"
-                    own = replace(own, text=text, severity="warning")
-                self.say(own)
+                    text = f"{here.text}; tried without '{unfit}', which is inherited"
+                    here = replace(here, text=text, severity="warning")
+                self.say(here)
             self.avoided |= set() if unfit is None else {unfit}
         else:
             self.written |= set(variant.outputs)
 
-    def _inherited(self, variant: Variant) -> list[str]:
-        """The connected optional inputs of a base class: nobody promised that the node combines them with its own."""
+    def _own_names(self) -> set[str]:
+        """What the author's module declares; nobody promised to combine optional inputs of a base with that."""
         cls = self.type.cls
-        own = {name for base in cls.__mro__ if base.__module__ == cls.__module__ for name in vars(base)}
-        ports = cls.inputs().items()
-        return [name for name, port in ports if port.optional and name not in own and name not in variant.left_out]
+        return {name for base in cls.__mro__ if base.__module__ == cls.__module__ for name in vars(base)}
 
     def _goes(self, variant: Variant) -> bool:
-        """Whether a variant draws; what is found then counts."""
+        """Whether a variant draws, or would on a device that has more; what is found then counts."""
         said = {problem: list(names) for problem, names in self.problems.items()}
         try:
             self._run(variant)
-        except RendergraphError:
+        except RendergraphError as error:
             self.problems = said
-            return False
+            return _is_beyond(error)
         self.written |= set(variant.outputs)
         return True
 
@@ -209,7 +210,7 @@ class Trial:
         return stages.resolve(selection, self.around.catalog())
 
     def _expanded(self, variant: Variant) -> Expanded:
-        return stages.expand(stages.link(self._resolved(variant)), RenderOptions(alias=False))
+        return stages.expand(stages.link(self._resolved(variant)), RenderOptions(alias=False, reuse=False))
 
     def _note_files(self, step: Step) -> None:
         names = [name for _, name in step.shaders] if step.node == self.type.name else []
@@ -223,9 +224,9 @@ class Trial:
     def _draw(self, drawing: Drawing, number: int) -> dict[str, npt.NDArray[Any]]:
         """All outputs, after every texture was filled with a poison."""
         linked, runner, executable = drawing.expanded.linked, drawing.runner, drawing.executable
-        plan, memory, device = executable.plan, executable.memory, self.gpu.device
+        plan, memory = executable.plan, executable.memory
         for name, resource in plan.resources.items():
-            if name not in plan.placement:
+            if name not in plan.placement or resource.role == "scene":
                 continue
             if isinstance(resource.desc, BufferDesc):
                 if not self._fills_buffers:
@@ -234,7 +235,8 @@ class Trial:
             else:
                 value = _POISON[FORMATS[resource.desc.format].family][number]
                 for parity in range(memory.parities):
-                    Clear(device, memory.texture(name, parity), value)()
+                    for call in memory.clear(name, parity, value):
+                        call()
         executable.renew()  # what is kept has been filled with a poison, too
         runner.reset()
         scene = linked.scene
@@ -307,6 +309,11 @@ class Trial:
         more = f" and {len(met) - 3} more" if len(met) > 3 else ""
         word = "" if met[0].startswith("without ") else "with "
         return replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
+
+
+def _is_beyond(error: RendergraphError) -> bool:
+    """Whether a variant asks for more than this device has, which says nothing about the node."""
+    return all(problem.code == "RG435" for problem in error.problems)
 
 
 def _is_large(made: Expansion) -> bool:

@@ -21,6 +21,7 @@ class Variant:
         params: parameters that differ.
         left_out: optional inputs that are not connected.
         outputs: the outputs that somebody reads.
+        multisampled: whether inputs that take one sample a texel or several are given several.
         end: whether it takes a number to an end of its range, where the node must do all that it does otherwise.
     """
 
@@ -28,6 +29,7 @@ class Variant:
     params: Mapping[str, Any] = field(default_factory=dict)
     left_out: frozenset[str] = frozenset()
     outputs: tuple[str, ...] = ()
+    multisampled: bool = False
     end: bool = False
 
     def without(self, cls: type[Node], inputs: Set[str]) -> Variant:
@@ -59,6 +61,8 @@ def _all(cls: type[Node]) -> Iterator[Variant]:
         yield Variant(
             "without optional inputs", left_out=frozenset(optional), outputs=_usable(cls, frozenset(optional))
         )
+    if any(isinstance(port, Input) and port.samples == "any" for port in cls.inputs().values()):
+        yield Variant("several samples", outputs=everything, multisampled=True)
     if len(everything) > 1:
         for name in everything:
             yield Variant(f"{name} alone", outputs=(name,))

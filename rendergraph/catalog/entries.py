@@ -102,6 +102,9 @@ class Entries:
             text = f"the shader has {count:,} ports and parameters, {MOST_NAMES} are the limit; a texture holds tables"
             self.say("RG441", text, None)
             return
+        if self.header.threads is not None and self.file.suffix != ".comp":
+            text = "'threads' is a compute shader's; a full-screen pass runs once a texel of what it makes"
+            self.problems.append(self.header.threads.problem("RG443", text, key=True))
         self._match_single_output()
         for name, entry in self.header.inputs.items():
             self._input(name, entry)
@@ -180,6 +183,11 @@ class Entries:
             for key in ("doc", "optional", "many", "size", "filter", "wrap", "anisotropy", "group")
             if key in entry
         }
+        if found is not None and "kind" in entry:
+            kind, declared = entry["kind"].data, f"{found.storage} {found.type} {name}".replace("  ", " ")
+            text = f"the header has '{name}' as a {kind}, but the shader declares '{declared}'; leave one of them out"
+            self.problems.append(entry["kind"].problem("RG444", text))
+            return
         if found is None:
             kind = self._without_declaration(name, entry)
             if kind is None:
@@ -284,6 +292,7 @@ class Entries:
             texel = next((word for word in found.layout if word in FORMATS), None)
             if texel and "like" not in entry:
                 options["format"] = texel
+            return self._holds(name, found, entry)
         elif found.storage == "out" and not found.array:
             integer = found.type.startswith(("i", "u"))
             if integer and "format" not in entry and "like" not in entry:
@@ -292,6 +301,7 @@ class Entries:
                     self.say("RG441", f"no format holds the {found.type} of output '{name}'; use uvec4 or int", found)
             elif not integer and found.type not in ("float", "vec2", "vec3", "vec4"):
                 self.say("RG441", f"output '{name}' is a {found.type}; float, vec2 to vec4, uint and int can be", found)
+            return self._holds(name, found, entry)
         else:
             text = f"the header has output '{name}', but the shader declares '{found.storage} {found.type} {name}'"
             if name in self.header.names:
@@ -300,6 +310,22 @@ class Entries:
                 self.say("RG441", f"'{name}' is an array; declare one out a texture", found)
             return False
         return True
+
+    def _holds(self, name: str, found: Global, entry: Mapping[str, Value]) -> bool:
+        """Whether the format that the header says takes values of the declared type; false and a mistake where not."""
+        known = FORMATS.get(str(entry["format"].data)) if "format" in entry else None
+        if known is None:
+            return True
+        right = {"uint": "u", "int": "i"}.get(known.family, "")
+        if known.is_depth:
+            way = "leave that out, and write gl_FragDepth"
+        elif right != (found.type[0] if found.type[0] in "iu" and not found.type.startswith("image") else ""):
+            way = f"a {known.family} format takes {right}vec4" if right else "that format takes float to vec4"
+        else:
+            return True
+        text = f"format {entry['format'].data} does not hold what '{found.storage} {found.type} {found.name}' is; {way}"
+        self.problems.append(entry["format"].problem("RG444", text))
+        return False
 
     def _add_parameter(self, name: str, entry: Mapping[str, Value]) -> None:
         plain = (found for found in self.globals.declared if found.type in _SCALAR or _VECTOR.match(found.type))

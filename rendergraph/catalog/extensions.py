@@ -12,8 +12,8 @@ from typing import Any
 
 from rendergraph.catalog.configured import plain
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
-from rendergraph.declare.blame import raised_at
-from rendergraph.errors import Place, Problem, shown_file
+from rendergraph.declare.blame import raised_at, told
+from rendergraph.errors import Place, Problem, is_interruption, shown_file
 from rendergraph.stamps import look
 
 GROUP = "rendergraph.extensions"
@@ -60,7 +60,9 @@ def _file(entry: EntryPoint) -> Path:
     """The file an entry's module will come from, found without importing more than its parent; empty where none is."""
     try:
         spec = importlib.util.find_spec(entry.module)
-    except Exception:  # its parent fails to import, which loading will say
+    except BaseException as error:  # its parent fails to import, which loading will say
+        if is_interruption(error):
+            raise
         spec = None
     return Path(spec.origin) if spec is not None and spec.origin else Path()
 
@@ -70,10 +72,12 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     place = Place(shown_file(file)) if file.name else None
     try:
         found = load()
-    except (Exception, SystemExit) as error:  # whatever a stranger's module raises is a mistake in that module
-        text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {type(error).__name__}: {error}"
+    except BaseException as error:  # whatever a stranger's module raises is a mistake in that module
+        if is_interruption(error):
+            raise
+        text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {told(error)}"
         where = (raised_at(error, file.parent) if file.name else None) or place
-        return Source(plugin, file, None, (Problem("RG494", " ".join(text.split()), where),))
+        return Source(plugin, file, None, (Problem("RG494", text, where),))
     if not isinstance(found, Extension):
         text = f"'{value}' of plugin '{plugin}' is {type(found).__name__}, not an Extension"
         return Source(plugin, file, None, (Problem("RG495", text, place),))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
@@ -74,7 +74,12 @@ def read_header(text: str, file: Path, name: str) -> Header:
         text = f"the header {what}; it ends with a line '{END}'"
         raise InputError(_problem(name, lines, at, text))
     # The YAML keeps its lines: what stands above is blank.
-    return _checked(parse("\n" * first + "\n".join(lines[first:last]) + "\n", name, path=file, keep_going=True))
+    found = _checked(parse("\n" * first + "\n".join(lines[first:last]) + "\n", name, path=file, keep_going=True))
+    again = next((number for number in range(last, len(lines)) if _BEGIN.match(lines[number])), None)
+    if again is None:
+        return found
+    text = f"a file has one header, and this one has begun another in line {first}; put both into one"
+    return replace(found, problems=(*found.problems, _problem(name, lines, again, text)))
 
 
 def _problem(name: str, lines: list[str], number: int, text: str) -> Problem:

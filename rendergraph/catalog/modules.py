@@ -6,13 +6,11 @@ import importlib
 import sys
 from pathlib import Path
 
-from pydantic import PydanticUserError
-
 from rendergraph.catalog import find
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes
-from rendergraph.declare.blame import declared_by, raised_at
-from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.declare.blame import declared_by, raised_at, told
+from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 
 
 def load(name: str, listed: Listed) -> NodeType:
@@ -24,7 +22,9 @@ def load(name: str, listed: Listed) -> NodeType:
     place = Place(shown_file(listed.file))
     try:
         module = importlib.import_module(listed.module)
-    except (Exception, SystemExit) as error:  # whatever a stranger's module raises is a mistake in that module
+    except BaseException as error:  # whatever a stranger's module raises is a mistake in that module
+        if is_interruption(error):
+            raise
         raise InputError(_failed(name, listed, error, place)) from error
     classes = [
         value
@@ -58,6 +58,5 @@ def _inherited(cls: type[Node], listed: Listed) -> tuple[Path, ...]:
 
 def _failed(name: str, listed: Listed, error: BaseException, place: Place) -> Problem:
     """The author's own line of what a module raised, or a helper that it imports."""
-    said = getattr(error, "message", error) if isinstance(error, PydanticUserError) else error  # without its link
-    text = f"node type '{name}' cannot be imported: {type(error).__name__}: {said}"
-    return Problem("RG491", " ".join(text.split()), raised_at(error, listed.module, listed.file.parent) or place)
+    text = f"node type '{name}' cannot be imported: {told(error)}"
+    return Problem("RG491", text, raised_at(error, listed.module, listed.file.parent) or place)

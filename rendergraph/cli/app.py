@@ -9,16 +9,19 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
+from copy import copy
 from types import FrameType
 from typing import NoReturn
 
-from rendergraph.cli.output import print_error, say
+from rendergraph.cli.output import be_quiet, only_data, print_error, say
+from rendergraph.cli.watchdog import watch
 from rendergraph.cli.words import click
-from rendergraph.errors import Problem, RendergraphError, suggestion
+from rendergraph.errors import Interruption, Place, Problem, RendergraphError, suggestion
 from rendergraph.version import __version__
 
 VERBS = (
     "run",
+    "view",
     "check",
     "plan",
     "graph",
@@ -28,6 +31,9 @@ VERBS = (
     "sweep",
     "bench",
     "nodes",
+    "pipelines",
+    "scenes",
+    "environments",
     "explain",
     "schema",
     "new-node",
@@ -39,6 +45,7 @@ VERBS = (
 _MEANT = {
     "render": "run",
     "draw": "run",
+    "serve": "view",
     "lint": "check",
     "validate": "check",
     "show": "graph",
@@ -49,11 +56,27 @@ _MEANT = {
 }
 """Words that other programs have for our verbs."""
 
-INTERRUPTED, TERMINATED = 130, 143
+INTERRUPTED = 130
+EXIT_CODES = {
+    0: "done",
+    1: "failed while running: disk, memory, GL",
+    2: "the command line itself: an unknown verb or option, a malformed value",
+    3: "something named there or in a file is missing or wrong: pipeline, scene, mesh, image, shader",
+    4: "a comparison beyond its threshold",
+    5: "no usable GL device",
+    INTERRUPTED: "interrupted",
+    143: "terminated",
+}
 
 
-class _Terminated(BaseException):
-    """SIGTERM arrived; a BaseException, so that nothing on the way up takes it for a failure of its own."""
+def _hush(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    be_quiet(value)
+
+
+_QUIET = click.Option(
+    ["-q", "--quiet"], is_flag=True, is_eager=True, expose_value=False, callback=_hush, help="Say nothing but errors."
+)
+"""Of every verb."""
 
 
 class _Verbs(click.Group):
@@ -65,7 +88,10 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
             return None
-        found: click.Command = importlib.import_module(f"rendergraph.cli.{cmd_name.replace('-', '_')}").command
+        found: click.Command = copy(importlib.import_module(f"rendergraph.cli.{cmd_name.replace('-', '_')}").command)
+        found.params = [*found.params, _QUIET]
+        if found.callback is not None:
+            found.callback = only_data()(found.callback)
         return found
 
     def resolve_command(
@@ -78,7 +104,12 @@ class _Verbs(click.Group):
         return super().resolve_command(ctx, args)
 
 
-@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+_EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:<4} {meaning}" for code, meaning in EXIT_CODES.items())
+
+
+@click.group(
+    cls=_Verbs, epilog=_EPILOG, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.version_option(__version__, prog_name="rendergraph")
 def group() -> None:
     """A laboratory for real-time rendering: a renderer is one YAML file.
@@ -100,8 +131,11 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns:
         The exit code of design.md §7.
     """
+    if args is None:
+        watch()
     words = list(sys.argv[1:] if args is None else args)
     as_json = "--json" in words
+    be_quiet(False)
     try:
         with _terminable():
             code = _invoke(words)
@@ -119,9 +153,10 @@ def main(args: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, EOFError, click.Abort):
         say("interrupted")
         return INTERRUPTED
-    except _Terminated:
-        say("terminated")
-        return TERMINATED
+    except Interruption as signalled:
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            say("terminated")
+        return 128 + signalled.number
     except BrokenPipeError:
         _discard_stdout()  # whoever read us has enough: `rendergraph nodes | head`
         return 0
@@ -130,9 +165,9 @@ def main(args: Sequence[str] | None = None) -> int:
     except OSError as error:
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
-        where = f"{error.filename}: " if error.filename else ""
-        return _told([Problem("RG509", f"{where}{error.strerror or error}")], 1, as_json)
-    except Exception as error:
+        where = Place(str(error.filename)) if error.filename else None
+        return _told([Problem("RG509", error.strerror or str(error), where)], 1, as_json)
+    except BaseException as error:  # an exit, too, that nobody here has asked for
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
         return _told([unexpected(error)], 1, as_json)
@@ -140,7 +175,13 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _invoke(words: list[str]) -> int:
     if "_RENDERGRAPH_COMPLETE" in os.environ:  # the shell asks for completions
-        group.main(words, prog_name="rendergraph", complete_var="_RENDERGRAPH_COMPLETE")
+        from rendergraph.cli.completion import install
+
+        install()
+        try:
+            group.main(words, prog_name="rendergraph", complete_var="_RENDERGRAPH_COMPLETE")
+        except SystemExit as done:
+            return int(done.code or 0)
     try:
         with group.make_context("rendergraph", words) as context:
             group.invoke(context)
@@ -169,7 +210,7 @@ def _usage(error: click.UsageError) -> Problem:
     return Problem("RG500", f"{text[:1].lower()}{text[1:]}; see '{path} --help'")
 
 
-def unexpected(error: Exception) -> Problem:
+def unexpected(error: BaseException) -> Problem:
     """What is said of an exception that nobody meant to be seen."""
     what = f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
     text = f"a mistake in rendergraph, not yours: {what}; RENDERGRAPH_TRACEBACK=1 shows where, please report that "
@@ -189,16 +230,21 @@ def _discard_stdout() -> None:
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """SIGTERM unwinds like Ctrl-C does, so that half-written files are removed."""
+    """SIGTERM and SIGHUP unwind like Ctrl-C does: half-written files are removed, children ended.
+
+    A SIGHUP that is ignored, as under nohup, stays so.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def stop(number: int, frame: FrameType | None) -> NoReturn:
-        raise _Terminated
+        raise Interruption(number)
 
-    before = signal.signal(signal.SIGTERM, stop)
+    asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, stop) for number in asked}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

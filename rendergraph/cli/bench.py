@@ -39,7 +39,7 @@ def command(
 
     linked = stages.link(stages.resolve(selection))
     warn(linked.warnings)
-    expanded = stages.expand(linked, RenderOptions(range(1, frames + 1), fps, alias=not no_alias))
+    expanded = stages.expand(linked, RenderOptions(range(1, frames + 1), fps, alias=not no_alias, timed=True))
     with Gpu(device) as gpu:
         frame = stages.draw_last(expanded, gpu)
     warn(frame.warnings)

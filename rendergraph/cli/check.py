@@ -31,6 +31,7 @@ def command(selection: Selection, as_json: bool) -> None:
     from rendergraph.compare.axes import is_sweep
     from rendergraph.schema import outdated
     from rendergraph.session import stages
+    from rendergraph.session.made import is_picture
     from rendergraph.settings import Roots
 
     if is_sweep(Path(selection.source)):
@@ -47,7 +48,11 @@ def command(selection: Selection, as_json: bool) -> None:
     warn(linked.warnings)
     stages.check(linked)
     graph, path = linked.graph, linked.spec.path
-    stale = path and outdated(path, Roots.around(path, selection.asset_roots), linked.catalog, selection.plugins)
+    stale = (
+        path
+        and not is_picture(path)
+        and outdated(path, Roots.around(path, selection.asset_roots), linked.catalog, selection.plugins)
+    )
     later = [stale] if stale else []
     warn(later)
     width, height = graph.size

@@ -13,7 +13,7 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 
 
 @click.command("check-node", no_args_is_help=True)
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=options.NamedPath())
 @click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb.")
 @click.option(
     "--limit",

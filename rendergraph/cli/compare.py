@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
-from rendergraph.cli.output import Bar, emit, emit_json, megabytes, say, table, warn
+from rendergraph.cli.output import emit, emit_json, megabytes, on_terminal, say, table, warn
 from rendergraph.cli.words import click
-from rendergraph.errors import InputError, Problem, UsageError, suggestion
+from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
 
 if TYPE_CHECKING:
     from rendergraph.compare.values import Comparison, Result
     from rendergraph.declare import Extensions
-    from rendergraph.session import Pipeline
+    from rendergraph.session import Pipeline, Selection
 
 BEYOND = 4
 """Exit code of a comparison beyond its threshold."""
@@ -60,8 +60,22 @@ def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) ->
 
 
 THRESHOLD = options.Parsed("METRIC=NUMBER", _threshold)
+WITH = options.Parsed("'PATH=VALUE …'", options.settings)
 reference_option = click.option(
-    "--reference", metavar="FILE|PIPELINE", help="Measure against this picture or pipeline; the first by default."
+    "--reference",
+    metavar="FILE|PIPELINE",
+    shell_complete=options.offered("pipelines"),
+    help="Measure against this picture or pipeline; the first by default.",
+)
+metric_option = click.option(
+    "--metric",
+    metavar="NODE.PORT",
+    shell_complete=options.offered("ports"),
+    help="Measure this port's texture in place of the picture.",
+)
+title_option = click.option("--title", default="", metavar="TEXT", help="What stands above the report.")
+note_option = click.option(
+    "--note", default="", metavar="TEXT", help="What you say about it, beneath the title; empty lines part paragraphs."
 )
 at_option = click.option(
     "--at",
@@ -74,26 +88,39 @@ at_option = click.option(
 
 
 @click.command("compare", no_args_is_help=True)
-@click.argument("pipelines", nargs=-1, required=True)
+@click.argument("pipelines", nargs=-1, required=True, shell_complete=options.offered("pipelines"))
+@click.option(
+    "--with",
+    "withs",
+    multiple=True,
+    type=WITH,
+    shell_complete=options.offered("settings"),
+    help="Compare the pipeline with these settings, several in one text; one alone with the pipeline as it is.",
+)
 @reference_option
+@metric_option
 @options.selection_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), default=10, show_default=True, help="Measured frames.")
 @at_option
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a report, HTML."
-)
+@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a report, HTML.")
 @click.option(
     "--fail-above", "thresholds", multiple=True, type=THRESHOLD, help="Exit 4 where a metric is above: flip=0.02."
 )
+@title_option
+@note_option
 @options.json_option
 @options.device_option
 def command(
     pipelines: tuple[str, ...],
+    withs: tuple[tuple[str, ...], ...],
     reference: str | None,
+    metric: str | None,
     frames: int,
     frame: int,
     output: Path | None,
     thresholds: tuple[Threshold, ...],
+    title: str,
+    note: str,
     as_json: bool,
     device: int | None,
     select: options.Select,
@@ -102,28 +129,56 @@ def command(
 
     All are drawn on one scene, with one camera and at one size: those of the first, or what the options say. Options
     such as -s hold for all pipelines, not for the reference. Times are medians of frames that the pipelines take turns
-    to draw.
+    to draw. Pictures alone, with no option that changes what they were made with, are compared as they are.
 
     \b
     Examples:
       rendergraph compare forward forward-prepass --size 320x180
       rendergraph compare forward shading-flat --size 320x180 -n 20 -o report.html
+      rendergraph compare shadow-pcf --with shadows.taps=1 --with 'shadows.taps=8 sun.resolution=512' --size 160x90
+      rendergraph compare ssao-hemisphere ssao-disc --metric ao.occlusion --size 160x90 -n 2
+      rendergraph compare soft.png hard.png
       rendergraph compare forward-prepass --reference forward --size 160x90 --fail-above flip=0.02 --json
     """
-    from rendergraph.compare import compare
-
-    if len(pipelines) < 2 and reference is None:
-        text = "there is one pipeline and nothing to compare it with; name another, or a --reference"
+    first = pipelines[0]
+    if withs and len(pipelines) > 1:
+        raise UsageError(Problem("RG500", "--with makes variants of one pipeline; name one, or write each as a file"))
+    if len(pipelines) < 2 and reference is None and not withs:
+        ways = "name another, a --reference, or settings: --with NODE.PARAM=VALUE"
+        text = f"there is one pipeline and nothing to compare it with; {ways}"
         raise UsageError(Problem("RG500", text))
     if output is not None:
         check_page(output)
-    loaded = [_load(name, pipelines, select) for name in pipelines]
-    check_thresholds(thresholds, loaded[0].link().catalog.extensions)
-    bar = Bar("steps")
-    found = compare(
-        loaded, load_reference(reference, select), frames=frames, frame=frame, device=device, progress=bar.show
-    )
-    bar.clear()
+    elif title or note:
+        raise UsageError(Problem("RG500", "--title and --note are the report's; write one: -o report.html"))
+    if not withs and metric is None and _as_they_are(pipelines, reference, select):
+        from rendergraph.catalog import Catalog
+        from rendergraph.compare import compare_pictures
+
+        plugins = select("").plugins
+        check_thresholds(thresholds, Catalog.discover(plugins).extensions)
+        found = compare_pictures(pipelines, reference, plugins=plugins)
+    else:
+        from rendergraph.compare import compare
+
+        names: list[str] = []
+        if withs:
+            variants = [(), *withs] if len(withs) == 1 else list(withs)
+            names = [" ".join(settings) or Path(first).stem for settings in variants]
+            loaded = [_with(settings, select(first)) for settings in variants]
+        else:
+            loaded = [_load(name, pipelines, select) for name in pipelines]
+        check_thresholds(thresholds, loaded[0].link().catalog.extensions)
+        found = compare(
+            loaded,
+            load_reference(reference, select),
+            metric=metric,
+            names=names,
+            frames=frames,
+            frame=frame,
+            device=device,
+            progress=on_terminal(),
+        )
     warn(found.warnings)
     for note in found.notes:
         say(note)
@@ -132,9 +187,12 @@ def command(
     if output is not None:
         from rendergraph.compare.report import comparison_page
 
-        words = ["compare", *pipelines, *options.words(loaded[0].selection), *_reference_words(reference)]
+        words = ["compare", *pipelines, *(w for settings in withs for w in ("--with", " ".join(settings)))]
+        words += ["--metric", metric] if metric else []
+        words += [*options.words(select(first)), *_reference_words(reference)]
         words += ["-n", str(frames), *(["--at", str(frame)] if frame != 1 else []), "-o", str(output)]
-        options.write(comparison_page(found, typed(words)), output)
+        words += [*(["--title", title] if title else []), *(["--note", note] if note else [])]
+        options.write(comparison_page(found, typed(words), title=title, note=note), output)
         written["report"] = str(output)
     if as_json:
         emit_json(found.as_json() | written | {"exceeded": beyond})
@@ -143,9 +201,22 @@ def command(
         if output is not None:
             say(f"report: {output}")
     for text in beyond:
-        say(text)
+        say(text, always=True)
     if beyond:
         raise click.exceptions.Exit(BEYOND)
+
+
+def _as_they_are(names: Sequence[str], reference: str | None, select: options.Select) -> bool:
+    """Whether these are pictures that need not be drawn: nothing is said that changes them, or how they are drawn."""
+    from rendergraph.session import Selection
+    from rendergraph.session.made import is_picture
+
+    source, context = click.core.ParameterSource, click.get_current_context()
+    drawn = {"frames", "frame", "device"} & {
+        name for name in context.params if context.get_parameter_source(name) is source.COMMANDLINE
+    }
+    changed = select("") != Selection("", plugins=select("").plugins)
+    return not drawn and not changed and all(map(is_picture, [*names, *([reference] if reference else [])]))
 
 
 def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
@@ -157,6 +228,9 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
     try:
         return options.linked(select(name))
     except InputError as error:
+        if error.problems[0].code == "RG510":
+            way = f"; to measure pipelines against it: --reference {name}"
+            raise InputError([replace(problem, text=problem.text + way) for problem in error.problems]) from None
         others = [other for other in names if other != name]
         if not others:
             raise
@@ -169,13 +243,30 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
         ) from None
 
 
+def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
+    """The pipeline with the settings of one variant; what is wrong with them is said of `--with`.
+
+    Raises:
+        InputError: with every mistake found on the way.
+    """
+    try:
+        return options.linked(replace(selection, sets=(*selection.sets, *settings)))
+    except InputError as error:
+        raise InputError([_of_with(problem, settings) for problem in error.problems]) from None
+
+
+def _of_with(problem: Problem, settings: Sequence[str]) -> Problem:
+    where = problem.place.file.removeprefix("--set ") if problem.place else ""
+    return replace(problem, place=Place(f"--with '{where}'")) if where in settings else problem
+
+
 def _of_setting(problem: Problem) -> bool:
     return problem.place is not None and problem.place.file.startswith("--set ")
 
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """The reference: a picture's path, or a pipeline on the same scene, without the variants' settings."""
-    from rendergraph.compare.reference import is_picture
+    from rendergraph.session.made import is_picture
 
     if reference is None:
         return None
@@ -205,7 +296,7 @@ def exceeded(results: Sequence[Result], thresholds: Sequence[Threshold]) -> list
     for result in results:
         values = {**result.metrics.as_json(), "radiance_rmse": result.radiance_rmse, **result.metrics.plugins}
         for threshold in thresholds:
-            value = values.get(threshold.metric)
+            value = values.get(threshold.metric) if not result.not_finite else math.nan
             if value is None or not value <= threshold.most:
                 shown = "unknown" if value is None else f"{value:.6g}"
                 found.append(f"{result.name}: {threshold.metric} is {shown}, above {threshold.most:g}")
@@ -221,61 +312,52 @@ def _reference_words(reference: str | None) -> list[str]:
     return [] if reference is None else ["--reference", reference]
 
 
-def plugin_metrics(results: Sequence[Result]) -> list[str]:
-    """The names of plugins' metrics."""
-    return list(dict.fromkeys(name for result in results for name in result.metrics.plugins))
-
-
-def summary_rows(results: Sequence[Result]) -> list[tuple[object, ...]]:
-    """A row a variant: errors, times, passes, bytes."""
+def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
+    """What stands above the columns, and a row a variant: errors, times, passes, bytes; of pictures errors alone."""
+    more = list(dict.fromkeys(name for result in results for name in result.columns))
+    heads: tuple[str, ...] = ("", "FLIP", "RMSE", "PSNR", "SSIM", *more)
     rows: list[tuple[object, ...]] = []
-    plugins = plugin_metrics(results)
     for result in results:
-        m, times = result.metrics, result.times
+        m = result.metrics
         psnr = "∞" if m.psnr is None else f"{m.psnr:.2f}"
-        gpu = f"{times.gpu_ms.median:.2f}" if times.gpu_ms else "–"
-        spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
-        size = megabytes(int(str(result.memory["allocated_bytes"])))
-        rows.append(
-            (
-                result.name,
-                f"{m.flip:.4f}",
-                f"{m.rmse:.4f}",
-                psnr,
-                f"{m.ssim:.4f}",
-                *(f"{m.plugins.get(name, math.nan):.4g}" for name in plugins),
-                gpu,
-                spread,
-                f"{times.cpu_ms.median:.2f}",
-                result.pass_count,
-                size,
-            )
-        )
-    return rows
+        errors = (f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}")
+        rows.append((result.name, *errors, *(_told(result.columns.get(name)) for name in more)))
+    if not all(result.memory for result in results):
+        return heads, rows
+    costs = [_costs(result) for result in results]
+    return (*heads, "GPU ms", "10–90 %", "CPU ms", "passes", "textures"), [
+        (*row, *cost) for row, cost in zip(rows, costs, strict=True)
+    ]
 
 
-def heads(results: Sequence[Result]) -> tuple[str, ...]:
-    """What stands above the columns."""
-    times = ("GPU ms", "10–90 %", "CPU ms", "passes", "textures")
-    return ("", "FLIP", "RMSE", "PSNR", "SSIM", *plugin_metrics(results), *times)
+def _told(value: float | None) -> str:
+    return "–" if value is None else f"{value:.4g}"
+
+
+def _costs(result: Result) -> tuple[object, ...]:
+    times = result.times
+    gpu = f"{times.gpu_ms.median:.2f}" if times.gpu_ms else "–"
+    spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
+    size = megabytes(int(str(result.memory["allocated_bytes"])))
+    return gpu, spread, f"{times.cpu_ms.median:.2f}", result.pass_count, size
 
 
 def _text(found: Comparison) -> str:
     width, height = found.size
-    head = heads(found.results)
-    lines = [
-        f"{found.scene}, {width}×{height}, against {found.reference.name}, on {found.device.get('renderer')}",
-        table(summary_rows(found.results), head, right=range(1, len(head))),
-    ]
+    head, rows = summary(found.results)
+    where = [found.scene, f"{width}×{height}", f"against {found.reference.name}"]
+    where += [f"of {found.metric}"] if found.metric else []
+    where += [f"on {found.device.get('renderer')}"] if found.device else []
+    lines = [", ".join(filter(None, where)), table(rows, head, right=range(1, len(head)))]
     if found.software:
         lines.append(SOFTWARE)
-    lines += [line for result in found.results if (line := _first(found, result))]
+    lines += [line for result in found.results if (line := _first(found, result) or _made(found, result))]
     return "\n".join(lines)
 
 
 def _first(found: Comparison, result: Result) -> str:
     base = found.base[0] if found.base else ""
-    if result.name == base or result.difference is None:
+    if result.name == base or result.difference is None or result.plan is None:
         return ""
     if result.first is None:
         return f"{result.name}: every pass draws what it draws in {base}"
@@ -286,3 +368,12 @@ def _first(found: Comparison, result: Result) -> str:
     return (
         f"{result.name}: the first pass that differs from {base} is {first.node} ({first.port}){first.after}, {amount}"
     )
+
+
+def _made(found: Comparison, result: Result) -> str:
+    """What a picture was made with and the first of them was not, as `diff` says it."""
+    if result.difference is None or found.base is None or result.name == found.base[0]:
+        return ""
+    from rendergraph.diff import diff_text
+
+    return diff_text(result.difference).rstrip() if result.difference else f"{result.name}: made as {found.base[0]} was"

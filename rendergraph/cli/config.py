@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING
 from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
-from rendergraph.errors import InputError, Place, Problem
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
-
-_PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr")
 
 
 @click.command("config", no_args_is_help=True)
@@ -31,9 +28,10 @@ def command(selection: Selection, as_json: bool) -> None:
       rendergraph config forward -s light.ambient=0.1 --json
       rendergraph config forward.png
     """
-    from rendergraph.session import stages
+    from rendergraph.session import Selection, stages
+    from rendergraph.session.made import is_picture
 
-    if Path(selection.source).suffix.lower() in _PICTURES:
+    if is_picture(selection.source) and selection == Selection(selection.source):
         _of_picture(Path(selection.source), as_json)
         return
     spec = stages.resolve(selection).spec
@@ -46,12 +44,9 @@ def command(selection: Selection, as_json: bool) -> None:
 
 
 def _of_picture(path: Path, as_json: bool) -> None:
-    from rendergraph.images import read_metadata
+    from rendergraph.session.made import metadata
 
-    found = read_metadata(path)
-    if "pipeline" not in found:
-        text = "the picture does not say how it was made; EXR and PNG files that rendergraph wrote do"
-        raise InputError(Problem("RG510", text, Place(str(path))))
+    found = metadata(path)
     if as_json:
         emit_json({"picture": str(path), "yaml": found["pipeline"], "metadata": found})
         return

@@ -35,11 +35,32 @@ def describe(found: NodeType, extensions: Extensions | None = None) -> dict[str,
         "plugin": found.plugin,
         "file": str(found.file),
         "doc": inspect.getdoc(cls) or "",
+        "extends": [_imported(base) for base in (cls, *_bases(cls))] if _is_importable(found) else [],
         "inputs": [_input(name, port) | _group(groups.get(name)) for name, port in cls.inputs().items()],
         "outputs": [_output(name, port) for name, port in outputs.items()],
         "internal": [_made(name, port) for name, port in internal.items()],
         "parameters": [_parameter(one, extensions or NO_EXTENSIONS) for one in cls.parameters().values()],
     }
+
+
+def _imported(cls: type) -> str:
+    return f"from {cls.__module__} import {cls.__name__}"
+
+
+def _bases(cls: type) -> list[type]:
+    """The nodes that a class extends, the nearest first."""
+    from rendergraph.declare import Node
+
+    return [base for base in cls.__mro__[1:] if issubclass(base, Node) and base is not Node]
+
+
+def _is_importable(found: NodeType) -> bool:
+    """Whether others get the class by an import: it comes with an installed package."""
+    from importlib.metadata import entry_points
+
+    from rendergraph.catalog.catalog import GROUP
+
+    return not found.is_shader and any(entry.name == found.plugin for entry in entry_points(group=GROUP))
 
 
 def _group(group: str | None) -> dict[str, str]:

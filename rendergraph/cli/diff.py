@@ -10,13 +10,13 @@ from rendergraph.cli.words import click
 
 
 @click.command("diff", no_args_is_help=True)
-@click.argument("a")
-@click.argument("b")
+@click.argument("a", shell_complete=options.offered("pipelines"))
+@click.argument("b", shell_complete=options.offered("pipelines"))
 @options.selection_options
 @click.option(
     "--svg",
     "picture",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=options.NamedPath(dir_okay=False),
     metavar="FILE",
     help="Draw both graphs with the difference coloured.",
 )

@@ -13,7 +13,7 @@ from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json, table
 from rendergraph.cli.words import click
 
-_OPTIONAL_FEATURES = ("memory objects",)
+_OPTIONAL_FEATURES = ("memory objects", "depth bounds")
 _SECONDS = 60
 NO_DEVICE = 5
 
@@ -114,7 +114,21 @@ def _advice(asked: dict[str, Any], devices: list[dict[str, Any]], packages: dict
     broken = [device for device in devices if not device["usable"] and not device.get("software")]
     if broken:
         advice.append("update the driver of the device that cannot be used: OpenGL 4.5 is needed")
+    if any(_overruns(device) for device in devices):
+        advice.append(
+            "unset GALLIUM_DRIVER, or use Mesa 23 or newer: zink over lavapipe of Mesa 22 crashes on some programs"
+        )
     return advice
+
+
+def _overruns(device: dict[str, Any]) -> bool:
+    """Whether the device is zink over Mesa 22's lavapipe.
+
+    That looks for uniforms to inline behind every branch, and notes those of the block it numbers 4 behind the end of
+    its table, so that the next draw reads through a wild pointer. Which block has that number the driver decides.
+    """
+    version = re.search(r"Mesa (\d+)", device.get("version", ""))
+    return device.get("renderer", "").startswith("zink (llvmpipe") and version is not None and int(version[1]) <= 22
 
 
 def _text(report: dict[str, Any]) -> str:

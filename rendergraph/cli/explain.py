@@ -25,22 +25,29 @@ FILES = ("pipeline", "scene", "sweep", "settings", "header")
 
 
 @click.command("explain", no_args_is_help=True)
-@click.argument("topic")
+@click.argument("topic", shell_complete=options.offered("topics"))
 @click.option("--glsl", is_flag=True, help="Print the program of the node: what is in scope, and its final text.")
-@click.option("--pipeline", metavar="PIPELINE", help="The program that node TOPIC of this pipeline has.")
+@click.option(
+    "--pipeline",
+    metavar="PIPELINE",
+    shell_complete=options.offered("pipelines"),
+    help="The program that node TOPIC of this pipeline has.",
+)
 @click.option("--step", type=click.IntRange(min=0), metavar="N", help="Which of the node's steps, as `plan` counts.")
 @options.selection_options
 @options.json_option
 def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
-    """Explain a node type, an error code or a file.
+    """Explain a node, pipeline, scene, error code or file.
 
-    `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of such a file; the path of a shader file
-    explains the node that it is. With --glsl a type is shown in a small pipeline, or TOPIC is a node of
+    `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of such a file; the path of a file explains the
+    pipeline, the scene or the node that it is. With --glsl a type is shown in a small pipeline, or TOPIC is a node of
     --pipeline; either is changed by the options that `run` has.
 
     \b
     Examples:
       rendergraph explain tonemap
+      rendergraph explain forward
+      rendergraph explain cornell_box
       rendergraph explain RG103
       rendergraph explain scene
       rendergraph explain tonemap --glsl
@@ -65,17 +72,23 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
         emit_json({"file": topic, "keys": keys}) if as_json else emit(_keys_text(topic, keys))
         return
     from rendergraph.catalog import SHADERS, Catalog
+    from rendergraph.resources import shipped_pipelines, shipped_scenes
 
     catalog = Catalog.discover(plugins)
     warn(catalog.notes)
     if topic.endswith(SHADERS):
         catalog = catalog.with_file(topic, Path(topic))
+    shown = None if glsl else _file(topic, select)
+    if topic not in catalog and shown is not None:
+        emit_json(shown[0]) if as_json else emit(shown[1])
+        return
     if topic not in catalog:
-        known = [*catalog.names(), *FILES]
+        known = [*catalog.names(), *FILES, *shipped_pipelines(), *shipped_scenes()]
         beside = next((f"{topic}{end}" for end in SHADERS if Path(f"{topic}{end}").is_file()), None)
         if beside is not None:
             raise InputError(Problem("RG511", f"nothing is called '{topic}'; did you mean './{beside}'?"))
-        text = f"nothing is called '{topic}'{suggestion(topic, known)}; `rendergraph nodes` lists the node types"
+        hint = suggestion(topic, known)
+        text = f"nothing is called '{topic}'{hint}; `nodes`, `pipelines` and `scenes` list what there is"
         raise InputError(Problem("RG511", text))
     found = catalog.get(topic)
     if glsl:
@@ -85,7 +98,24 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
     if any("added" in parameter for parameter in described["parameters"]):
         warn(catalog.extensions.warnings)
     warn(found.warnings)
-    emit_json(described) if as_json else emit(_node_text(described))
+    if as_json:
+        emit_json((shown[0] if shown else {}) | described)
+    else:
+        emit(_node_text(described) + (f"\n\n{shown[1]}" if shown else ""))
+
+
+def _file(topic: str, select: Select) -> tuple[dict[str, Any], str] | None:
+    """The pipeline or the scene that a topic names, as values and as text."""
+    from rendergraph.cli import about
+
+    kind = about.kind_of(topic)
+    if kind == "pipeline":
+        found = about.pipeline(topic, select)
+        return found, about.pipeline_text(found)
+    if kind == "scene":
+        found = about.scene(topic, select)
+        return found, about.scene_text(found)
+    return None
 
 
 def _program(linked: Linked, node: str, step: int | None, as_json: bool) -> None:
@@ -214,6 +244,8 @@ def _node_text(node: dict[str, Any]) -> str:
     ]
     if added:
         parts.append("Choices of plugins\n" + _block(added))
+    if node["extends"]:
+        parts.append("To extend it, or what it stands on\n" + _indented("\n".join(node["extends"])))
     parts.append("In a file\n" + _indented(node["example"]))
     return "\n\n".join(filter(None, parts))
 

@@ -24,7 +24,7 @@ _FORMATS = {".txt": "text", ".dot": "dot", ".gv": "dot", ".mmd": "mermaid", ".sv
     type=click.Choice(["text", "dot", "mermaid", "svg"]),
     help="What to draw it as; by default what the file's extension says, else text.",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
+@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
 def command(selection: Selection, format_name: str | None, output: Path | None, as_json: bool) -> None:
     """Draw the graph as text, DOT, Mermaid or SVG.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import re
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial, wraps
@@ -58,14 +60,14 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versi
 
 
 def _size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,9})[x×](\d{1,9})", text)
+    found = re.fullmatch(r"([0-9]{1,9})[x×]([0-9]{1,9})", text)
     if not found or int(found[1]) < 1 or int(found[2]) < 1:
         raise ValueError(f"'{text}' is not WIDTHxHEIGHT, as in 1280x720")
     return int(found[1]), int(found[2])
 
 
 def _frames(text: str) -> range:
-    found = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", text)
+    found = re.fullmatch(r"([0-9]{1,9})(?:-([0-9]{1,9}))?", text)
     first, last = (int(found[1]), int(found[2] or found[1])) if found else (0, 0)
     if not 1 <= first <= last:
         raise ValueError(f"'{text}' is not FIRST-LAST, as in 1-10; frame 1 is the first")
@@ -77,6 +79,15 @@ def _setting(text: str) -> str:
     if not equals or not name.strip():
         raise ValueError(f"'{text}' is not PATH=VALUE, as in light.ambient=0")
     return text
+
+
+def settings(text: str) -> tuple[str, ...]:
+    """Several settings in one text, as a shell would split it.
+
+    Raises:
+        ValueError: one of them is none, or a quote is not closed.
+    """
+    return tuple(_setting(word) for word in shlex.split(text))
 
 
 def _output(text: str) -> Target:
@@ -105,7 +116,7 @@ def _picture(name: str, text: str) -> Path:
 
 def _limit(text: str) -> tuple[str, int]:
     name, _, number = text.partition("=")
-    if not name or not re.fullmatch(r"\d{1,18}", number):
+    if not name or not re.fullmatch(r"[0-9]{1,18}", number):
         raise ValueError(f"'{text}' is not NAME=N, as in yaml-depth=100")
     return name, int(number)
 
@@ -127,7 +138,22 @@ OUTPUT = Parsed("[NAME=]FILE", _output)
 TAP = Parsed("NODE.PORT=FILE", _tap)
 LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
-_PATH = click.Path(path_type=Path)
+
+
+class NamedPath(click.Path):
+    """A path that was typed, and not left out: an empty one would mean the current folder."""
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True) -> None:
+        super().__init__(file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path."""
+        if value == "" or "\0" in str(value):
+            self.fail(f"'{value}' names no file" + ("" if self.file_okay else " and no folder"), param, ctx)
+        return super().convert(value, param, ctx)
+
+
+_PATH = NamedPath()
 _FIELDS = ("scene", "camera", "environment", "size", "sets", "patches", "asset_roots", "limits", "plugins")
 """Of a `Selection`, all that an option sets."""
 
@@ -138,6 +164,17 @@ plugin_option = click.option(
 device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
 
 
+def offered(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
+    """What a shell offers on TAB, a function of `rendergraph.cli.completion`, looked up when one asks."""
+
+    def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
+        completion = importlib.import_module("rendergraph.cli.completion")  # it knows the verbs
+        found: list[Any] = getattr(completion, what)(ctx, param, incomplete)
+        return found
+
+    return complete
+
+
 def pipeline_options(function: F) -> F:
     """The pipeline, and everything that changes it before anything looks at it; the verb gets it as `selection`."""
 
@@ -145,7 +182,7 @@ def pipeline_options(function: F) -> F:
     def selected(*, pipeline: str, select: Select, **given: Any) -> None:
         function(selection=select(pipeline), **given)
 
-    return click.argument("pipeline")(selection_options(selected))  # type: ignore[return-value]
+    return click.argument("pipeline", shell_complete=offered("pipelines"))(selection_options(selected))  # type: ignore[return-value]
 
 
 def selection_options(function: F) -> F:
@@ -161,8 +198,18 @@ def selection_options(function: F) -> F:
     decorated: Callable[..., Any] = selecting
     for decorate in reversed(
         [
-            click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb."),
-            click.option("--camera", metavar="NAME", help="See it through this camera of the scene."),
+            click.option(
+                "--scene",
+                metavar="FILE",
+                shell_complete=offered("scenes"),
+                help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb.",
+            ),
+            click.option(
+                "--camera",
+                metavar="NAME",
+                shell_complete=offered("cameras"),
+                help="See it through this camera of the scene.",
+            ),
             click.option(
                 "--environment", type=_PATH, metavar="FILE", help="Light it by this picture of the sky (.hdr, .exr)."
             ),
@@ -173,6 +220,7 @@ def selection_options(function: F) -> F:
                 "sets",
                 multiple=True,
                 type=SETTING,
+                shell_complete=offered("settings"),
                 help="Set a parameter, rewire an input, swap a type, take a node out: ao.radius=0.5, "
                 "light.lookup=null, sun.type=T, ao.enabled=false.",
             ),
@@ -267,6 +315,6 @@ def write(text: str, output: Path) -> None:
     check_target(output)
     with staged([output]) as (part,):
         try:
-            part.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+            part.write_text(text.rstrip("\n") + "\n", encoding="utf-8", errors="backslashreplace")
         except OSError as error:
             raise failed(output, error.strerror or str(error)) from error

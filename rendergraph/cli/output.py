@@ -3,41 +3,101 @@
 from __future__ import annotations
 
 import json
-import math
+import os
 import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from contextvars import ContextVar
+from typing import Any, TextIO
 
 from rendergraph.errors import Problem
+from rendergraph.jsonable import jsonable
 
+_RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
 _CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+
+
+_DATA: ContextVar[TextIO | None] = ContextVar("data")
+"""The process's stdout while a verb runs."""
+
+
+@contextmanager
+def only_data() -> Iterator[None]:
+    """What `emit` is given goes to stdout, and what anybody else prints, such as a plugin, to stderr."""
+    token = _DATA.set(sys.stdout)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _DATA.reset(token)
+
+
+def data_stream() -> TextIO | None:
+    """Where data goes; None where the process has no such stream."""
+    return _DATA.get(sys.stdout)
 
 
 def emit(text: str) -> None:
     """Data, to stdout, with one line end."""
-    if sys.stdout is not None:
-        sys.stdout.write(_printable(text, sys.stdout) + "\n")
+    stream = data_stream()
+    if stream is not None:
+        stream.write(_printable(text, stream) + "\n")
 
 
 def emit_json(document: Any, *, line: bool = False) -> None:
     """One JSON document to stdout, in one line if asked; infinite and undefined numbers become null."""
-    emit(json.dumps(_plain(document), indent=None if line else 2, ensure_ascii=False, default=str))
+    emit(json.dumps(jsonable(document), indent=None if line else 2, ensure_ascii=False, default=str))
 
 
-def say(text: str) -> None:
-    """A word to the person, on stderr."""
+class _Voice:
+    """How much is said: `--quiet` leaves errors alone."""
+
+    quiet = False
+
+
+def be_quiet(quiet: bool) -> None:
+    """Say nothing but errors from now on, or everything again."""
+    _Voice.quiet = quiet
+
+
+def say(text: str, *, always: bool = False) -> None:
+    """A word to the person, on stderr; `always` where it is why the exit code is not 0."""
+    if always or not _Voice.quiet:
+        _write(_printable(text, sys.stderr))
+
+
+def tell(problem: Problem) -> None:
+    """A mistake or a warning: as it is in a log, on a terminal with `error:` before its code and in colour."""
+    if problem.severity == "warning" and _Voice.quiet:
+        return
+    text = _printable(str(problem), sys.stderr)
+    _write(_painted(problem, text) if sys.stderr is not None and sys.stderr.isatty() else text)
+
+
+def _painted(problem: Problem, text: str) -> str:
+    place = _printable(f"{problem.place}: ", sys.stderr) if problem.place else ""
+    rest = text[len(place) :].removeprefix("warning: ")
+    first, *shown = rest.split("\n")
+    word, hue = ("warning:", _YELLOW) if problem.severity == "warning" else ("error:", _RED)
+    if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return f"{place}{word} {rest}"
+    shown = [*shown[:-1], f"{hue}{shown[-1]}{_PLAIN}"] if shown else []  # the mark beneath the line
+    return "\n".join([f"{_BOLD}{place}{hue}{word}{_PLAIN} {first}", *shown])
+
+
+def _write(text: str) -> None:
     if sys.stderr is not None:
-        sys.stderr.write(_printable(text, sys.stderr) + "\n")
+        sys.stderr.write(text + "\n")
         sys.stderr.flush()
 
 
 def warn(problems: Sequence[Problem]) -> None:
     """Warnings, each once."""
-    for text in dict.fromkeys(str(problem) for problem in problems):
-        say(text)
+    for problem in {str(problem): problem for problem in problems}.values():
+        tell(problem)
 
 
 class Warnings:
@@ -48,9 +108,7 @@ class Warnings:
 
     def say(self, problems: Sequence[Problem]) -> None:
         """Those that have not been said."""
-        for text in dict.fromkeys(str(problem) for problem in problems):
-            if text not in self._said:
-                say(text)
+        warn([problem for problem in problems if str(problem) not in self._said])
         self._said.update(str(problem) for problem in problems)
 
 
@@ -58,6 +116,8 @@ def say_summary(report: dict[str, Any]) -> None:
     """Of what `run --json` prints: what was not drawn, how large, how long and on what."""
     for node, reason in report["culled"].items():
         say(f"not drawn: {node}: {reason}")
+    for name, value in report["figures"].items():
+        say(f"{name}: {', '.join(f'{number:.6g}' for number in (value if isinstance(value, list) else [value]))}")
     device, (width, height) = report["device"], report["size"]
     passes = amount(len(report["passes"]), "pass", "passes")
     text = f"{width}×{height}, {passes}, {report['frame_ms']['median']:.1f} ms a frame"
@@ -67,7 +127,11 @@ def say_summary(report: dict[str, Any]) -> None:
 def print_error(problems: Sequence[Problem], exit_code: int, *, as_json: bool) -> None:
     """What stopped us: in words on stderr, and as the document of `--json` on stdout."""
     for problem in problems:
-        say(str(problem))
+        tell(problem)
+    from rendergraph.keys import MOST_PROBLEMS
+
+    if len(problems) >= MOST_PROBLEMS:
+        say(f"these are the first {len(problems)} mistakes; there may be more", always=True)
     if as_json:
         emit_json({"error": error_document(problems, exit_code)})
 
@@ -82,7 +146,7 @@ class Progress:
 
     def __init__(self, total: int) -> None:
         self._total = total
-        self._on = total > 1 and sys.stderr is not None and sys.stderr.isatty()
+        self._on = total > 1 and on_terminal()
 
     def show(self, done: int) -> None:
         """Say how many are done."""
@@ -97,28 +161,9 @@ class Progress:
             sys.stderr.flush()
 
 
-class Bar:
-    """A bar that fills on a terminal, nothing elsewhere."""
-
-    _WIDTH = 30
-
-    def __init__(self, word: str) -> None:
-        self._word = word
-        self._on = sys.stderr is not None and sys.stderr.isatty()
-
-    def show(self, done: int, total: int) -> None:
-        """Say how many of how many are done."""
-        if self._on:
-            full = self._WIDTH * done // max(1, total)
-            bar = _printable("█" * full + "·" * (self._WIDTH - full), sys.stderr)
-            sys.stderr.write(f"\r{bar} {done} of {total} {self._word}")
-            sys.stderr.flush()
-
-    def clear(self) -> None:
-        """Leave the line as it was."""
-        if self._on:
-            sys.stderr.write("\r" + " " * (self._WIDTH + 30) + "\r")
-            sys.stderr.flush()
+def on_terminal() -> bool:
+    """Whether somebody watches: how far things are is shown there and nowhere else."""
+    return sys.stderr is not None and sys.stderr.isatty() and not _Voice.quiet
 
 
 def table(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = ()) -> str:
@@ -149,7 +194,8 @@ def table(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right:
 
 def terminal_width() -> int:
     """Columns of the terminal that stdout is, without bound elsewhere."""
-    if sys.stdout is not None and sys.stdout.isatty():
+    stream = data_stream()
+    if stream is not None and stream.isatty():
         return shutil.get_terminal_size().columns
     return 1 << 20
 
@@ -169,13 +215,3 @@ def _printable(text: str, stream: Any) -> str:
     text = _CONTROL.sub(lambda found: repr(found[0])[1:-1], text)
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value

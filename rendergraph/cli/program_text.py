@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli.output import amount
@@ -50,8 +51,11 @@ def shown_at_work(found: NodeType, catalog: Catalog, select: Select) -> tuple[Li
     patch = {} if names else yaml.safe_load(text)
     selection = select(names[0] if names else patch.pop("extends"))
     selection = replace(selection, patches=(*([patch] if patch else []), *selection.patches))
-    linked = stages.link(stages.resolve(selection, catalog))
-    nodes = [node.id for node in linked.graph.nodes if node.type.name == found.name]
+    for around in (selection, replace(selection, environment=selection.environment or Path("studio"))):
+        linked = stages.link(stages.resolve(around, catalog))
+        nodes = [node.id for node in linked.graph.nodes if node.type.name == found.name]
+        if nodes or not linked.graph.unlit:  # else it takes part where the scene has an environment
+            break
     if not nodes:
         raise InputError(Problem("RG511", f"what was set leaves no node of type '{found.name}'"))
     return linked, nodes[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,42 +14,56 @@ from rendergraph.cli.options import Target
 from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say_summary
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Place, Problem, UsageError
+from rendergraph.stamps import looking
 
 if TYPE_CHECKING:
     from rendergraph.images import Saved
     from rendergraph.session import Frame, RenderOptions, Selection
     from rendergraph.session.gpu import Gpu
-    from rendergraph.session.values import Expanded
+    from rendergraph.session.values import Expanded, Linked
 
 
 @click.command("run", no_args_is_help=True)
 @options.pipeline_options
 @click.option("--frames", type=options.FRAMES, help="Render these frames; `####` in a file's name numbers them.")
-@click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
+@click.option("--fps", type=options.POSITIVE, help="Frames a second.  [default: 30]")
 @click.option("-o", "--output", "outputs", multiple=True, type=options.OUTPUT, help="Write an output to a file.")
-@click.option("--tap", "taps", multiple=True, type=options.TAP, help="Write any port's texture to a file.")
+@click.option(
+    "--tap",
+    "taps",
+    multiple=True,
+    type=options.TAP,
+    shell_complete=options.offered("taps"),
+    help="Write any port's texture to a file.",
+)
 @click.option(
     "--tap-all",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=options.NamedPath(file_okay=False),
     metavar="FOLDER",
     help="Write every port's texture there as a picture, and all on one sheet.",
 )
 @options.json_option
 @options.device_option
 @click.option("--watch", is_flag=True, help="Stay, and render again whenever a file that went into it changes.")
+@click.option(
+    "--reuse/--no-reuse",
+    default=None,
+    help="Leave out steps whose values are still there from the frame before.  [default: unless --json measures them]",
+)
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
 @click.option("--poison", is_flag=True, help="Overwrite textures that are dead, to show who still reads them.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
 def command(
     selection: Selection,
     frames: range | None,
-    fps: float,
+    fps: float | None,
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
     tap_all: Path | None,
     as_json: bool,
     device: int | None,
     watch: bool,
+    reuse: bool | None,
     no_alias: bool,
     poison: bool,
     shuffle: int | None,
@@ -57,7 +71,8 @@ def command(
     """Render a pipeline to picture files.
 
     The extension chooses the format, and the output where none is named: PNG and JPEG take `image`, EXR and HDR take
-    `radiance`. Without -o the picture goes to PIPELINE.png in the current folder.
+    `radiance`. Without -o the picture goes to PIPELINE.png in the current folder. A picture that was written so (PNG or
+    EXR) stands for the pipeline, camera and frame that it was made with.
 
     \b
     Examples:
@@ -67,11 +82,16 @@ def command(
       rendergraph run forward --tap-all inside
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
       rendergraph run my.yaml --watch
+      rendergraph run spheres.exr -s light.ambient=0 -o darker.png
     """
     from rendergraph.session import RenderOptions
     from rendergraph.session.gpu import Gpu
 
-    modes = RenderOptions(frames or range(1, 2), fps, alias=not no_alias, poison=poison, shuffle=shuffle)
+    def modes(linked: Linked) -> RenderOptions:
+        shown = frames or linked.frames
+        plain = RenderOptions(shown, fps or linked.fps, timed=as_json, reuse=reuse)
+        return replace(plain, alias=not no_alias, poison=poison, shuffle=shuffle)
+
     warnings = Warnings()
     read = partial(_read, selection, modes, outputs, taps, tap_all, warnings)
     draw = partial(_draw, sheet=tap_all, warnings=warnings, quiet=as_json)
@@ -90,7 +110,7 @@ def command(
 
 def _read(
     selection: Selection,
-    modes: RenderOptions,
+    modes_of: Callable[[Linked], RenderOptions],
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
     tap_all: Path | None,
@@ -99,13 +119,15 @@ def _read(
     """Everything before the device is opened: what is to be drawn, and the files it goes to, each with its name."""
     from rendergraph import images
     from rendergraph.session import stages
-    from rendergraph.session.wanted import every_port
+    from rendergraph.session.wanted import every_port, figures
 
-    linked = stages.link(stages.resolve(selection))
+    with looking() as files:
+        linked = stages.link(stages.resolve(selection))
     warnings.say(linked.warnings)
+    modes = modes_of(linked)
     ending = ".####.png" if len(modes.frames) > 1 else ".png"
     if not outputs and not taps and tap_all is None:
-        outputs = (Target("", Path(f"{Path(selection.source).stem}{ending}")),)
+        outputs = (Target("", _default(selection.source, ending)),)
     if tap_all is not None:
         ports = every_port(stages.plan(stages.expand(linked, modes)))
         taps += tuple(
@@ -114,12 +136,23 @@ def _read(
         )
     known = linked.graph.outputs
     named = [t if t.name else replace(t, name=images.output_for(t.path, known)) for t in outputs]
-    expanded = stages.expand(linked, replace(modes, outputs=_names(named), taps=_names(taps)))
+    wanted = tuple(dict.fromkeys((*_names(named), *figures(linked.graph))))
+    expanded = stages.expand(linked, replace(modes, outputs=wanted, taps=_names(taps)))
     targets = [*named, *taps]
     if tap_all is not None:
         _make(tap_all)
-    _check(targets, expanded)
+    _check(targets, expanded, files)
     return expanded, targets
+
+
+def _default(source: str, ending: str) -> Path:
+    """Where the picture goes when nobody says: beside itself, where it is one that is drawn again."""
+    from rendergraph.session.made import is_picture
+
+    if is_picture(source):
+        kind = ".exr" if source.lower().endswith(".exr") else ".png"
+        return Path(f"{Path(source).stem}-again{ending.removesuffix('.png')}{kind}")
+    return Path(f"{Path(source).stem}{ending}")
 
 
 def _make(folder: Path) -> None:
@@ -146,6 +179,7 @@ def _draw(
     contact = "contact.####.png" if len(expanded.options.frames) > 1 else "contact.png"
     progress = Progress(len(expanded.options.frames))
     frame: Frame | None = None
+    unsound: dict[str, Problem] = {}
     for frame in stages.draw(expanded, gpu):
         files = [
             images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
@@ -160,9 +194,10 @@ def _draw(
             if not quiet:
                 emit(str(file.path))
         progress.show(len(written) // len(files))
+        unsound = {**frame.unsound, **unsound}  # said once an output, of the first frame that shows it
     progress.clear()
     assert frame is not None  # a range of frames has one at least
-    warnings.say(frame.warnings)
+    warnings.say([*frame.warnings, *unsound.values()])
     return frame.as_json() | {"outputs": written}
 
 
@@ -183,8 +218,8 @@ def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -
     return [*done, images.Saved(path, images.contact_sheet(tiles), viewed)]
 
 
-def _check(targets: Sequence[Target], expanded: Expanded) -> None:
-    """Everything that can be said about the files before anything is rendered."""
+def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path]) -> None:
+    """Everything that can be said about the files before anything is rendered; `files` are those that were read."""
     from rendergraph import images
     from rendergraph.images.saving import extension
 
@@ -194,7 +229,8 @@ def _check(targets: Sequence[Target], expanded: Expanded) -> None:
             text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
             raise InputError(Problem("RG508", text))
     selection = linked.selection
-    inputs = {os.path.realpath(name) for name in (selection.source, selection.scene, selection.environment) if name}
+    own = [Path(name) for name in (selection.source, selection.scene, selection.environment) if name]
+    inputs = {os.path.realpath(name) for name in (*own, *files) if name.is_file()}
     seen: set[str] = set()
     for target in targets:
         extension(target.path)
@@ -202,7 +238,7 @@ def _check(targets: Sequence[Target], expanded: Expanded) -> None:
         if place in seen:
             raise UsageError(Problem("RG502", f"two pictures go to '{target.path}'; give each a file of its own"))
         seen.add(place)
-        if place in inputs and os.path.exists(place):
+        if place in inputs or any(images.stands_for(target.path, name) for name in inputs):
             raise UsageError(Problem("RG502", f"'{target.path}' is read by this very run; write to another file"))
         if len(numbers) > 1 and not images.is_numbered(target.path):
             better = target.path.with_name(f"{target.path.stem}.####{target.path.suffix}")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command("schema")
 @click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|FILE]")
 @options.plugin_option
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write a file.")
+@click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
 def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
     """Print the JSON Schema of a kind of file.

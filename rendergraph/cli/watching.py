@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph.cli.app import unexpected
-from rendergraph.cli.output import emit_json, error_document, say, say_summary
+from rendergraph.cli.output import data_stream, emit_json, error_document, say, say_summary, warn
 from rendergraph.errors import InputError, RenderError, RendergraphError
 from rendergraph.resources import folder
 
@@ -52,8 +51,8 @@ def keep_drawing(draw: Draw, device: int | None, *, as_json: bool) -> None:
                 say(f"watching {count} files; Ctrl-C ends")
             if as_json:
                 emit_json(_document(turn), line=True)
-            if sys.stdout is not None:
-                sys.stdout.flush()  # whoever reads a pipe waits for this picture, not for a full buffer
+            if (stream := data_stream()) is not None:
+                stream.flush()  # whoever reads a pipe waits for this picture, not for a full buffer
 
 
 def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
@@ -82,9 +81,7 @@ def _can_be_mended(error: RendergraphError, turn: Turn[Any]) -> bool:
 def _say_error(error: RendergraphError, changed: tuple[Path, ...], told: tuple[str, ...]) -> tuple[str, ...]:
     """Say what is wrong, each mistake once while it lasts; what has been said."""
     now = tuple(str(problem) for problem in error.problems)
-    for text in now:
-        if text not in told:
-            say(text)
+    warn([problem for problem in error.problems if str(problem) not in told])
     if changed:
         say(f"{_names(changed)}: not drawn, the last picture stays" + ("; the same mistake" if now == told else ""))
     return now

@@ -9,13 +9,25 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis
+    from rendergraph.compare.files import compare_pictures
     from rendergraph.compare.pictures import compare
     from rendergraph.compare.product import Sweep, check_sweep, sweep
     from rendergraph.compare.values import Comparison, Result
 
-__all__ = ["Axis", "Comparison", "Result", "Sweep", "check_sweep", "compare", "sweep"]
+__all__ = ["Axis", "Comparison", "Result", "Sweep", "check_sweep", "compare", "compare_pictures", "sweep"]
 
-_WHERE = {"Axis": "axes", "compare": "pictures", "Sweep": "product", "check_sweep": "product", "sweep": "product"}
+_WHERE = {
+    "Axis": "axes",
+    "compare": "pictures",
+    "compare_pictures": "files",
+    "Sweep": "product",
+    "check_sweep": "product",
+    "sweep": "product",
+}
+
+
+def __dir__() -> list[str]:
+    return __all__
 
 
 def __getattr__(name: str) -> Any:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import itertools
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rendergraph.document import Value, load
+from rendergraph.document import Value, load, parse
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.keys import Codes, Key, Names, Table, Walk, plain
-from rendergraph.keys.forms import ANYTHING, listed, shipped, version, whole
+from rendergraph.keys.forms import ANYTHING, TEXT, listed, shipped, version, whole
 from rendergraph.read import SIZE, entries
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from rendergraph.session import Pipeline
 
 MOST_RUNS = 10_000
+MOST_MEASURED = 10_000
+"""Frames of a run."""
 _PAIRS = {"[": "]", "{": "}", "(": ")"}
 _CODES = Codes(unknown="RG030", wrong="RG030", name="RG030", file="RG030")
 SWEEP = Table(
@@ -42,10 +45,11 @@ SWEEP = Table(
             example="axes: {NODE.PARAM: [VALUE, VALUE]}",
         ),
         Key("reference", shipped(shipped_pipelines), "A picture or a pipeline that all runs are compared with."),
+        Key("metric", TEXT, "A port, `NODE.PORT`, whose texture is measured in place of the picture."),
         Key("scene", shipped(shipped_scenes), "What is drawn, in place of the pipeline's own."),
         SIZE,
         Key("set", Names(ANYTHING, what="path"), "Paths to values that hold for all runs."),
-        Key("frames", whole(1), "How many frames are measured."),
+        Key("frames", whole(1, MOST_MEASURED), "How many frames are measured."),
     ),
 )
 """What a sweep's file holds."""
@@ -67,18 +71,32 @@ class SweepFile:
         pipeline: a shipped name or a path, joined to the file's folder.
         axes: in the file's order.
         reference, scene: likewise.
+        metric: the port that is measured.
         size: width and height.
         sets: `PATH=VALUE` texts.
         frames: how many are measured.
+        places: what stands under each path, of axes and of `set`.
     """
 
     pipeline: str
     axes: tuple[Axis, ...]
     reference: str | None = None
     scene: str | None = None
+    metric: str | None = None
     size: tuple[int, int] | None = None
     sets: tuple[str, ...] = ()
     frames: int | None = None
+    places: Mapping[str, Value] = field(default_factory=dict)
+
+    def placed(self, error: InputError) -> InputError:
+        """Mistakes in what the file says of paths, at its own lines; others as they are."""
+        return InputError([self._placed(problem) for problem in error.problems])
+
+    def _placed(self, problem: Problem) -> Problem:
+        where = problem.place.file if problem.place else ""
+        path = where.removeprefix("-x ").removeprefix("--set ").partition("=")[0]
+        value = self.places.get(path) if where.startswith(("-x ", "--set ")) else None
+        return problem if value is None else value.problem(problem.code, problem.text, key=True)
 
 
 def parse_axis(text: str) -> Axis:
@@ -96,9 +114,8 @@ def parse_axis(text: str) -> Axis:
         raise ValueError(f"axis '{path}' has no values; write {path}=VALUE,VALUE,…")
     if "" in values:
         raise ValueError(f"axis '{path}' has an empty value in '{rest}'")
-    twice = [value for number, value in enumerate(values) if value in values[:number]]
-    if twice:
-        raise ValueError(f"axis '{path}' has the value {twice[0]} twice")
+    for value in _repeated(values):
+        raise ValueError(f"axis '{path}' has the value {value} twice")
     return Axis(path, tuple(values))
 
 
@@ -121,6 +138,21 @@ def _split(text: str) -> list[str]:
     return parts
 
 
+def typed(text: str) -> Any:
+    """A value as `-s` reads its text: a number, a switch, a list, or the text itself."""
+    if text.lstrip().startswith("#"):
+        return text  # a colour
+    try:
+        return parse(text).root.plain()
+    except InputError:
+        return text
+
+
+def _repeated(values: Iterable[str]) -> list[str]:
+    """The values that are there more than once."""
+    return [value for value, count in Counter(values).items() if count > 1]
+
+
 def check_axes(axes: Sequence[Axis]) -> None:
     """Say what is wrong with axes as a whole.
 
@@ -132,7 +164,7 @@ def check_axes(axes: Sequence[Axis]) -> None:
         text = "the sweep has no axis; add one: -x NODE.PARAM=VALUE,VALUE"
         problems.append(Problem("RG524", text))
     paths = [axis.path for axis in axes]
-    for path in dict.fromkeys(path for number, path in enumerate(paths) if path in paths[:number]):
+    for path in _repeated(paths):
         problems.append(Problem("RG524", f"two axes are called '{path}'; put all values into one"))
     count = 1
     for axis in axes:
@@ -224,9 +256,11 @@ def read_sweep(path: Path) -> SweepFile:
         tuple(axes),
         said.get("reference"),
         said.get("scene"),
+        said.get("metric"),
         said.get("size"),
         tuple(f"{name}={value_text(value)}" for name, value in (given.items() if given else ())),
         said.get("frames"),
+        entries(root, "set") | entries(root, "axes"),
     )
 
 
@@ -238,7 +272,7 @@ def value_text(value: Value) -> str:
 
 def _axis(path: str, listed: Value, walk: Walk) -> Axis:
     values = [value_text(value) for value in listed.data] if isinstance(listed.data, list) else []
-    for value in dict.fromkeys(value for number, value in enumerate(values) if value in values[:number]):
+    for value in _repeated(values):
         walk.say(listed, _CODES.wrong, f"axis '{path}' has the value {value} twice")
     return Axis(path, tuple(values))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rendergraph.compare.divergence import passes
-from rendergraph.compare.merge import Merged, merge
+from rendergraph.compare.merge import Merged, kinship, merge
 from rendergraph.compare.timing import Times, times_within
 from rendergraph.compare.values import Pixels
 from rendergraph.errors import InputError
@@ -57,16 +57,40 @@ class Drawn:
 
 
 def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
-    """The variants in as few batches as fit.
+    """The variants in as few batches as fit, and those together that share most of their first passes.
 
     Args:
         variants: all with one scene, camera and size.
         numbers: which of them.
         most_bytes: of textures in a batch; a single variant may have more.
     """
-    if len(numbers) > MOST_RUNS or not numbers:
-        parts = range(0, len(numbers), MOST_RUNS)
-        return [batch for at in parts for batch in batches(variants, numbers[at : at + MOST_RUNS], most_bytes)]
+    if not numbers:
+        return []
+    graphs = [variants[number].linked.graph for number in numbers]
+    kin = dict(zip(numbers, kinship(graphs, passes(variants[numbers[0]].plan)), strict=True))
+    waiting = sorted(numbers, key=kin.__getitem__)
+    found: list[Batch] = []
+    while waiting:
+        cut = _cut([kin[number] for number in waiting])
+        found += _fitting(variants, waiting[:cut], most_bytes)
+        waiting = waiting[cut:]
+    return found
+
+
+def _cut(kin: Sequence[tuple[int, ...]]) -> int:
+    """How many of the first variants are a batch: as many as may be, or some less where what follows shares less."""
+    if len(kin) <= MOST_RUNS:
+        return len(kin)
+
+    def shared(at: int) -> int:
+        differing = (place for place, pair in enumerate(zip(kin[at - 1], kin[at], strict=True)) if pair[0] != pair[1])
+        return next(differing, len(kin[at]))
+
+    return min(range(MOST_RUNS, MOST_RUNS // 2, -1), key=shared)
+
+
+def _fitting(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int) -> list[Batch]:
+    """These variants in one batch, or halved until each batch fits."""
     chosen = [variants[number] for number in numbers]
     merged = merge([variant.linked.graph for variant in chosen])
     try:
@@ -80,7 +104,7 @@ def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int
         if len(numbers) == 1:
             raise
     half = len(numbers) // 2
-    return [*batches(variants, numbers[:half], most_bytes), *batches(variants, numbers[half:], most_bytes)]
+    return [*_fitting(variants, numbers[:half], most_bytes), *_fitting(variants, numbers[half:], most_bytes)]
 
 
 def draw(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Iterator[Drawn]:
@@ -110,7 +134,8 @@ def measure(
         frames: how many frames are measured.
         warm: whether the batch has just been drawn.
     """
-    times = stages.draw_last(batch.planned.for_frames(range(1, frames + 1), warm_up=not warm), gpu).times
+    timed = batch.planned.for_frames(range(1, frames + 1), warm_up=not warm, timed=True)
+    times = stages.draw_last(timed, gpu).times
     for place, number in enumerate(batch.numbers):
         variant = variants[number]
         own = {name: batch.merged.names[place][name] for name in passes(variant.plan)}

@@ -46,7 +46,7 @@ class Ledger:
             try:
                 size = os.fstat(handle).st_size
                 torn = size > 0 and os.pread(handle, 1, size - 1) != b"\n"
-                data = (b"\n" if torn else b"") + line.encode()
+                data = (b"\n" if torn else b"") + line.encode(errors="backslashreplace")
                 while data:
                     data = data[os.write(handle, data) :]
                 os.fsync(handle)
@@ -66,7 +66,7 @@ def checksum(record: Mapping[str, Any]) -> str:
     """SHA-256 of a record without its checksum."""
     rest = {key: value for key, value in record.items() if key != CHECKSUM}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
 
 
 def _record(line: bytes) -> dict[str, Any] | None:

@@ -60,8 +60,20 @@ def merge(graphs: Sequence[Graph]) -> Merged:
         for name, end in graph.outputs.items()
     }
     first = graphs[0]
-    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures, objects=first.objects)
+    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures)
+    merged = replace(merged, objects=first.objects, environment=first.environment)
     return Merged(merged, names)
+
+
+def kinship(graphs: Sequence[Graph], order: Sequence[str]) -> list[tuple[int, ...]]:
+    """For each graph a number for each node: equal ones of two graphs compute the same.
+
+    Args:
+        graphs: with one scene and one size.
+        order: the nodes' ids; graphs that are sorted by their numbers share as many of the first ones as can be.
+    """
+    classes = _classes(graphs)
+    return [tuple(classes.get((number, node), -1) for node in order) for number in range(len(graphs))]
 
 
 def _moved(end: Endpoint, names: Mapping[str, str]) -> Endpoint:

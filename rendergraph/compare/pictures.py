@@ -9,12 +9,20 @@ from typing import TYPE_CHECKING
 
 from rendergraph import metrics
 from rendergraph.compare.divergence import every_output, first_difference, passes
-from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, scene_name, unique_names
+from rendergraph.compare.reference import (
+    compared_output,
+    measured_at,
+    on_one_stage,
+    read_picture,
+    scene_name,
+    unique_names,
+)
 from rendergraph.compare.timing import Times, times_of
-from rendergraph.compare.values import Comparison, Difference, Pixels, Reference, Result
+from rendergraph.compare.values import Comparison, Difference, Pixels, Reference, Result, not_finite_pixels
 from rendergraph.diff import diff
 from rendergraph.link import Graph
 from rendergraph.session import stages
+from rendergraph.session.progress import Progress, shown
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
@@ -24,9 +32,6 @@ if TYPE_CHECKING:
 
 FRAMES_A_TURN = 2
 """Few, so that whatever else the machine does falls on all variants alike."""
-
-Progress = Callable[[int, int], None]
-"""Told how many parts of the work are done, and of how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +51,26 @@ def compare(
     pipelines: Sequence[Pipeline],
     reference: Path | Pipeline | None = None,
     *,
+    metric: str | None = None,
+    names: Sequence[str] = (),
     frames: int = 10,
     frame: int = 1,
     session: Gpu | None = None,
     device: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Comparison:
     """Draw pipelines on one scene, with one camera and at one size, and compare what comes out.
 
     Args:
         pipelines: what is compared; all are drawn with the scene and at the size of the first.
         reference: a picture file or another pipeline; the first of `pipelines` by default.
+        metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
+        names: what the pipelines are called; as their files by default.
         frames: how many frames of each are measured; the pipelines take turns.
         frame: number of the frame whose pictures are compared.
         session: where to draw; a private one by default.
         device: GL device number where no session is given.
-        progress: told about the work done.
+        progress: told how many parts of the work are done, and of how many; True shows a bar on stderr.
 
     Raises:
         InputError: a mistake in a file, or the pictures cannot be compared.
@@ -71,14 +80,14 @@ def compare(
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
     own = [] if reference is None or isinstance(reference, Path) else [reference]
-    staged, notes = on_one_stage([*pipelines, *own])
+    staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*pipelines, *own]])
     planned = [stages.plan(pipeline.expand()) for pipeline in staged]
     first_one = planned[0].linked
-    names = unique_names([each.linked.graph.name for each in planned[: len(pipelines)]])
+    names = unique_names(names or [each.linked.graph.name for each in planned[: len(pipelines)]])
     picture = read_picture(reference, first_one.graph.size, names[0]) if isinstance(reference, Path) else None
-    output, encoding = compared_output(staged, picture[1] if picture else None)
-    step = _Steps(len(staged) + frames + 2 * len(pipelines), progress)
-    with opened(session, device) as gpu:
+    output, encoding = compared_output(staged, picture[1] if picture else None, measured=metric is not None)
+    with opened(session, device) as gpu, shown(progress, "steps") as tell:
+        step = _Steps(len(staged) + frames + 2 * len(pipelines), tell)
         drawn = []
         for each in planned:
             drawn.append(_Drawn(each, stages.draw_last(each.for_frames(range(1, frame + 1)), gpu)))
@@ -87,9 +96,9 @@ def compare(
         base = drawn[-1] if own else drawn[0]
         base_name = base.graph.name if own else names[0]
         if picture:
-            against = Reference(str(reference), "file", *picture)
+            against = Reference(str(reference), "file", picture[0], encoding, output)
         else:
-            against = Reference(base_name, "pipeline" if own else "variant", base.frame[output], encoding)
+            against = Reference(base_name, "pipeline" if own else "variant", base.frame[output], encoding, output)
         times = _times(gpu, [variant.planned for variant in variants], frames, step)
         tapped = every_output(gpu, base.planned, frame)
         results = []
@@ -110,13 +119,17 @@ def compare(
         camera=first_one.selection.camera,
         size=first_one.graph.size,
         frame=frame,
+        metric=metric,
         device=drawn[0].frame.device,
         notes=tuple(notes),
         warnings=tuple(
             dict.fromkeys(
-                problem
-                for each in drawn
-                for problem in (*each.frame.warnings, *each.planned.linked.catalog.extensions.warnings)
+                [
+                    problem
+                    for each in drawn
+                    for problem in (*each.frame.warnings, *each.planned.linked.catalog.extensions.warnings)
+                ]
+                + [problem for result in results for problem in result.warnings]
             )
         ),
     )
@@ -150,6 +163,8 @@ def _result(
         plan=plan,
         difference=diff(base.graph, linked.graph),
         first=first,
+        not_finite=not_finite_pixels(linked.graph, drawn.frame),
+        figures=drawn.frame.figures,
     )
 
 
@@ -169,7 +184,7 @@ def _times(gpu: Gpu, variants: Sequence[Planned], frames: int, step: Callable[[]
         count = min(FRAMES_A_TURN, left)
         for place in range(len(variants)):
             number = (place + turn) % len(variants)
-            taken[number] += stages.draw_last(variants[number].for_frames(range(1, count + 1)), gpu).times
+            taken[number] += stages.draw_last(variants[number].for_frames(range(1, count + 1), timed=True), gpu).times
         left -= count
         turn += 1
         for _ in range(count):
@@ -183,10 +198,9 @@ def _times(gpu: Gpu, variants: Sequence[Planned], frames: int, step: Callable[[]
 class _Steps:
     """Counts the parts of the work for whoever watches."""
 
-    def __init__(self, total: int, progress: Progress | None) -> None:
+    def __init__(self, total: int, progress: Progress) -> None:
         self._done, self._total, self._progress = 0, total, progress
 
     def __call__(self) -> None:
         self._done += 1
-        if self._progress is not None:
-            self._progress(self._done, self._total)
+        self._progress(self._done, self._total)

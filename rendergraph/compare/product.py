@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph import metrics
-from rendergraph.compare.axes import Axis, check_axes, combinations, pipelines, run_name
-from rendergraph.compare.batches import MOST_BYTES, Drawn, batches, draw, measure
+from rendergraph.compare.axes import Axis, check_axes, combinations, pipelines, run_name, typed
+from rendergraph.compare.batches import MOST_BYTES, Batch, Drawn, batches, draw, measure
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
-from rendergraph.compare.pictures import Progress, light_error
-from rendergraph.compare.reference import compared_output, on_one_stage, read_picture, scene_name, unique_names
-from rendergraph.compare.runs import NO_TIMES, RUN, Run, found_again, keep, key_of, restored, settle
+from rendergraph.compare.pictures import light_error
+from rendergraph.compare.reference import (
+    compared_output,
+    measured_at,
+    on_one_stage,
+    read_picture,
+    scene_name,
+    unique_names,
+)
+from rendergraph.compare.runs import RUN, Failure, Run, found_again, give_up, keep, key_of, restored, settle
 from rendergraph.compare.sources import file_digest
-from rendergraph.compare.study import begin, open_folder, study_of
-from rendergraph.compare.values import Comparison, Pixels, Reference, Result
+from rendergraph.compare.study import begin, claimed, open_folder, study_of
+from rendergraph.compare.timing import NO_TIMES
+from rendergraph.compare.values import Comparison, Pixels, Reference, Result, not_finite_pixels
+from rendergraph.errors import InputError, RenderError
 from rendergraph.metrics import Encoding
 from rendergraph.session import stages
+from rendergraph.session.frame import figures_of
+from rendergraph.session.progress import Progress, shown
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
@@ -41,6 +53,7 @@ class Sweep:
         timed: runs of which the picture was there, and not as many measured frames.
         redrawn: runs that were there, drawn from files that have changed since.
         torn: lines of the results that were not whole.
+        failures: runs that could not be drawn or compared; they are no variants.
     """
 
     comparison: Comparison
@@ -51,6 +64,13 @@ class Sweep:
     timed: int
     redrawn: int
     torn: int
+    failures: tuple[Failure, ...]
+
+    def __repr__(self) -> str:
+        return f"<Sweep of {', '.join(axis.path for axis in self.axes)}: {len(self.comparison.results)} runs>"
+
+    def _repr_html_(self) -> str:
+        return self.comparison._repr_html_()
 
     def as_json(self) -> dict[str, Any]:
         """The document of `sweep --json`."""
@@ -58,13 +78,14 @@ class Sweep:
         runs = found.pop("variants")
         front = {result.name for result in pareto(self.comparison.results)}
         return found | {
-            "axes": {axis.path: list(axis.values) for axis in self.axes},
+            "axes": {axis.path: list(map(typed, axis.values)) for axis in self.axes},
             "executed_passes": self.executed,
             "passes_one_by_one": self.alone,
             "resumed": self.resumed,
             "timed_again": self.timed,
             "redrawn": self.redrawn,
             "runs": [run | {"pareto": run["name"] in front} for run in runs],
+            "failed": [failure.as_json() for failure in self.failures],
         }
 
 
@@ -77,7 +98,9 @@ class _Work:
         encoding: of the output that is compared.
         other: the reference, where it is a pipeline of its own.
         ledger: where results go.
+        lines: those that it had, by key.
         results, records: what is there, by the run's number; results may lack times.
+        failures: what cannot be drawn, likewise.
         frames: how many are to be measured.
         device: what drew.
         reference, light: what is measured against, once it is there.
@@ -87,9 +110,11 @@ class _Work:
     encoding: Encoding
     other: Planned | None
     ledger: Ledger
+    lines: Mapping[str, dict[str, Any]]
     frames: int
     results: dict[int, Result] = field(default_factory=dict)
     records: dict[int, Mapping[str, Any]] = field(default_factory=dict)
+    failures: dict[int, Failure] = field(default_factory=dict)
     device: Mapping[str, object] = field(default_factory=dict)
     reference: Reference | None = None
     light: Pixels | None = None
@@ -98,8 +123,8 @@ class _Work:
 
     @property
     def missing(self) -> list[int]:
-        """Numbers of the runs that have no result, or one of fewer frames than asked for."""
-        return [number for number in range(len(self.runs)) if not self.is_done(number)]
+        """Numbers of the runs that have no result, or one of fewer frames than asked for; failed ones are not asked."""
+        return [n for n in range(len(self.runs)) if n not in self.failures and not self.is_done(n)]
 
     def is_done(self, number: int) -> bool:
         """Whether a run is drawn and measured."""
@@ -112,95 +137,115 @@ def sweep(
     out: Path,
     reference: Path | Pipeline | None = None,
     *,
+    metric: str | None = None,
     frames: int = 5,
     frame: int = 1,
     resume: bool = False,
     most_bytes: int = MOST_BYTES,
     session: Gpu | None = None,
     device: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Sweep:
     """Draw every combination of the axes' values into a folder each, and measure it.
 
     A run's picture and figures are kept as soon as it is drawn, its times when they are known: what is interrupted
-    loses little.
+    loses little. A run that cannot be drawn gets a line with the reason, and the others go on.
 
     Args:
         base: what the axes change.
         axes: paths with values.
         out: the folder; `results.jsonl` in it grows by a line a run that has been measured.
         reference: a picture or a pipeline that runs are measured against; the first run by default.
+        metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
         frames: how many frames are measured, at least; runs that are there and have fewer are measured again.
         frame: number of the frame whose pictures are kept.
         resume: keep runs that the folder has already.
         most_bytes: of textures that variants drawn together may take.
         session: where to draw; a private one by default.
         device: GL device number where no session is given.
-        progress: told about the runs done.
+        progress: told how many runs are done, and of how many; True shows a bar on stderr.
 
     Raises:
-        InputError: an axis names nothing, a value does not fit, or the folder has results already, or of another study.
-        RenderError: it failed while drawing or writing.
+        InputError: an axis names nothing, a value does not fit, the folder has results already, or of another study, or
+            another sweep is at work in it; or what runs are measured against cannot be drawn.
+        RenderError: it failed while writing, or while drawing what runs are measured against.
         DeviceError: there is no usable GL device.
     """
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
-    staged, notes, picture, output, encoding = _looked_at(base, axes, reference)
+    base, reference = _measured(base, reference, metric)
+    staged, notes, picture, output, encoding = _looked_at(base, axes, reference, metric)
     settings, planned = combinations(axes), [pipeline.check() for pipeline in staged]
     variants, other = planned[: len(settings)], planned[-1] if len(staged) > len(settings) else None
     names = unique_names([run_name(run) for run in settings])
     against = key_of(other or variants[0], frame, "") if picture is None else file_digest(Path(str(reference)))
     study = study_of(base, frame, str(reference) if picture else other.linked.graph.name if other else names[0])
-    ledger, records, torn = open_folder(out, study, resume=resume)
     runs = [
-        Run(name, run, variant, output, key_of(variant, frame, against), out / name)
+        Run(name, run, variant, output, frame, key_of(variant, frame, against), out / name)
         for name, run, variant in zip(names, settings, variants, strict=True)
     ]
-    work = _Work(runs, encoding, other, ledger, frames)
-    if picture:
-        work.reference = Reference(str(reference), "file", *picture)
-    for number, run in enumerate(runs):
-        if record := found_again(run, records):
-            work.results[number], work.records[number] = restored(run, record, encoding), record
-            work.device = record["device"]
-    resumed = sum(map(work.is_done, range(len(runs))))
-    timed = len(work.results) - resumed
-    redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))
-    if work.missing or other:
-        with opened(session, device) as gpu:
-            begin(out, study)
-            _draw_missing(work, gpu, frame, most_bytes, progress or (lambda done, total: None))
-    results = tuple(work.results[number] for number in range(len(runs)))
+    with claimed(out):
+        ledger, lines, torn = open_folder(out, study, resume=resume)
+        work = _Work(runs, encoding, other, ledger, lines, frames)
+        if picture:
+            work.reference = Reference(str(reference), "file", picture[0], encoding, output)
+        _take_kept(work)
+        resumed = sum(map(work.is_done, range(len(runs))))
+        timed = len(work.results) - resumed
+        redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))
+        if work.missing or other:
+            with opened(session, device) as gpu, shown(progress, "runs") as tell:
+                begin(out, study)
+                _draw_missing(work, gpu, frame, most_bytes, tell)
+    results = tuple(work.results[number] for number in sorted(work.results))
+    failures = tuple(work.failures[number] for number in sorted(work.failures))
     first = variants[0].linked
     comparison = Comparison(
         results=results,
-        reference=work.reference or Reference(names[0], "variant", results[0].pixels, encoding),
+        reference=work.reference or Reference(names[0], "variant", results[0].pixels, encoding, output),
         base=(names[0], first.graph),
         scene=scene_name(first),
         camera=first.selection.camera,
         size=first.graph.size,
         frame=frame,
+        metric=metric,
         device=work.device,
         notes=tuple(notes),
-        warnings=tuple(dict.fromkeys(problem for variant in variants for problem in variant.linked.warnings)),
+        warnings=tuple(
+            dict.fromkeys(
+                [problem for variant in variants for problem in variant.linked.warnings]
+                + [problem for result in results for problem in result.warnings]
+            )
+        ),
     )
-    return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, timed, redrawn, torn)
+    return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, timed, redrawn, torn, failures)
 
 
-def check_sweep(base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None = None) -> list[Pipeline]:
+def check_sweep(
+    base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None = None, metric: str | None = None
+) -> list[Pipeline]:
     """The pipelines that `sweep` would draw; everything that can be wrong without GL is found.
 
     Raises:
         InputError: as from `sweep`.
     """
-    staged, *_ = _looked_at(base, axes, reference)
+    base, reference = _measured(base, reference, metric)
+    staged, *_ = _looked_at(base, axes, reference, metric)
     for pipeline in staged:
         pipeline.check()
     return staged[: len(combinations(axes))]
 
 
+def _measured(
+    base: Pipeline, reference: Path | Pipeline | None, metric: str | None
+) -> tuple[Pipeline, Path | Pipeline | None]:
+    """Both with the port that is measured."""
+    own = reference if reference is None or isinstance(reference, Path) else measured_at(reference, metric)
+    return measured_at(base, metric), own
+
+
 def _looked_at(
-    base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None
+    base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None, metric: str | None
 ) -> tuple[list[Pipeline], list[str], tuple[Pixels, Encoding] | None, str, Encoding]:
     """Runs on one stage and what was changed for that, a reference picture, and the compared output's name and kind."""
     check_axes(axes)
@@ -209,15 +254,23 @@ def _looked_at(
     staged, notes = on_one_stage([*variants, *own])
     name = run_name(combinations(axes)[0])
     picture = read_picture(reference, staged[0].link().graph.size, name) if isinstance(reference, Path) else None
-    return staged, notes, picture, *compared_output(staged, picture[1] if picture else None)
+    return (
+        staged,
+        notes,
+        picture,
+        *compared_output(staged, picture[1] if picture else None, measured=metric is not None),
+    )
 
 
 def pareto(results: Sequence[Result]) -> list[Result]:
-    """The results than which none is both quicker and better, quickest first; quality is FLIP."""
+    """The results than which none is both quicker and better, quickest first; quality is FLIP.
+
+    Pictures that hold NaN or infinity are none of them.
+    """
     found: list[Result] = []
     for result in sorted(results, key=lambda r: (r.times.headline.median, r.metrics.flip)):
         flip = result.metrics.flip
-        if math.isfinite(flip) and (not found or flip < found[-1].metrics.flip):
+        if math.isfinite(flip) and not result.not_finite and (not found or flip < found[-1].metrics.flip):
             found.append(result)
     return found
 
@@ -229,23 +282,75 @@ def _draw_missing(work: _Work, gpu: Gpu, frame: int, most_bytes: int, progress: 
         planned = work.other or work.runs[0].planned
         shown = stages.draw_last(planned.for_frames(range(1, frame + 1)), gpu)
         if work.other:
-            work.reference = Reference(work.other.linked.graph.name, "pipeline", shown[output], work.encoding)
+            work.reference = Reference(work.other.linked.graph.name, "pipeline", shown[output], work.encoding, output)
         else:
-            work.reference = Reference(work.runs[0].name, "variant", shown[output], work.encoding)
+            work.reference = Reference(work.runs[0].name, "variant", shown[output], work.encoding, output)
         work.light, work.device = shown.get("radiance"), shown.device
     variants = [run.planned for run in work.runs]
-    for batch in batches(variants, missing, most_bytes):
-        work.executed += batch.pass_count
-        if undrawn := any(number not in work.results for number in batch.numbers):
-            for drawn in draw(gpu, variants, batch, frame):
-                if drawn.number not in work.results:
-                    _keep(work, drawn)
-        for number, times in measure(gpu, variants, batch, work.frames, warm=undrawn):
-            run, result = work.runs[number], replace(work.results[number], times=times)
-            work.records[number] = settle(run, work.records[number], times, work.device, work.ledger)
-            work.results[number] = result
-            work.alone += result.pass_count
-            progress(len(work.runs) - len(work.missing), len(work.runs))
+    waiting = batches(variants, missing, most_bytes)
+    while waiting:
+        batch = waiting.pop(0)
+        try:
+            work.executed += _draw_batch(work, gpu, batch, variants, frame)
+        except _DrawingFailed as failed:
+            if len(batch.numbers) > 1:  # each alone, so that only the one at fault fails, and in its own words
+                left = [number for number in batch.numbers if not work.is_done(number)]
+                waiting[:0] = [alone for number in left for alone in batches(variants, [number], most_bytes)]
+                continue
+            number = next(iter(batch.numbers))
+            if work.reference is None:
+                raise type(failed.error)(failed.error.problems) from failed.error
+            work.failures[number] = give_up(work.runs[number], failed.error.problems, work.ledger, work.lines)
+        progress(len(work.runs) - len(work.missing), len(work.runs))
+
+
+class _DrawingFailed(Exception):
+    """Drawing or comparing did not go well, which is the fault of the runs and of nothing that they share."""
+
+    def __init__(self, error: InputError | RenderError) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+@contextmanager
+def _drawing() -> Iterator[None]:
+    try:
+        yield
+    except (InputError, RenderError) as error:
+        raise _DrawingFailed(error) from error
+
+
+def _draw_batch(work: _Work, gpu: Gpu, batch: Batch, variants: Sequence[Planned], frame: int) -> int:
+    """Draw, compare, keep and measure the runs of a batch, and count the passes it draws.
+
+    Raises:
+        _DrawingFailed: one of them cannot be drawn or compared.
+        RenderError: the disk does not take it.
+    """
+    undrawn = [number for number in batch.numbers if number not in work.results]
+    if undrawn:
+        with _drawing():
+            drawn = [each for each in draw(gpu, variants, batch, frame) if each.number in undrawn]
+        for each in drawn:
+            _keep(work, each)
+    with _drawing():
+        taken = list(measure(gpu, variants, batch, work.frames, warm=bool(undrawn)))
+    for number, times in taken:
+        run, result = work.runs[number], replace(work.results[number], times=times)
+        work.records[number] = settle(run, work.records[number], times, work.device, work.ledger)
+        work.results[number] = result
+        work.alone += result.pass_count
+    return batch.pass_count
+
+
+def _take_kept(work: _Work) -> None:
+    """What is there already; a run whose line was lost gets it again."""
+    for number, run in enumerate(work.runs):
+        if record := found_again(run, work.lines):
+            if record["frames"] and run.key not in work.lines:
+                work.ledger.append(record)
+            work.results[number], work.records[number] = restored(run, record, work.encoding), record
+            work.device = record["device"]
 
 
 def _keep(work: _Work, drawn: Drawn) -> None:
@@ -253,9 +358,10 @@ def _keep(work: _Work, drawn: Drawn) -> None:
     run = work.runs[drawn.number]
     work.device = drawn.device
     if work.reference is None:
-        work.reference = Reference(run.name, "variant", drawn.arrays[run.output], work.encoding)
+        work.reference = Reference(run.name, "variant", drawn.arrays[run.output], work.encoding, run.output)
         work.light = drawn.arrays.get("radiance")
-    result = _compared(run, drawn, work.reference, work.light)
+    with _drawing():
+        result = _compared(run, drawn, work.reference, work.light)
     work.records[drawn.number] = keep(run, result, drawn.arrays, drawn.device)
     work.results[drawn.number] = result
 
@@ -285,4 +391,6 @@ def _compared(run: Run, drawn: Drawn, reference: Reference, light: Pixels | None
         flip_map=map_,
         graph=linked.graph,
         plan=plan,
+        not_finite=not_finite_pixels(linked.graph, drawn.arrays),
+        figures=figures_of(drawn.arrays),
     )

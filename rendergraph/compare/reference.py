@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,26 +12,23 @@ import numpy as np
 from rendergraph.compare.values import Pixels
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.metrics import Encoding, check_sizes
+from rendergraph.textures import FORMATS
+
+METRIC = "metric"
+"""The output that stands for a port that is measured."""
+WHOLE = frozenset(name for name, format in FORMATS.items() if format.family in ("int", "uint"))
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
     from rendergraph.session.values import Linked
 
-PICTURES = frozenset({".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga"})
-"""Extensions that make a reference a picture rather than a pipeline."""
 
-
-def is_picture(name: str | Path) -> bool:
-    """Whether a reference's name is a picture's."""
-    return Path(name).suffix.lower() in PICTURES
-
-
-def read_picture(path: Path, size: tuple[int, int], name: str) -> tuple[Pixels, Encoding]:
+def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:
     """A reference picture and what its values are: floats are linear light, whole numbers are display-referred.
 
     Args:
         path: the file.
-        size: width and height it must have.
+        size: width and height it must have, where that is known.
         name: what is compared with it, for the message.
 
     Raises:
@@ -42,8 +40,39 @@ def read_picture(path: Path, size: tuple[int, int], name: str) -> tuple[Pixels, 
     if pixels.ndim != 3:
         text = "the image has layers; a reference is one picture of R, G, B or Y"
         raise InputError(Problem("RG354", text, Place(str(path))))
-    check_sizes(np.empty((size[1], size[0])), pixels, (name, str(path)))
+    if size is not None:
+        check_sizes(np.empty((size[1], size[0])), pixels, (name, str(path)))
     return pixels, "linear" if np.issubdtype(pixels.dtype, np.floating) else "display"
+
+
+def measured_at(pipeline: Pipeline, metric: str | None) -> Pipeline:
+    """The pipeline with one more output, the port that is measured in place of its picture.
+
+    Raises:
+        InputError: there is no such port, or it holds no picture.
+    """
+    if metric is None:
+        return pipeline
+    found = pipeline.patch({"outputs": {METRIC: metric}})
+    try:
+        graph = found.link().graph
+    except InputError as error:
+        place = Place(f"--metric {metric}")
+        raise InputError(
+            [
+                replace(one, place=place, text=f"in {found.selection.source}: {one.text}")
+                if one.place and one.place.file == "patch"
+                else one
+                for one in error.problems
+            ]
+        ) from None
+    desc = graph.textures[graph.outputs[METRIC]].desc
+    if desc is None or desc.kind != "texture2d" or desc.samples > 1 or desc.format in WHOLE:
+        what = "a buffer" if desc is None else f"{desc.kind} {desc.format}"
+        needed = "what is measured is a picture: one layer, one sample, no whole numbers"
+        text = f"'{metric}' of pipeline '{graph.name}' is {what}; {needed}"
+        raise InputError(Problem("RG523", text, Place(f"--metric {metric}")))
+    return found
 
 
 def on_one_stage(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline], list[str]]:
@@ -81,16 +110,22 @@ def unique_names(names: Sequence[str]) -> list[str]:
     return found
 
 
-def compared_output(pipelines: Sequence[Pipeline], encoding: Encoding | None) -> tuple[str, Encoding]:
+def compared_output(
+    pipelines: Sequence[Pipeline], encoding: Encoding | None, *, measured: bool = False
+) -> tuple[str, Encoding]:
     """The output that all pipelines have and that fits the reference, with the encoding of its values.
 
     Args:
         pipelines: what is compared.
         encoding: the reference's where that is a picture.
+        measured: they are `measured_at` a port.
 
     Raises:
         InputError: one of them lacks it.
     """
+    if measured:
+        first = pipelines[0].link().graph
+        return METRIC, first.textures[first.outputs[METRIC]].semantic.encoding or "values"
     wanted = {"display": ["image"], "linear": ["radiance"]}.get(encoding or "", ["image", "radiance"])
     for output in wanted:
         if all(output in pipeline.link().graph.outputs for pipeline in pipelines):

@@ -5,27 +5,30 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph import metrics
+from rendergraph.compare.axes import typed
 from rendergraph.compare.divergence import passes
-from rendergraph.compare.ledger import CHECKSUM, Ledger
+from rendergraph.compare.ledger import CHECKSUM, Ledger, checksum
 from rendergraph.compare.sources import sources_digest
-from rendergraph.compare.timing import Spread, Times
+from rendergraph.compare.timing import NO_TIMES, Times
 from rendergraph.compare.values import Pixels, Result, machine
 from rendergraph.errors import Place, Problem, RenderError
+from rendergraph.jsonable import jsonable
 from rendergraph.metrics import Encoding, Metrics
+from rendergraph.session.made import at_time, described
 from rendergraph.version import __version__
 
 if TYPE_CHECKING:
     from rendergraph.session.values import Planned
 
 RUN = "run.json"
-NO_TIMES = Times(0, None, None, Spread.of([math.nan]), ())
-"""Of a run that has been drawn and not measured."""
+ERROR = "error"
+"""What a line has in place of figures where the run cannot be drawn or compared."""
 UNTIMED: Mapping[str, Any] = {"frames": 0, "frame_ms": None, "gpu_ms": None, "cpu_ms": None, "passes": []}
 
 
@@ -38,6 +41,7 @@ class Run:
         settings: path to value.
         planned: the pipeline with the settings.
         output: the output that is compared and kept.
+        frame: whose picture it is.
         key: what decides its picture and figures, so that it is known again.
         folder: where it is kept.
     """
@@ -46,13 +50,42 @@ class Run:
     settings: Mapping[str, str]
     planned: Planned
     output: str
+    frame: int
     key: str
     folder: Path
 
     @property
     def picture(self) -> Path:
         """The picture's file: light keeps its values."""
-        return self.folder / ("image.png" if self.output == "image" else "radiance.exr")
+        return self.folder / (f"{self.output}.png" if self.output == "image" else f"{self.output}.exr")
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A run that could not be drawn or compared.
+
+    Attributes:
+        name: the run's.
+        settings: path to value.
+        problems: why.
+    """
+
+    name: str
+    settings: Mapping[str, str]
+    problems: tuple[Problem, ...]
+
+    @property
+    def text(self) -> str:
+        """Why, a line a problem."""
+        return "\n".join(str(problem).splitlines()[0] for problem in self.problems)
+
+    def as_json(self) -> dict[str, Any]:
+        """Name, settings and reason."""
+        return {
+            "name": self.name,
+            "settings": {path: typed(value) for path, value in self.settings.items()},
+            ERROR: self.text,
+        }
 
 
 def key_of(planned: Planned, frame: int, against: str) -> str:
@@ -80,12 +113,12 @@ def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping
         raise RenderError(Problem("RG507", text, Place(str(run.folder)))) from error
     graph = run.planned.linked.graph
     info = graph.textures[graph.outputs[run.output]]
-    described = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
-    picture = Saved(run.picture, arrays[run.output], described, raw=False)
-    save_outputs([picture], {"rendergraph:pipeline": run.planned.linked.spec.to_yaml(origins=False)})
+    shown = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
+    picture = Saved(run.picture, arrays[run.output], shown, raw=False)
+    save_outputs([picture], {**described(run.planned.linked), **at_time(run.frame, 30.0)})
     record = {
         "key": run.key,
-        **_finite(result.as_json()),
+        **jsonable(result.as_json()),
         **UNTIMED,
         "picture": f"{run.folder.name}/{run.picture.name}",
         "picture_sha256": _digest(run.picture),
@@ -106,10 +139,23 @@ def settle(
         RenderError: the disk does not take it.
     """
     timed = {key: value for key, value in record.items() if key != CHECKSUM}
-    timed |= {**_finite(times.as_json()), "device": dict(device), "machine": machine()}
+    timed |= {**jsonable(times.as_json()), "device": dict(device), "machine": machine()}
     _describe(run, timed)
     ledger.append(timed)
     return timed
+
+
+def give_up(run: Run, problems: Sequence[Problem], ledger: Ledger, lines: Mapping[str, dict[str, Any]]) -> Failure:
+    """Give a run that cannot be drawn its line in the results, unless the last one says the same already.
+
+    Raises:
+        RenderError: the disk does not take it.
+    """
+    failure = Failure(run.name, run.settings, tuple(problems))
+    if lines.get(run.key, {}).get(ERROR) != failure.text:
+        source = run.planned.linked.selection.source
+        ledger.append({"key": run.key, "pipeline": source, **failure.as_json()})
+    return failure
 
 
 def _describe(run: Run, record: Mapping[str, Any]) -> None:
@@ -117,8 +163,11 @@ def _describe(run: Run, record: Mapping[str, Any]) -> None:
 
     resolved = run.planned.linked.spec.to_yaml(origins=False)
     document = {**record, "resolved": resolved, "metrics": metrics.description()}
+    document[CHECKSUM] = checksum(document)
     with staged([run.folder / RUN]) as (part,):
-        part.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        part.write_text(
+            json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8", errors="backslashreplace"
+        )
 
 
 def found_again(run: Run, lines: Mapping[str, dict[str, Any]]) -> dict[str, Any] | None:
@@ -128,7 +177,8 @@ def found_again(run: Run, lines: Mapping[str, dict[str, Any]]) -> dict[str, Any]
         run: which.
         lines: of the results, by key. A run that was drawn and not yet timed has none, only its `run.json`.
     """
-    record = lines.get(run.key) or _drawn_before(run)
+    line = lines.get(run.key)
+    record = line if line is not None and ERROR not in line else _drawn_before(run)
     return record if record is not None and is_kept(run, record) else None
 
 
@@ -139,7 +189,9 @@ def _drawn_before(run: Run) -> dict[str, Any] | None:
         return None
     if not isinstance(document, dict) or document.get("key") != run.key:
         return None
-    return {name: value for name, value in document.items() if name not in ("resolved", "metrics")}
+    if document.get(CHECKSUM) != checksum(document):  # somebody has changed it
+        return None
+    return {name: value for name, value in document.items() if name not in ("resolved", "metrics", CHECKSUM)}
 
 
 def is_kept(run: Run, record: Mapping[str, Any]) -> bool:
@@ -168,12 +220,15 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
         radiance_rmse=record["radiance_rmse"],
         graph=linked.graph,
         plan=plan,
+        not_finite=record["not_finite"],
+        figures=record.get("figures", {}),
     )
 
 
 def _metrics(record: Mapping[str, Any]) -> Metrics:
     plugins = {name: _number(value) for name, value in record.get("plugin_metrics", {}).items()}
-    return Metrics(_number(record["rmse"]), record["psnr"], _number(record["ssim"]), _number(record["flip"]), plugins)
+    psnr = record["psnr"] if record["rmse"] is not None else math.nan
+    return Metrics(_number(record["rmse"]), psnr, _number(record["ssim"]), _number(record["flip"]), plugins)
 
 
 def _digest(path: Path) -> str:
@@ -182,12 +237,3 @@ def _digest(path: Path) -> str:
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no NaN."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 RESULTS = "results.jsonl"
 STUDY = "study.json"
+_LOCK = ".lock"
 _VALUES = "resolved"
 """The whole file without the axes; the other entries of a study are said in words."""
 
@@ -39,17 +42,41 @@ def study_of(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
     }
 
 
-def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[Ledger, dict[str, dict[str, Any]], int]:
-    """The folder's results: where they go, what is there by key, and how many lines are not whole.
+@contextlib.contextmanager
+def claimed(out: Path) -> Iterator[None]:
+    """Make the folder where there is none, and keep other sweeps out of it meanwhile.
+
+    The lock is the system's, and ends with the process, however that ends.
 
     Raises:
-        InputError: there are results already, or those of another study, or it cannot be a folder.
+        InputError: it cannot be a folder, or another sweep is at work in it.
     """
-    ledger = Ledger(out / RESULTS)
+    import fcntl  # a sweep is read and checked on every system
+
     try:
         out.mkdir(parents=True, exist_ok=True)
+        lock = os.open(out / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as error:
         raise _refused(out, error.strerror or str(error)) from error
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise _refused(out, "another sweep is at work in it; wait for that, or name another folder") from None
+        yield
+    finally:
+        os.close(lock)
+
+
+def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[Ledger, dict[str, dict[str, Any]], int]:
+    """A claimed folder's results: where they go, what is there by key, and how many lines are not whole.
+
+    What a killed sweep was about to write is removed.
+
+    Raises:
+        InputError: there are results already, or those of another study.
+    """
+    ledger = Ledger(out / RESULTS)
     if (ledger.path.exists() or (out / STUDY).exists()) and not resume:
         raise _refused(out, "it has results of a sweep; --resume adds what is missing, or name another folder")
     before = _study_in(out)
@@ -59,6 +86,8 @@ def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[L
             "; ".join(named) or f"other values (-s, -p or the file): {_first_change(before[_VALUES], study[_VALUES])}"
         )
         raise _refused(out, f"it has results of another study: {what}; name another folder: -o {out}-2")
+    for part in (*out.glob(".*.part"), *out.glob("*/.*.part")):
+        part.unlink(missing_ok=True)
     records, torn = ledger.read()
     return ledger, {record["key"]: record for record in records if "key" in record}, torn
 
@@ -68,7 +97,9 @@ def begin(out: Path, study: Mapping[str, Any]) -> None:
     from rendergraph.images.files import staged  # a sweep is checked without OpenImageIO
 
     with staged([out / STUDY]) as (part,):
-        part.write_text(json.dumps(study, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        part.write_text(
+            json.dumps(study, indent=2, ensure_ascii=False) + "\n", encoding="utf-8", errors="backslashreplace"
+        )
 
 
 def kept_runs(out: Path) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -84,6 +85,10 @@ class Times:
 
 def _spread(found: Mapping[str, float] | None) -> Spread | None:
     return None if found is None else Spread(**found)
+
+
+NO_TIMES = Times(0, None, None, Spread(*[math.nan] * 5), ())
+"""Of what was drawn and not measured, or not drawn at all."""
 
 
 def times_of(frames: Sequence[FrameTimes], types: Mapping[str, str]) -> Times:

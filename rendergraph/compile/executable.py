@@ -11,22 +11,30 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
+from rendergraph.compile.memory import Call
+from rendergraph.compile.reuse import Reuse
+from rendergraph.expand import CAMERA
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
-from rendergraph.program import prefix
+from rendergraph.program import looked_at, prefix
 from rendergraph.schedule.dependencies import StepKey, touched_ids
-from rendergraph.steps import Step
+from rendergraph.steps import Read, Step
 
 if TYPE_CHECKING:
     import moderngl
 
     from rendergraph.allocate import ResourcePlan
+    from rendergraph.compile.gpu_scene import GpuScene
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.views import ViewBuffers
     from rendergraph.gl.device import Device
+    from rendergraph.gl.passed import Passed
     from rendergraph.gl.timer import Timer
 
-Call = Callable[[], object]
+
+_MOST_PARTS = 64
+"""Lists of some of the steps that are remembered."""
 
 
 @dataclass(eq=False)
@@ -85,6 +93,7 @@ class CompiledStep:
         draws: in order.
         sorted: draws whose order is the eye's, instead of `draws`.
         after: barriers, poison.
+        watched: around the draws: calls that count, or leave them out; first and last.
     """
 
     step: Step
@@ -92,15 +101,21 @@ class CompiledStep:
     draws: list[Draw] = field(default_factory=list)
     sorted: SortedDraws | None = None
     after: list[Call] = field(default_factory=list)
+    watched: tuple[list[Call], list[Call]] = field(default_factory=lambda: ([], []))
 
     @property
     def all_draws(self) -> list[Draw]:
         """All draws, however they are ordered."""
         return self.draws + (self.sorted.parts if self.sorted is not None else [])
 
+    def values(self, step: Step) -> dict[str, Any]:
+        """The uniforms of a step like this one that any of its programs looks at."""
+        seen = {name for draw in self.all_draws for name in draw.program.uniforms}
+        return {name: value for name, value in step_uniforms(step).items() if name in seen}
+
 
 @dataclass(frozen=True, eq=False)
-class Listed:
+class FrameStep:
     """A step as a frame runs it: all its calls, flat, and what measures it.
 
     What is set before a draw depends on the steps before it, so the calls of another list may differ.
@@ -125,27 +140,44 @@ class Executable:
         due: kept steps that the next frame runs.
         statics: uniform writes that hold for the whole frame.
         sorters: called with the view tables when a view has changed: objects front to back.
+        scene: what it draws, which counts its changes.
+        reuse: which steps have to run.
+        filled: what the CPU wrote into buffers last.
+        touched: the sources that have changed since the last frame, as `_looks` names them, but for the scene's.
         timers: one a step.
+        passed: what steps are left out by.
         buffers: draw commands.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written and everything bound before the next frame.
+        looks_back: a program looks at where things were in the frame before.
     """
 
     device: Device
     plan: ResourcePlan
     memory: Memory
     views: ViewBuffers
+    scene: GpuScene
     binds: list[list[Call]]
     steps: list[list[CompiledStep]]
-    lists: list[list[Listed]] = field(default_factory=list)
+    lists: list[list[FrameStep]] = field(default_factory=list)
     due: set[StepKey] = field(default_factory=set)
     statics: list[Call] = field(default_factory=list)
     sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
+    passed: list[Passed] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
     vertex_arrays: Call = bool
     fresh: bool = True
-    _steady: list[list[Listed]] = field(default_factory=list)
+    looks_back: bool = False
+    filled: dict[str, bytes] = field(default_factory=dict)
+    touched: set[str] = field(default_factory=set)
+    _steady: list[list[FrameStep]] = field(default_factory=list)
+    _parts: dict[tuple[int, tuple[int, ...]], list[FrameStep]] = field(default_factory=dict)
+    _seen: Mapping[str, int] = field(default_factory=dict)
+    _begun: bool = False
+
+    def __post_init__(self) -> None:
+        self.reuse = Reuse(self.plan, self._looks)
 
     @cached_property
     def kept(self) -> dict[StepKey, Step]:
@@ -155,14 +187,68 @@ class Executable:
         return {s.key: s for s in steps if any(resources[write.resource].role == "kept" for write in s.writes)}
 
     def renew(self) -> None:
-        """Let the next frame make all that is kept: nothing has, or what did failed."""
+        """Let the next frame make everything, what is kept included: nothing has, or what did failed."""
         self.due = set(self.kept)
+        self.reuse.forget()
         self.assemble()
 
     def done(self) -> None:
-        """The kept steps that were due have run: go on without them."""
+        """A frame has run: go on without the kept steps that were due."""
+        self._begun = False
         if self.due:
             self.due, self.lists = set(), self._steady
+
+    def break_off(self) -> None:
+        """A step was broken off in its middle: leave nothing of it to what is drawn after."""
+        for passed in self.passed:
+            passed.break_off()
+        self.fresh = True
+
+    def next(self, parity: int, *, reuse: bool) -> list[FrameStep]:
+        """What a frame runs: all steps, or with `reuse` those whose values are gone or out of date."""
+        if not reuse or self.due or self._begun:  # or the last frame was broken off
+            self.reuse.forget()
+        self._begun = True
+        changes = self.scene.changes
+        if changes != self._seen:
+            self.touched |= {name for name, count in changes.items() if self._seen.get(name, 0) != count}
+            self._seen = dict(changes)
+        positions = self.reuse.choose(frozenset(self.touched))
+        self.touched.clear()
+        if positions is None:
+            return self.lists[parity]
+        key = parity, positions
+        if key not in self._parts:
+            if len(self._parts) >= _MOST_PARTS:
+                self._parts.clear()
+            self._parts[key] = self._listed(parity, positions)
+        return self._parts[key]
+
+    def _looks(self) -> list[frozenset[str]]:
+        """For each step, what it looks at beside what other steps have made."""
+        resources, found = self.plan.resources, []
+        for compiled in self.steps[0]:
+            step = compiled.step
+            blocks = {b for draw in compiled.all_draws for text in draw.program.texts.values() for b in looked_at(text)}
+            views = {"camera_block": source_of_view(CAMERA)}
+            if step.view is not None:
+                views["pass_view_block"] = source_of_view(step.view)
+                views["previous_pass_view_block"] = source_of_view(step.view, before=True)
+            for before, read in named(step):
+                table = resources[read.resource].view
+                if table is not None:
+                    views[f"{before}{read.name}_view_block"] = source_of_view(table, before=read.previous)
+                    views[f"{before}previous_{read.name}_view_block"] = source_of_view(table, before=True)
+            sources = {views.get(block, block) for block in blocks}
+            sources |= {source_of_step(step.key), *(source_of_buffer(id) for id in touched_ids(step))}
+            if step.kind == "geometry":
+                sources |= {"instances", source_of_view(step.view or "")}
+            if any(name in draw.program.object for draw in compiled.all_draws for name in PREVIOUS_ATTRIBUTES):
+                sources.add("instances before")
+            if step.region is not None:
+                sources.add(source_of_region(step.node, step.region))
+            found.append(frozenset(sources))
+        return found
 
     @cached_property
     def reads_frame(self) -> bool:
@@ -188,13 +274,15 @@ class Executable:
                     (own if key in shared else self.statics).append(write)
             return own
 
-        def listed(steps: Iterable[CompiledStep], due: Container[StepKey]) -> list[Listed]:
+        def listed(parity: int, positions: Iterable[int]) -> list[FrameStep]:
             state: Pieces | None = None
-            found: list[Listed] = []
-            for compiled, timer in zip(steps, self.timers, strict=True):
-                if compiled.step.key in self.kept and compiled.step.key not in due:
-                    continue
-                calls: list[Call] = list(compiled.before)
+            found: list[FrameStep] = []
+            for position in positions:
+                compiled, timer = self.steps[parity][position], self.timers[position]
+                calls: list[Call] = [*compiled.before, *compiled.watched[0]]
+                last = found[-1].calls[-1:] if found else ()
+                if calls and last and calls[0] is last[0]:
+                    del calls[0]  # one barrier between two steps that store
                 for draw in compiled.draws:
                     calls += draw.binds
                     if draw.state is not None:
@@ -207,18 +295,25 @@ class Executable:
                     ]
                     calls.append(compiled.sorted)
                     state = None
-                found.append(Listed(compiled.step, (*calls, *compiled.after), timer))
+                found.append(FrameStep(compiled.step, (*calls, *compiled.watched[1], *compiled.after), timer))
             return found
 
-        self.lists = [listed(steps, self.due) for steps in self.steps]
-        self._steady = [listed(steps, ()) for steps in self.steps] if self.due else self.lists
+        def all_but_kept(due: Container[StepKey]) -> list[list[FrameStep]]:
+            keys = [compiled.step.key for compiled in self.steps[0]]
+            positions = [at for at, key in enumerate(keys) if key not in self.kept or key in due]
+            return [listed(parity, positions) for parity in range(len(self.steps))]
+
+        self.lists = all_but_kept(self.due)
+        self._steady = all_but_kept(()) if self.due else self.lists
+        self._listed, self._parts = listed, {}
         self.fresh = True
 
     def set_uniforms(self, steps: Iterable[Step]) -> None:
         """Take over changed parameter values; the steps must be the same but for their uniforms."""
         values: Mapping[StepKey, Step] = {step.key: step for step in steps}
-        changed = {key for key, step in self.kept.items() if step_uniforms(step) != step_uniforms(values[key])}
-        self.due = self._with_dependents(self.due | changed)
+        changed = {c.step.key for c in self.steps[0] if c.values(c.step) != c.values(values[c.step.key])}
+        self.touched |= {source_of_step(key) for key in changed}
+        self.due = self._with_dependents(self.due | (changed & self.kept.keys()))
         for compiled in (c for steps_of in self.steps for c in steps_of):
             step = values[compiled.step.key]
             compiled.step = step
@@ -232,7 +327,7 @@ class Executable:
         """The steps that have to run again where these do.
 
         Those are all that make one of their textures, as what each of them found there is gone, all that read one, and
-        whoever makes what they read in a state before the last.
+        whoever makes what they read in a state before the last. The scene's environment is read and never made.
         """
         final: dict[str, int] = {}
         for step in self.kept.values():
@@ -240,7 +335,8 @@ class Executable:
         while True:
             steps = [self.kept[key] for key in due]
             again = {write.resource for step in steps for write in step.writes}
-            again |= {read.resource for step in steps for read in step.all_reads if read.version < final[read.resource]}
+            reads = [read for step in steps for read in step.all_reads]
+            again |= {read.resource for read in reads if read.version < final.get(read.resource, 0)}
             more = {key for key, step in self.kept.items() if not again.isdisjoint(touched_ids(step))}
             if more <= due:
                 return due
@@ -255,7 +351,36 @@ class Executable:
             buffer.release()
         for timer in self.timers:
             timer.release()
+        for passed in self.passed:
+            passed.release()
         self.timers.clear()
+        self.passed.clear()
+
+
+def source_of_step(key: StepKey) -> str:
+    """A step's own parameters, as something that values are made of (`Reuse`)."""
+    return f"step {key[0]} {key[1]}"
+
+
+def source_of_view(table: str, *, before: bool = False) -> str:
+    """A table of views, or what it was in the frame before, likewise."""
+    return f"view {table} before" if before else f"view {table}"
+
+
+def source_of_buffer(id: str) -> str:
+    """What the CPU writes into a buffer, likewise."""
+    return f"buffer {id}"
+
+
+def source_of_region(node: str, number: int) -> str:
+    """The part of the picture that steps are drawn in, likewise."""
+    return f"region {node} {number}"
+
+
+def named(step: Step) -> list[tuple[str, Read]]:
+    """What a step and the functions it calls read, each with what stands before its name in the text."""
+    found = [("", read) for read in step.reads]
+    return found + [(prefix(function.node), read) for function in step.functions for read in function.reads]
 
 
 def step_uniforms(step: Step) -> dict[str, Any]:

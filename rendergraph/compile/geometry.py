@@ -16,8 +16,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.compile.executable import Call, Draw, SortedDraws
-from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.executable import Draw, SortedDraws
+from rendergraph.compile.gpu_scene import GpuScene, MeshIndices
+from rendergraph.compile.memory import Call
 from rendergraph.compile.views import ViewBuffers
 from rendergraph.expand import CAMERA
 from rendergraph.program.variants import features, select
@@ -57,6 +58,7 @@ class MultiDraw:
         clockwise: whether front faces are clockwise.
         objects: object indices in the order they are drawn.
         commands: the buffer of draw commands.
+        indices: what the commands count through.
     """
 
     defines: Mapping[str, str]
@@ -65,10 +67,11 @@ class MultiDraw:
     clockwise: bool
     objects: npt.NDArray[np.int64]
     commands: moderngl.Buffer
+    indices: MeshIndices
 
     def call(self, vertex_array: Any) -> Call:
         """The draw."""
-        return partial(vertex_array.render_indirect, self.commands, moderngl.TRIANGLES, len(self.objects))
+        return partial(vertex_array.render_indirect, self.commands, self.indices.mode, len(self.objects))
 
 
 @dataclass(eq=False)
@@ -94,6 +97,7 @@ class GeometryCompiler:
             return [make(multi_draw) for multi_draw in self._grouped(step, objects)]
         if step.order == "back_to_front":
             return self._sorted(step, objects, make)
+        indices = self.scene.indices(step.topology)
         runs: list[tuple[MultiDrawKey, list[int]]] = []
         for index in objects:
             key = self._key(step, index)
@@ -101,16 +105,17 @@ class GeometryCompiler:
                 runs[-1][1].append(index)
             else:
                 runs.append((key, [index]))
-        return [make(self._multi_draw(key, members)) for key, members in runs]
+        return [make(self._multi_draw(key, members, indices)) for key, members in runs]
 
     def _grouped(self, step: Step, objects: list[int]) -> list[MultiDraw]:
         view = (step.view or CAMERA, step.view_index or 0)
-        key = (view, tuple(objects), step.materials, step.state.cull, step.state.front)
+        key = (view, tuple(objects), step.materials, step.topology, step.state.cull, step.state.front)
         if key not in self._multi_draws:
+            indices = self.scene.indices(step.topology)
             groups: dict[MultiDrawKey, list[int]] = {}
             for index in objects:
                 groups.setdefault(self._key(step, index), []).append(index)
-            self._multi_draws[key] = [self._multi_draw(alike, members) for alike, members in groups.items()]
+            self._multi_draws[key] = [self._multi_draw(alike, members, indices) for alike, members in groups.items()]
             for multi_draw in self._multi_draws[key]:
                 if len(multi_draw.objects) > 1:
                     self.sorters.append(partial(self._sort, multi_draw, *view))
@@ -122,18 +127,19 @@ class GeometryCompiler:
         parts = {key: number for number, key in enumerate(dict.fromkeys(keys))}
         members = np.array(objects, np.int64)
         part_of = np.array([parts[key] for key in keys], np.int64)
-        everything = MultiDraw({}, {}, "none", False, members, self._command_buffer(members))
-        draws = [make(self._multi_draw(key, objects[:1])) for key in parts]
+        indices = self.scene.indices(step.topology)
+        commands = self._command_buffer(members, indices)
+        draws = [make(self._multi_draw(key, objects[:1], indices)) for key in parts]
 
         def render(part: int, first: int, count: int) -> None:
-            draws[part].vertex_array.render_indirect(everything.commands, moderngl.TRIANGLES, count, first)
+            draws[part].vertex_array.render_indirect(commands, indices.mode, count, first)
 
         made = SortedDraws(draws, render)
 
         def sort(views: ViewBuffers) -> None:
             view = views.current[step.view or CAMERA][step.view_index or 0]
             order = np.argsort(-self._depths(members, view), kind="stable")
-            everything.commands.write(self._commands(members[order]).tobytes())
+            commands.write(self._commands(members[order], indices).tobytes())
             kinds = part_of[order]
             starts = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(kinds)]
             made.runs = [(int(kinds[a]), a, b - a) for a, b in pairwise(starts)]
@@ -141,14 +147,15 @@ class GeometryCompiler:
         self.sorters.append(sort)
         return made
 
-    def _multi_draw(self, key: MultiDrawKey, members: list[int]) -> MultiDraw:
+    def _multi_draw(self, key: MultiDrawKey, members: list[int], indices: MeshIndices) -> MultiDraw:
         self.scene.load_images([texture for _, texture in key.textures])
         objects = np.array(members, np.int64)
         found = {name: self.scene.texture(texture) for name, texture in key.textures}
-        return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, objects, self._command_buffer(objects))
+        commands = self._command_buffer(objects, indices)
+        return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, objects, commands, indices)
 
-    def _command_buffer(self, objects: npt.NDArray[np.int64]) -> moderngl.Buffer:
-        buffer = self.scene.device.ctx.buffer(self._commands(objects).tobytes() or bytes(COMMAND.itemsize))
+    def _command_buffer(self, objects: npt.NDArray[np.int64], indices: MeshIndices) -> moderngl.Buffer:
+        buffer = self.scene.device.ctx.buffer(self._commands(objects, indices).tobytes() or bytes(COMMAND.itemsize))
         self.buffers.append(buffer)
         return buffer
 
@@ -157,9 +164,8 @@ class GeometryCompiler:
         depths: npt.NDArray[np.float64] = -(self.scene.packed.centers[objects] @ view.view[2, :3] + view.view[2, 3])
         return depths
 
-    def _commands(self, objects: npt.NDArray[np.int64]) -> npt.NDArray[np.void]:
-        packed = self.scene.packed
-        meshes = packed.meshes[packed.object_mesh[objects]]
+    def _commands(self, objects: npt.NDArray[np.int64], indices: MeshIndices) -> npt.NDArray[np.void]:
+        meshes = indices.meshes[self.scene.packed.object_mesh[objects]]
         commands = np.zeros(len(objects), COMMAND)
         commands["count"] = meshes["count"]
         commands["instances"] = 1
@@ -171,13 +177,13 @@ class GeometryCompiler:
     def _sort(self, multi_draw: MultiDraw, table: str, index: int, views: ViewBuffers) -> None:
         depths = self._depths(multi_draw.objects, views.current[table][index])
         multi_draw.objects = multi_draw.objects[np.argsort(depths, kind="stable")]
-        multi_draw.commands.write(self._commands(multi_draw.objects).tobytes())
+        multi_draw.commands.write(self._commands(multi_draw.objects, multi_draw.indices).tobytes())
 
     def _key(self, step: Step, index: int) -> MultiDrawKey:
         scene = self.scene.scene
         placed = scene.objects[index]
         material = scene.materials[placed.material]
-        defines, found = features(material, scene.meshes[placed.mesh], step.materials)
+        defines, found = features(scene, index, step.materials)
         cull, front = step.state.cull, step.state.front
         clockwise = bool(self.scene.packed.mirrored[index]) if front == "object" else front == "clockwise"
         if cull == "material":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,20 +19,25 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.variants import light_macros, scene_macros, storage_blocks
 from rendergraph.scene import pack
-from rendergraph.scene.model import ImageSource, Scene, Texture
-from rendergraph.scene.pack import PackedScene
+from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture
+from rendergraph.scene.pack import PackedScene, Records
 from rendergraph.textures import TextureDesc, full_mip_count
 
 Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
 """Image to (height, width, 4) uint8 or float32, top row first; the flag says that colours are sRGB."""
 
+DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
+"""The picture around a scene, likewise."""
+
+_TRILINEAR = 0x2703
+_ANISOTROPY = 8  # texels along the longer side of what a pixel sees of a texture
 _MIN = {
     "nearest": 0x2600,
     "linear": 0x2601,
     "nearest_mipmap_nearest": 0x2700,
     "linear_mipmap_nearest": 0x2701,
     "nearest_mipmap_linear": 0x2702,
-    "linear_mipmap_linear": 0x2703,
+    "linear_mipmap_linear": _TRILINEAR,
 }
 _MAG = {"nearest": 0x2600, "linear": 0x2601}
 _WRAP = {"repeat": 0x2901, "mirror": 0x8370, "clamp": 0x812F}
@@ -46,12 +52,33 @@ SCENE_ATTRIBUTES = {
     "in_object1": "4f",
     "in_object2": "4f",
     "in_ids": "2i",
+    "in_previous0": "4f",
+    "in_previous1": "4f",
+    "in_previous2": "4f",
 }
 """What a vertex shader that draws the scene may read, with moderngl's formats."""
 _ABSENT = {"in_tangent": (0.0, 0.0, 0.0, 0.0), "in_uv0": (0.0, 0.0), "in_uv1": (0.0, 0.0), "in_color": (1.0,) * 4}
 """What an attribute holds that no mesh of the scene has; `pack` fills the same in for a mesh that lacks it."""
 _INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "4f"), ("in_ids", "2i"))
+PREVIOUS_ATTRIBUTES = ("in_previous0", "in_previous1", "in_previous2")
+"""The same rows in the frame before."""
+_PREVIOUS_FORMAT = (*((name, "4f") for name in PREVIOUS_ATTRIBUTES), ("", "2i"))
 _PADDING = {"4f": "16x", "2i": "8x"}
+
+
+@dataclass(frozen=True, eq=False)
+class MeshIndices:
+    """The indices of all meshes, for one kind of primitive.
+
+    Attributes:
+        buffer: the indices.
+        meshes: `MESH` records that say where each mesh's lie.
+        mode: the primitive, moderngl's.
+    """
+
+    buffer: moderngl.Buffer
+    meshes: Records
+    mode: int
 
 
 @dataclass(eq=False)
@@ -61,17 +88,23 @@ class GpuScene:
     Attributes:
         packed: the arrays the buffers were made from.
         scene: the scene they were packed from.
+        changes: how often each block, the `instances`, and those of the frame before have been uploaded anew.
     """
 
     device: Device
     scene: Scene
     packed: PackedScene
     decode: Decode
+    decode_light: DecodeLight
+    changes: Counter[str] = field(default_factory=Counter)
     _streams: dict[str, tuple[moderngl.Buffer, str]] = field(default_factory=dict)
     _constants: dict[str, moderngl.Buffer] = field(default_factory=dict)
     _images: dict[tuple[ImageSource, bool], GpuTexture] = field(default_factory=dict)
     _samplers: dict[tuple[int, ...], int] = field(default_factory=dict)
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = field(default_factory=dict)
+    _environment: GpuTexture | None = None
+    _before: moderngl.Buffer | None = None
+    _instances_before: Records | None = None
 
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed
@@ -85,7 +118,8 @@ class GpuScene:
         ):
             if array is not None and array.size:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
-        self._indices = ctx.buffer(packed.indices.tobytes() or bytes(4))
+        buffer = ctx.buffer(packed.indices.tobytes() or bytes(4))
+        self._indices = {"triangles": MeshIndices(buffer, packed.meshes, moderngl.TRIANGLES)}
         self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
         stored = storage_blocks(packed, self.device.limits["uniform_block"])
         for block, records in pack.blocks(packed).items():
@@ -116,29 +150,58 @@ class GpuScene:
 
     def update(self, scene: Scene) -> None:
         """Take over an animated scene's lights and transforms; the meshes stay."""
-        packed = pack.update(self.packed, scene)
+        packed = pack.update(self.packed, self.scene, scene)
         for block, now, before in (
             ("light_block", packed.lights, self.packed.lights),
             ("material_block", packed.materials, self.packed.materials),
+            ("environment_block", packed.environment, self.packed.environment),
         ):
-            if block in self._blocks and now.tobytes() != before.tobytes():
+            if block in self._blocks and now is not before and now.tobytes() != before.tobytes():
                 self._blocks[block][0].write(now.tobytes())
-        if packed.instances.tobytes() != self.packed.instances.tobytes():
-            self._instances.write(packed.instances.tobytes())
+                self.changes[block] += 1
+        if packed.instances is not self.packed.instances:
+            placed = packed.instances.tobytes()
+            if placed != self.packed.instances.tobytes():
+                self._instances.write(placed)
+                self.changes["instances"] += 1
         self.scene, self.packed = scene, packed
 
-    def vertex_array(self, programs: ProgramCache, program: Program) -> Any:
+    def advance(self) -> None:
+        """From now on where the objects are is where they were in the frame before; asked of what looks back."""
+        if self._before is not None and self._instances_before is not self.packed.instances:
+            self._instances_before = self.packed.instances
+            self._before.write(self.packed.instances.tobytes())
+            self.changes["instances before"] += 1
+
+    def indices(self, topology: str) -> MeshIndices:
+        """The indices of `triangles`, or of `triangles_adjacency`, which are found when somebody first draws them."""
+        if topology not in self._indices:
+            indices, meshes = pack.with_adjacency(self.packed)
+            buffer = self.device.ctx.buffer(indices.tobytes() or bytes(4))
+            self._indices[topology] = MeshIndices(buffer, meshes, moderngl.TRIANGLES_ADJACENCY)
+        return self._indices[topology]
+
+    def vertex_array(self, programs: ProgramCache, program: Program, topology: str) -> Any:
         """The streams a program looks at, the object's transform once an instance, and the index buffer."""
         names = set(program.object)
         content: list[tuple[Any, ...]] = [
             (buffer, layout, name) for name, (buffer, layout) in self._streams.items() if name in names
         ]
         content += [(*self._constant(name), name) for name in _ABSENT if name in names and name not in self._streams]
-        used = [name for name, _ in _INSTANCE_FORMAT if name in names]
-        if used:
-            layout = " ".join(f if name in names else _PADDING[f] for name, f in _INSTANCE_FORMAT)
-            content.append((self._instances, f"{layout}/i", *used))
-        return programs.vertex_array(program, (id(self), "scene"), content, self._indices)
+        for formats in (_INSTANCE_FORMAT, _PREVIOUS_FORMAT):
+            used = [name for name, _ in formats if name in names]
+            if used:
+                layout = " ".join(f if name in names else _PADDING[f] for name, f in formats)
+                buffer = self._instances if formats is _INSTANCE_FORMAT else self._previous()
+                content.append((buffer, f"{layout}/i", *used))
+        return programs.vertex_array(program, (id(self), "scene", topology), content, self.indices(topology).buffer)
+
+    def _previous(self) -> moderngl.Buffer:
+        """Where objects were in the frame before, kept as soon as a program looks at it."""
+        if self._before is None:
+            self._instances_before = self.packed.instances
+            self._before = self.device.ctx.buffer(self.packed.instances.tobytes() or bytes(64))
+        return self._before
 
     def _constant(self, name: str) -> tuple[moderngl.Buffer, str]:
         """One value once an instance: draws begin at the object's own instance, so a single one would not do."""
@@ -153,9 +216,10 @@ class GpuScene:
         """GL names of a material texture and its sampler."""
         image = self._images[texture.image, texture.srgb].glo
         wraps = (_WRAP[texture.wrap_s], _WRAP[texture.wrap_t])
-        key = (_MIN.get(texture.min_filter, 0x2703), _MAG[texture.mag_filter], *wraps)
+        key = (_MIN.get(texture.min_filter, _TRILINEAR), _MAG[texture.mag_filter], *wraps)
         if key not in self._samplers:
-            self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=1)
+            steps = min(_ANISOTROPY, self.device.limits["anisotropy"]) if key[0] == _TRILINEAR else 1
+            self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=steps)
         return image, self._samplers[key]
 
     def load_images(self, wanted: list[Texture]) -> None:
@@ -168,6 +232,13 @@ class GpuScene:
         with ThreadPoolExecutor() as pool:
             for key, pixels in zip(missing, pool.map(lambda k: self.decode(*k), missing), strict=True):
                 self._images[key] = self._upload(pixels, srgb=key[1])
+
+    def environment(self) -> GpuTexture:
+        """The picture around the scene, decoded and uploaded when somebody first asks."""
+        if self._environment is None:
+            assert self.scene.environment is not None  # only a scene that has one is asked
+            self._environment = self._upload(self.decode_light(self.scene.environment.image), srgb=True)
+        return self._environment
 
     def _upload(self, pixels: npt.NDArray[Any], *, srgb: bool) -> GpuTexture:
         height, width = pixels.shape[:2]
@@ -191,9 +262,12 @@ class GpuScene:
             buffer.release()
         for buffer in self._constants.values():
             buffer.release()
-        self._indices.release()
+        for indices in self._indices.values():
+            indices.buffer.release()
         self._instances.release()
-        for image in self._images.values():
+        if self._before is not None:
+            self._before.release()
+        for image in (*self._images.values(), *([self._environment] if self._environment else [])):
             textures.delete(self.device, image)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)

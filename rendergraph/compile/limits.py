@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rendergraph.allocate import ResourcePlan
-from rendergraph.errors import Problem, RenderError
+from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.expand import ViewTable
 from rendergraph.gl.device import Device
 from rendergraph.scene.pack import VIEW
@@ -17,9 +17,11 @@ def check_plan(device: Device, plan: ResourcePlan, views: Mapping[str, ViewTable
     """Refuse what this device cannot hold, all of it at once.
 
     Raises:
+        InputError: a node asks for more samples than there are (RG435).
         RenderError: textures, view tables or steps exceed a limit (RG435).
     """
     limits = device.limits
+    _check_samples(plan, limits)
     texts = [text for name, resource in plan.resources.items() for text in _texture(name, resource.desc, limits)]
     most = limits["uniform_block"] // VIEW.itemsize
     for name, table in views.items():
@@ -30,20 +32,43 @@ def check_plan(device: Device, plan: ResourcePlan, views: Mapping[str, ViewTable
         texts.append(f"there are {len(views)} view tables; this device binds {bindings - fixed_blocks} at once")
     problems = [Problem("RG435", text) for text in texts]
     problems += [problem for step in plan.schedule.steps for problem in _step(step, limits, fixed_blocks)]
+    if not device.has_depth_bounds:
+        problems += [
+            step.problem(
+                "RG435", "its `State` has depth bounds, which this device lacks; `rendergraph doctor` says more"
+            )
+            for step in plan.schedule.steps
+            if step.state.depth_bounds is not None
+        ]
     if problems:
         raise RenderError(problems)
+
+
+def _check_samples(plan: ResourcePlan, limits: Mapping[str, int]) -> None:
+    """Unlike the other limits it is met by what people type: a parameter, at the node that has it."""
+    problems = []
+    for step in plan.schedule.steps:
+        for write in step.writes:
+            desc = plan.resources[write.resource].desc
+            if not isinstance(desc, TextureDesc) or desc.samples == 1:
+                continue
+            family = FORMATS[desc.format].family
+            kind = "integer_" if family in ("int", "uint") else "depth_" if "depth" in family else ""
+            most = limits[f"{kind}samples"]
+            if desc.samples > most:
+                text = f"'{write.resource}' has {desc.samples} samples a texel, which is more than this device's {most}"
+                problems.append(Problem("RG435", text, step.place))
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
 
 
 def _texture(name: str, desc: object, limits: Mapping[str, int]) -> list[str]:
     if not isinstance(desc, TextureDesc):
         return []
-    family = FORMATS[desc.format].family
-    samples = "integer_samples" if family in ("int", "uint") else "depth_samples" if "depth" in family else "samples"
     found = []
     for words, value, most in (
         (f"is {desc.width}×{desc.height}", max(desc.size), limits["texture_size"]),
         (f"has {desc.layers} layers", desc.layers, limits["layers"]),
-        (f"has {desc.samples} samples a texel", desc.samples, limits[samples]),
     ):
         if value > most:
             found.append(f"'{name}' {words}, which is more than this device's {most}")

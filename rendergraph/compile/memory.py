@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import moderngl
 import numpy as np
 
-from rendergraph.allocate import ResourcePlan
+from rendergraph.allocate import Physical, ResourcePlan
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
+from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import GpuTexture, texel
 from rendergraph.steps import Read, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
+
+Call = Callable[[], object]
 
 _TEXTURE_LABEL = 0x1702
 _STATUS = {
@@ -43,15 +47,40 @@ class Attachment:
 
 
 @dataclass(eq=False)
+class Region:
+    """A part of the picture that a node's `update` sets, and steps are drawn in.
+
+    Attributes:
+        scissor: x, y, width and height; None for everything.
+        depth_bounds: least and greatest depth, for drivers that have depth bounds.
+    """
+
+    scissor: tuple[int, int, int, int] | None = None
+    depth_bounds: tuple[float, float] = (0.0, 1.0)
+
+    def use(self, framebuffer: moderngl.Framebuffer) -> None:
+        """Bind a framebuffer to draw within the scissor."""
+        framebuffer.scissor = self.scissor  # type: ignore[assignment]  # None takes the scissor away
+        framebuffer.use()
+
+    def bound_depth(self, raw: RawGL) -> None:
+        """Keep to the range of depth."""
+        raw.glDepthBoundsEXT(*self.depth_bounds)
+
+
+@dataclass(eq=False)
 class Memory:
     """Everything a pipeline allocates for one size.
 
-    `parity` is the frame number's: history textures swap their two copies with it.
+    `parity` is the frame number's: history textures swap their two copies with it. `regions` are those that steps are
+    drawn in, by node and number; `environment` gives the scene's own texture, which the scene keeps.
     """
 
     device: Device
     plan: ResourcePlan
+    environment: Callable[[], GpuTexture]
     physicals: list[GpuTexture | moderngl.Buffer] = field(default_factory=list)
+    regions: dict[tuple[str, int], Region] = field(default_factory=dict)
     _views: dict[tuple[object, ...], GpuTexture] = field(default_factory=dict)
     _samplers: dict[Sampler, int] = field(default_factory=dict)
     _framebuffers: dict[tuple[object, ...], moderngl.Framebuffer] = field(default_factory=dict)
@@ -60,7 +89,9 @@ class Memory:
     def __post_init__(self) -> None:
         try:
             for physical in self.plan.physicals:
-                if isinstance(physical.desc, BufferDesc):
+                if self._is_scenes(physical):
+                    self.physicals.append(self.environment())
+                elif isinstance(physical.desc, BufferDesc):
                     self.physicals.append(self.device.ctx.buffer(reserve=max(16, physical.desc.bytes)))
                 else:
                     label = ", ".join(physical.members)
@@ -72,7 +103,10 @@ class Memory:
             self.release()
             raise
 
-    @property
+    def _is_scenes(self, physical: Physical) -> bool:
+        return self.plan.resources[physical.members[0]].role == "scene"
+
+    @cached_property
     def parities(self) -> int:
         """2 where any texture has a history, else 1."""
         return 2 if any(len(places) == 2 for places in self.plan.placement.values()) else 1
@@ -127,13 +161,14 @@ class Memory:
         color_mask: tuple[bool, bool, bool, bool] = (True, True, True, True),
         depth_mask: bool = True,
         scissor: tuple[int, int, int, int] | None = None,
+        region: tuple[str, int] | None = None,
     ) -> moderngl.Framebuffer:
         """A framebuffer whose `use()` also sets viewport, masks and scissor.
 
         moderngl cannot attach wrapped depth textures, mips or layers, so it is made over 1×1 renderbuffers, which raw
         calls then replace by the real attachments.
         """
-        key = (tuple(_key(c) for c in colors), _key(depth), size, color_mask, depth_mask, scissor)
+        key = (tuple(_key(c) for c in colors), _key(depth), size, color_mask, depth_mask, scissor, region)
         if key in self._framebuffers:
             return self._framebuffers[key]
         stencil = depth is not None and FORMATS[depth.texture.desc.format].family == "depth_stencil"
@@ -171,6 +206,25 @@ class Memory:
         previous = isinstance(write, Read) and write.previous
         return Attachment(self.texture(write.resource, parity, previous=previous), write.mip or 0, write.layer)
 
+    def clear(
+        self,
+        resource: str,
+        parity: int,
+        value: float | tuple[float, ...],
+        *,
+        mip: int | None = None,
+        layer: int | None = None,
+    ) -> list[Call]:
+        """The calls that clear a texture, a mip or a layer; one seen through a view is drawn to (`textures.Clear`)."""
+        texture = self.texture(resource, parity)
+        if texture in self.physicals:
+            return [textures.Clear(self.device, texture, value, mip=mip, layer=layer)]
+        calls: list[Call] = []
+        for level in range(texture.desc.mips) if mip is None else (mip,):
+            target = self.framebuffer([Attachment(texture, level, layer)], None, texture.desc.mip_size(level))
+            calls += [target.use, ClearTarget(self.device, target, 0, texture.desc.format, value)]
+        return calls
+
     def _attach(self, framebuffer: int, point: int, attachment: Attachment) -> None:
         texture, raw = attachment.texture, self.device.raw
         if attachment.layer is None:
@@ -198,7 +252,9 @@ class Memory:
             textures.delete(self.device, view)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)
-        for physical in self.physicals:
+        for planned, physical in zip(self.plan.physicals, self.physicals, strict=False):  # it may have failed midway
+            if self._is_scenes(planned):
+                continue
             if isinstance(physical, GpuTexture):
                 textures.delete(self.device, physical)
             else:

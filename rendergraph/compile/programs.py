@@ -6,16 +6,13 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
-from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError
-from rendergraph.expand import ViewTable
 from rendergraph.gl import programs
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.glsl.expansion import check_expansion
-from rendergraph.program import compile_problems, link_problems, stage_texts
+from rendergraph.program import StageText, compile_problems, link_problems
 from rendergraph.resources import folder
-from rendergraph.steps import Resource, Step
 
 
 @dataclass(eq=False)
@@ -27,22 +24,12 @@ class ProgramCache:
     _programs: dict[tuple[object, ...], Program] = field(default_factory=dict)
     _vertex_arrays: dict[tuple[object, ...], Any] = field(default_factory=dict)
 
-    def get(
-        self,
-        step: Step,
-        types: Mapping[str, NodeType],
-        resources: Mapping[str, Resource],
-        views: Mapping[str, ViewTable],
-        defines: Mapping[str, str],
-        blocks: Mapping[str, int],
-        outputs: Sequence[str],
-    ) -> Program:
-        """The program of a step with these macros.
+    def get(self, texts: Mapping[str, StageText], blocks: Mapping[str, int], outputs: Sequence[str]) -> Program:
+        """The program of these texts.
 
         Raises:
-            InputError: the driver refused a shader, its macros grow too far, or a file is missing.
+            InputError: the driver refused a shader, or its macros grow too far.
         """
-        texts = stage_texts(step, types, resources, views, defines=defines)
         sources = {stage: text.text for stage, text in texts.items()}
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:
@@ -54,7 +41,9 @@ class ProgramCache:
             program = programs.link(self.device, sources, outputs)
         except programs.ProgramError as error:
             stage, message = programs.driver_message(error)
-            found = compile_problems(message, texts[stage]) if stage in texts else link_problems(message, texts)
+            found = (
+                compile_problems(message, texts[stage]) if stage and stage in texts else link_problems(message, texts)
+            )
             raise InputError(found) from error
         for name, binding in blocks.items():
             program.bind_block(name, binding)

@@ -20,11 +20,11 @@ from rendergraph.compile.checks import (
     check_uniforms,
     layout_for,
 )
-from rendergraph.compile.executable import Call, CompiledStep, Draw, Executable, SortedDraws, step_uniforms
+from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, named, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
-from rendergraph.compile.gpu_scene import SCENE_ATTRIBUTES, GpuScene
+from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.limits import check_plan, groups_of
-from rendergraph.compile.memory import ClearTarget, Memory
+from rendergraph.compile.memory import Call, ClearTarget, Memory, Region
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.stored import check_stored
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
@@ -33,10 +33,11 @@ from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
+from rendergraph.gl.passed import Passed
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import Clear, poison_value
 from rendergraph.gl.timer import Timer
-from rendergraph.program import Texts, check_kept_text, prefix, stage_texts
+from rendergraph.program import StepTexts, Texts, check_kept_text, positions_macro
 from rendergraph.program.variants import view_count
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, TextureDesc
@@ -50,7 +51,7 @@ _TOPOLOGY = {
     "triangles_adjacency": moderngl.TRIANGLES_ADJACENCY,
 }
 _ALL_BARRIERS = 0xFFFFFFFF
-_TEXTURE_2D = 0x0DE1
+_TEXTURE_2D, _DEPTH_BOUNDS_TEST, _CLIP_DISTANCE0 = 0x0DE1, 0x8890, 0x3000
 
 
 def compile_plan(
@@ -79,7 +80,7 @@ def compile_plan(
         InputError: a shader does not compile.
     """
     check_plan(device, plan, views, len(FIXED_BLOCKS))
-    memory = Memory(device, plan)
+    memory = Memory(device, plan, scene.environment)
     buffers = ViewBuffers(device, views)
     compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
     try:
@@ -106,9 +107,15 @@ class _Compiler:
     poison: bool
 
     def __post_init__(self) -> None:
+        self._step_texts = StepTexts(self.types, self.plan.resources, self.view_tables)
         self.units = Units(self.device, self.memory.parities)
         self.geometry = GeometryCompiler(self.scene)
+        self._barrier = partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS)
         self._geometry_draws: dict[tuple[str, int], list[Draw] | SortedDraws] = {}
+        # In a context of somebody else's such a query may be under way: there all is drawn.
+        asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
+        self._passed = {step.key: Passed(self.device) for step in self.plan.schedule.steps if step.key in asked}
+        self.looks_back = False
 
     def executable(self) -> Executable:
         steps = [
@@ -117,11 +124,13 @@ class _Compiler:
         ]
         self._keep_units(steps)
         binds: list[list[Call]] = [[*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()]
-        made = Executable(self.device, self.plan, self.memory, self.views, binds, steps)
+        made = Executable(self.device, self.plan, self.memory, self.views, self.scene, binds, steps)
         made.sorters = list(self.geometry.sorters)
         made.buffers = list(self.geometry.buffers)
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
+        made.looks_back = self.looks_back or self.views.looks_back
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
+        made.passed = list(self._passed.values())
         made.renew()
         return made
 
@@ -136,19 +145,34 @@ class _Compiler:
             "compute": self._compute,
             "clear": self._transfer,
             "mipmaps": self._transfer,
+            "resolve": self._transfer,
             "copy": self._transfer,
         }[step.kind](step, compiled, parity)
+        self._watch(step, compiled)
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
             clear_buffer(self.device, self.memory, write)
             for write in stored
             if write.use == "buffer" and write.load == "clear"
         ]
-        if stored and step.kind != "copy":  # what shaders store comes in no order by itself
-            compiled.after.append(partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS))
+        if stored and step.kind != "copy":  # what shaders store waits for nobody by itself, and nobody for it
+            compiled.before.insert(0, self._barrier)
+            compiled.after.append(self._barrier)
         if self.poison:
             compiled.after += self._poison(position, parity)
         return compiled
+
+    def _watch(self, step: Step, compiled: CompiledStep) -> None:
+        """See whether the step draws anything, where another one asks, and leave it out where it asks itself."""
+        first, last = compiled.watched
+        after = self._passed.get((step.node, step.if_drawn)) if step.if_drawn is not None else None
+        if after is not None:
+            first.append(after.only_if)
+        if step.key in self._passed:
+            first.append(self._passed[step.key].start)
+            last.append(self._passed[step.key].stop)
+        if after is not None:
+            last.append(after.anyway)
 
     def _fullscreen(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, {})
@@ -200,7 +224,9 @@ class _Compiler:
         vertex_array = self.programs.vertex_array(program, key, content)
         mode = _TOPOLOGY[step.topology]
         if isinstance(step.vertices, str):
-            call: Call = partial(vertex_array.render_indirect, self.memory.buffer(step.vertices), mode, 1)
+            call: Call = partial(
+                vertex_array.render_indirect, self.memory.buffer(step.vertices), mode, 1, first=step.command
+            )
         else:
             call = partial(vertex_array.render, mode, step.vertices, 0, step.instances)
         compiled.draws.append(Draw(program, uniforms, self._state(step, depth_default=True), call, binds))
@@ -216,7 +242,8 @@ class _Compiler:
             check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **multi_draw.defines}))
             for slot, (texture, sampler) in multi_draw.textures.items():
                 uniforms[slot] = self.units.unit((texture,), sampler, binds)
-            vertex_array = self.scene.vertex_array(self.programs, program)
+            vertex_array = self.scene.vertex_array(self.programs, program, step.topology)
+            self.looks_back |= any(name in program.object for name in PREVIOUS_ATTRIBUTES)
             state = self._state(step, depth_default=True, cull=multi_draw.cull, clockwise=multi_draw.clockwise)
             return Draw(program, uniforms, state, multi_draw.call(vertex_array), binds, vertex_array)
 
@@ -248,13 +275,14 @@ class _Compiler:
         """The program of a step with blocks bound and samplers given units."""
         outputs = [write.name for write in step.writes if write.use == "color"]
         blocks = dict(FIXED_BLOCKS)
+        before_views: dict[str, str] = {}
         if step.view is not None:
             blocks["pass_view_block"] = self.views.binding(step.view)
-        named: list[tuple[str, Read]] = [("", read) for read in step.reads]
-        named += [(prefix(function.node), read) for function in step.functions for read in function.reads]
+            before_views["previous_pass_view_block"] = step.view
+        reads = named(step)
         storage = len(FIXED_BLOCKS)  # lights and materials may be storage blocks too
         buffers: list[Call] = []
-        touched: list[tuple[str, Read | Write]] = [*named, *(("", write) for write in step.writes)]
+        touched: list[tuple[str, Read | Write]] = [*reads, *(("", write) for write in step.writes)]
         for before, use in touched:
             view = self.plan.resources[use.resource].view
             if use.use == "buffer" and before + use.name not in blocks:
@@ -262,31 +290,45 @@ class _Compiler:
                 buffers.append(partial(self.memory.buffer(use.resource).bind_to_storage_buffer, storage))
                 storage += 1
             elif view is not None and isinstance(use, Read):
-                blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
-        macros = {**self.scene.light_defines, **defines}
-        program = self.programs.get(step, self.types, self.plan.resources, self.view_tables, macros, blocks, outputs)
+                if use.previous:  # what was drawn last frame has last frame's view
+                    before_views[f"{before}{use.name}_view_block"] = view
+                else:
+                    blocks[f"{before}{use.name}_view_block"] = self.views.binding(view)
+                    before_views[f"{before}previous_{use.name}_view_block"] = view
+        blocks |= {name: self.views.previous_binding(table) for name, table in before_views.items()}
+        macros = {**self.scene.light_defines, **self._sample_positions(step), **defines}
+        texts = self._texts(step, macros)
+        program = self.programs.get(texts(), blocks, outputs)
+        for name in before_views.keys() & program.blocks.keys():
+            self.views.look_back(before_views[name])
         binds: list[Call] = buffers
         uniforms = step_uniforms(step)
         sampled: set[str] = set()
-        for before, read in named:
+        for before, read in reads:
             if read.use != "sample":
                 continue
             sampled.add(before + read.name)
             if before + read.name in program.uniforms:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
-        texts = self._texts(step, macros)
         check_kept_text(step, texts, self.types[step.node].cls, self.plan.resources)
         check_uniforms(step, program, uniforms, {*sampled, *materials}, texts)
         check_samplers(step, program, self.plan.resources, texts)
         check_blocks(step, program, blocks, texts)
         check_outputs(step, program, outputs)
-        check_stored(step, program, named, self.plan.resources, texts)
+        check_stored(step, program, reads, self.plan.resources, texts)
         return program, binds, uniforms
 
+    def _sample_positions(self, step: Step) -> dict[str, str]:
+        """Where the device has the samples of what a step draws to and reads."""
+        descs = [self.plan.resources[read.resource].desc for read in step.all_reads]
+        counts = {step.samples, *(desc.samples for desc in descs if isinstance(desc, TextureDesc))} - {1}
+        texts = {count: [f"vec2({x}, {y})" for x, y in self.device.sample_positions(count)] for count in sorted(counts)}
+        return {positions_macro(count): f"vec2[]({', '.join(text)})" for count, text in texts.items()}
+
     def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:
-        """The texts of a step's program, made again for a message."""
-        return partial(stage_texts, step, self.types, self.plan.resources, self.view_tables, defines=macros)
+        """The texts of a step's program."""
+        return partial(self._step_texts.of, step, macros)
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         """Bind the framebuffer, clearing first what the step says."""
@@ -298,15 +340,36 @@ class _Compiler:
         state = step.state
         depth_mask = depth_write is not None if state.depth_write is None else state.depth_write
         whole = self.memory.framebuffer(attachments, at_depth, step.size)
+        region = (step.node, step.region) if step.region is not None else None
+        within = self.memory.regions.setdefault(region, Region()) if region is not None else None
         drawn = self.memory.framebuffer(
-            attachments, at_depth, step.size, color_mask=state.color_mask, depth_mask=depth_mask, scissor=state.scissor
+            attachments,
+            at_depth,
+            step.size,
+            color_mask=state.color_mask,
+            depth_mask=depth_mask,
+            scissor=state.scissor,
+            region=region,
         )
         numbered: list[tuple[int | None, Write]] = [*enumerate(colors), *([(None, depth_write)] if depth_write else [])]
         clears = [self._clear(whole, number, write, parity) for number, write in numbered if write.load == "clear"]
         if clears:
             compiled.before += [whole.use, *clears]
-        if not clears or drawn is not whole:
+        if within is not None:
+            compiled.before.append(partial(within.use, drawn))
+        elif not clears or drawn is not whole:
             compiled.before.append(drawn.use)
+        bounds: Call | None = None
+        if state.depth_bounds is not None:
+            bounds = partial(self.device.raw.glDepthBoundsEXT, *state.depth_bounds)
+        elif within is not None and depth is not None and self.device.has_depth_bounds:
+            bounds = partial(within.bound_depth, self.device.raw)
+        if bounds is not None:
+            compiled.before += [partial(self.device.raw.glEnable, _DEPTH_BOUNDS_TEST), bounds]
+            compiled.after.append(partial(self.device.raw.glDisable, _DEPTH_BOUNDS_TEST))
+        for plane in range(_CLIP_DISTANCE0, _CLIP_DISTANCE0 + state.clip_distances):
+            compiled.before.append(partial(self.device.raw.glEnable, plane))
+            compiled.after.append(partial(self.device.raw.glDisable, plane))
 
     def _clear(self, target: moderngl.Framebuffer, number: int | None, write: Write, parity: int) -> Call:
         texture = self.memory.texture(write.resource, parity)
@@ -337,6 +400,5 @@ class _Compiler:
         for name in self.plan.released.get(position, ()):
             resource = self.plan.resources[name]
             if resource.role in ("transient", "internal") and isinstance(resource.desc, TextureDesc):
-                texture = self.memory.texture(name, parity)
-                calls.append(Clear(self.device, texture, poison_value(resource.desc.format)))
+                calls += self.memory.clear(name, parity, poison_value(resource.desc.format))
         return calls

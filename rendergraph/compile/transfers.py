@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
-from rendergraph.compile.executable import Call
-from rendergraph.compile.memory import Memory
+from rendergraph.compile.memory import Call, Memory
 from rendergraph.gl.device import Device
-from rendergraph.gl.textures import Clear
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc
 
+_COLOR, _NEAREST = 0x4000, 0x2600
 _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, _READ_WRITE = 0x8232, 0x8D94, 0x1401, 0x88BA
 
 
 def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
-    """The calls of a clear, a mip chain or a copy."""
+    """The calls of a clear, a mip chain, a resolve or a copy."""
     if step.kind == "copy":
         return _copy(device, memory, step, parity)
+    if step.kind == "resolve":
+        return _resolve(device, memory, step, parity)
     if step.kind == "mipmaps":
         textures = [memory.texture(write.resource, parity) for write in step.writes]
         return [partial(device.raw.glGenerateTextureMipmap, texture.glo) for texture in textures]
-    return [
-        clear_buffer(device, memory, write) if write.use == "buffer" else _clear(device, memory, write, parity)
-        for write in step.writes
-    ]
+    calls: list[Call] = []
+    for write in step.writes:
+        calls += [clear_buffer(device, memory, write)] if write.use == "buffer" else _clear(memory, write, parity)
+    return calls
 
 
 def clear_buffer(device: Device, memory: Memory, write: Write) -> Call:
@@ -54,14 +56,14 @@ def image_calls(device: Device, memory: Memory, step: Step, parity: int) -> tupl
                 FORMATS[texture.desc.format].gl,
             )
         )
-    written = [write for write in step.writes if write.use == "image" and write.load == "clear"]
-    calls += [_clear(device, memory, write, parity) for write in written]
+    for write in step.writes:
+        if write.use == "image" and write.load == "clear":
+            calls += _clear(memory, write, parity)
     return calls, {touched.name: unit for unit, touched in enumerate(images)}
 
 
-def _clear(device: Device, memory: Memory, write: Write, parity: int) -> Call:
-    texture = memory.texture(write.resource, parity)
-    return Clear(device, texture, write.clear, mip=write.mip, layer=write.layer)
+def _clear(memory: Memory, write: Write, parity: int) -> list[Call]:
+    return memory.clear(write.resource, parity, write.clear, mip=write.mip, layer=write.layer)
 
 
 def _copy(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
@@ -89,3 +91,16 @@ def _copy(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]
         )
         for mip in range(source.desc.mips)
     ]
+
+
+def _resolve(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
+    (read,), (write,) = step.reads, step.writes
+    source, target = memory.attachment(read, parity), memory.attachment(write, parity)
+    calls: list[Call] = []
+    for layer in range(source.texture.desc.layers) if source.texture.desc.kind != "texture2d" else (None,):
+        framebuffers = [memory.framebuffer([replace(end, layer=layer)], None, step.size) for end in (source, target)]
+        names = [framebuffer.glo for framebuffer in framebuffers]
+        box = (0, 0, *step.size)
+        calls.append(framebuffers[1].use)  # scissor and masks are the target's
+        calls.append(partial(device.raw.glBlitNamedFramebuffer, *names, *box, *box, _COLOR, _NEAREST))
+    return calls

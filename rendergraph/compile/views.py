@@ -8,13 +8,20 @@ from dataclasses import dataclass, field
 import moderngl
 import numpy as np
 
-from rendergraph.errors import Misuse
+from rendergraph.errors import Misuse, Problem, RenderError
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.gl.device import Device
 from rendergraph.scene.pack import VIEW, pack_view
 from rendergraph.steps import ViewMatrices
 
-FIXED_BLOCKS = {"camera_block": 0, "frame_block": 1, "light_block": 2, "material_block": 3, "material_uv_block": 4}
+FIXED_BLOCKS = {
+    "camera_block": 0,
+    "frame_block": 1,
+    "light_block": 2,
+    "material_block": 3,
+    "material_uv_block": 4,
+    "environment_block": 5,
+}
 """Binding points of the blocks the framework keeps; view tables follow."""
 
 
@@ -24,14 +31,19 @@ class ViewBuffers:
 
     Attributes:
         current: the views each table holds now.
+        changed, moved_before: the tables that were uploaded since these were emptied, and those of the frame before.
     """
 
     device: Device
     tables: Mapping[str, ViewTable]
     current: dict[str, tuple[ViewMatrices, ...]] = field(default_factory=dict)
-    changed: bool = True
+    changed: set[str] = field(default_factory=set)
+    moved_before: set[str] = field(default_factory=set)
     _buffers: dict[str, moderngl.Buffer] = field(default_factory=dict)
     _packed: dict[str, bytes] = field(default_factory=dict)
+    _before: dict[str, moderngl.Buffer] = field(default_factory=dict)
+    _packed_before: dict[str, bytes] = field(default_factory=dict)
+    _frame_bytes: bytes = b""
 
     def __post_init__(self) -> None:
         for name, table in self.tables.items():
@@ -44,6 +56,33 @@ class ViewBuffers:
         if table == CAMERA:
             return FIXED_BLOCKS["camera_block"]
         return len(FIXED_BLOCKS) + list(self.tables).index(table)
+
+    def previous_binding(self, table: str) -> int:
+        """The binding point of the views that a table had in the frame before."""
+        return len(FIXED_BLOCKS) + len(self.tables) + [CAMERA, *self.tables].index(table)
+
+    def look_back(self, table: str) -> None:
+        """Keep from now on what a table's views were in the frame before: a program looks at them."""
+        if table not in self._buffers or table in self._before:
+            return
+        if self.previous_binding(table) >= self.device.limits["uniform_bindings"]:
+            text = f"view table '{table}' and its frame before are more than this device binds at once"
+            raise RenderError(Problem("RG435", text))
+        self._before[table] = self.device.ctx.buffer(reserve=max(1, self.tables[table].count) * VIEW.itemsize)
+
+    @property
+    def looks_back(self) -> bool:
+        """Whether any program looks at views of the frame before."""
+        return bool(self._before)
+
+    def advance(self) -> None:
+        """From now on what the tables hold is what they held in the frame before."""
+        for table, buffer in self._before.items():
+            packed = self._packed.get(table)
+            if packed is not None and self._packed_before.get(table) is not packed:
+                self._packed_before[table] = packed
+                buffer.write(packed)
+                self.moved_before.add(table)
 
     def set(self, table: str, views: Sequence[ViewMatrices]) -> None:
         """Upload a table's views where they differ from what it holds."""
@@ -61,20 +100,28 @@ class ViewBuffers:
             return
         self._packed[table] = packed
         self._buffers[table].write(packed)
-        self.changed = True
+        self.changed.add(table)
 
-    def set_frame(self, time: float, delta: float, index: int) -> None:
-        """Upload the frame block."""
-        self._frame.write(np.array([time, delta], np.float32).tobytes() + np.array([index, 0], np.int32).tobytes())
+    def set_frame(self, time: float, delta: float, index: int, still: int) -> bool:
+        """Upload the frame block where it differs; whether it does."""
+        now = np.array([time, delta], np.float32).tobytes() + np.array([index, still], np.int32).tobytes()
+        if now == self._frame_bytes:
+            return False
+        self._frame_bytes = now
+        self._frame.write(now)
+        return True
 
     def bind(self) -> None:
         """Bind every block to its point; once a frame."""
         self._frame.bind_to_uniform_block(FIXED_BLOCKS["frame_block"])
         for name, buffer in self._buffers.items():
             buffer.bind_to_uniform_block(self.binding(name))
+        for name, buffer in self._before.items():
+            buffer.bind_to_uniform_block(self.previous_binding(name))
 
     def release(self) -> None:
         """Free the buffers."""
-        for buffer in (*self._buffers.values(), self._frame):
+        for buffer in (*self._buffers.values(), *self._before.values(), self._frame):
             buffer.release()
         self._buffers.clear()
+        self._before.clear()

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 from rendergraph.declare.node import Node
-from rendergraph.errors import Mistake, Misuse, Place, is_framework, nearest, shown_file, suggestion
+from rendergraph.errors import Mistake, Misuse, Place, is_framework, is_interruption, nearest, shown_file, suggestion
 
 
 def raised_at(error: BaseException, *own: Path | str) -> Place | None:
@@ -102,6 +102,23 @@ def _in_shader(text: str, name: str) -> tuple[int, int] | None:
     return None
 
 
+_MOST_SAID = 500
+"""Characters of an exception's text that a message repeats."""
+
+
+def told(error: BaseException) -> str:
+    """`KeyError: 'x'` in one line; a text that is endless is cut, and one that cannot be had is left out."""
+    try:
+        said = " ".join(str(error)[: 4 * _MOST_SAID].split())
+    except BaseException as another:  # a stranger's `__str__`
+        if is_interruption(another):
+            raise
+        said = ""
+    said = re.sub(r" For further information visit \S+", "", said)  # pydantic's link
+    said = said if len(said) <= _MOST_SAID else said[:_MOST_SAID] + "…"
+    return f"{type(error).__name__}: {said}"
+
+
 def happened(error: BaseException, cls: type, file: Path | None = None) -> Mistake:
     """`KeyError: 'x'` with the author's line, without the exception's name where the framework refused a call.
 
@@ -113,7 +130,7 @@ def happened(error: BaseException, cls: type, file: Path | None = None) -> Mista
     place = raised_at(error, cls.__module__)
     if place is None and file is not None and file.name:
         place = Place(shown_file(file))
-    text = str(error) if isinstance(error, Misuse) else f"{type(error).__name__}: {error}{_meant(error)}"
+    text = str(error) if isinstance(error, Misuse) else f"{told(error)}{_meant(error)}"
     return Mistake("", text, place=place)
 
 

@@ -9,9 +9,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from rendergraph.declare.blame import raised_at
+from rendergraph.declare.blame import raised_at, told
 from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
-from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.glsl.source import about
 from rendergraph.stamps import Stamp, again, looking
 from rendergraph.textures import SEMANTICS, Semantic
@@ -49,10 +49,11 @@ class Added(Generic[T]):
         """
         try:
             return self.value(*arguments)
-        except Exception as error:
+        except BaseException as error:
+            if is_interruption(error):
+                raise
             place = raised_at(error, self.file.parent) or Place(shown_file(self.file))
-            text = f"{doing}: {type(error).__name__}: {error} (plugin '{self.plugin}')"
-            raise InputError(Problem(code, " ".join(text.split()), place)) from error
+            raise InputError(Problem(code, f"{doing}: {told(error)} (plugin '{self.plugin}')", place)) from error
 
 
 @dataclass(frozen=True)

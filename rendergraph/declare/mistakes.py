@@ -11,10 +11,11 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 
 from rendergraph.annotations import may_be, mistakes_in, parts_of
+from rendergraph.declare.blame import told
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
-from rendergraph.errors import Mistake
+from rendergraph.errors import Mistake, is_interruption
 from rendergraph.ports import History, Internal
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
@@ -32,14 +33,14 @@ RESERVED_NAMES: frozenset[str] = (
     attribute const uniform varying buffer shared coherent volatile restrict readonly writeonly layout centroid flat
     smooth noperspective patch sample break continue do for while switch case default if else subroutine in out inout
     float double int void bool true false invariant precise discard return mat2 mat3 mat4 vec2 vec3 vec4 ivec2 ivec3
-    ivec4 bvec2 bvec3 bvec4 uint uvec2 uvec3 uvec4 lowp mediump highp precision struct common partition active asm
-    class union enum typedef template this resource goto inline noinline public static extern external interface long
-    short half fixed unsigned superp input output hvec2 hvec3 hvec4 fvec2 fvec3 fvec4 sampler3DRect filter image
-    sizeof cast namespace using texture sampler2D sampler3D samplerCube image2D abs acos all any asin atan ceil clamp
-    cos cross degrees determinant distance dot equal exp exp2 floor fma fract inverse inversesqrt length log log2 main
-    max min mix mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose
-    trunc camera world_position linear_depth to_viewer packed row_major atomic_uint dvec2 dvec3 dvec4 dmat2 dmat3 dmat4
-    mat2x2 mat2x3 mat2x4 mat3x2 mat3x3 mat3x4 mat4x2 mat4x3 mat4x4 dmat2x2 dmat2x3 dmat2x4 dmat3x2 dmat3x3 dmat3x4
+    ivec4 bvec2 bvec3 bvec4 uint uvec2 uvec3 uvec4 lowp mediump highp precision struct common partition active asm class
+    union enum typedef template this resource goto inline noinline public static extern external interface long short
+    half fixed unsigned superp input output hvec2 hvec3 hvec4 fvec2 fvec3 fvec4 sampler3DRect filter sizeof cast
+    namespace using texture sampler2D sampler3D samplerCube image2D abs acos all any asin atan ceil clamp cos cross
+    degrees determinant distance dot equal exp exp2 floor fma fract inverse inversesqrt length log log2 main max min mix
+    mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose trunc camera
+    world_position linear_depth is_nothing nearer to_viewer packed row_major atomic_uint dvec2 dvec3 dvec4 dmat2 dmat3
+    dmat4 mat2x2 mat2x3 mat2x4 mat3x2 mat3x3 mat3x4 mat4x2 mat4x3 mat4x4 dmat2x2 dmat2x3 dmat2x4 dmat3x2 dmat3x3 dmat3x4
     dmat4x2 dmat4x3 dmat4x4
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
     )
@@ -175,9 +176,10 @@ def _defaults(cls: type[Node]) -> Iterator[Mistake]:
     except TypeError as error:
         yield Mistake("", f"a default is no value that a file can hold: {error}")
         return
-    except Exception as error:  # what the author's own validators raise
-        said = " ".join(str(error).split())
-        yield Mistake("", f"it cannot be made with its defaults: {type(error).__name__}: {said}")
+    except BaseException as error:  # what the author's own validators raise
+        if is_interruption(error):
+            raise
+        yield Mistake("", f"it cannot be made with its defaults: {told(error)}")
         return
     if not all(_finite(value) for value in values.values()):
         yield Mistake("", "a default is not finite")
@@ -189,8 +191,10 @@ def _defaults(cls: type[Node]) -> Iterator[Mistake]:
             name = str(detail["loc"][0]) if detail["loc"] else ""
             of = f"the default of '{name}', {values[name]!r}, is" if name in values else "its defaults are"
             yield Mistake(name, f"{of} wrong: {complaint(detail)}")
-    except Exception as error:  # as above
-        yield Mistake("", f"its own checks fail on the defaults: {type(error).__name__}: {error}")
+    except BaseException as error:  # as above
+        if is_interruption(error):
+            raise
+        yield Mistake("", f"its own checks fail on the defaults: {told(error)}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:

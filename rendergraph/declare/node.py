@@ -90,6 +90,17 @@ class Node(BaseModel):
     def update(self, frame: Frame) -> None:
         """Compute what changes each frame on the CPU: views, buffers. Called once a frame, before any step runs."""
 
+    def camera_jitter(self, frame: int) -> tuple[float, float]:
+        """How far the camera's picture is moved in a frame, in texels, each way from -1 to 1.
+
+        What puts pictures of many frames together asks for each to be taken at other places within its pixels. Every
+        pass that is drawn with the camera sees it so; of several nodes the first that runs is asked.
+
+        Args:
+            frame: how many have been drawn since history began, from 0.
+        """
+        return 0.0, 0.0
+
     @classmethod
     def ports(cls) -> dict[str, Port]:
         """Every port by name, in the order of declaration, bases first."""

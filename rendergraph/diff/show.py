@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from html import escape
-from typing import Any
+from typing import Any, Literal
 
 from rendergraph.diff.structure import GraphDiff, PlanFigures, value_text
 from rendergraph.link import Graph
 from rendergraph.schedule.reasons import mebibytes
-from rendergraph.views import Mark, svg
+from rendergraph.views import Card, Link, Mark, Sheet, draw, sheet
 
 # Each at least 3:1 against white and against near-black; the signs carry it for those who cannot tell them apart.
 ADDED, REMOVED, CHANGED, RENAMED = "#2c9163", "#d0453e", "#b7791f", "#3b7dd8"
-_TITLE = 34.0
 _LEGEND = 34.0
 _STYLE = """
-.title{fill:#1f2328;font-size:14px;font-weight:600}.word{fill:#57606a}
-@media (prefers-color-scheme:dark){.title{fill:#e6edf3}.word{fill:#9aa4af}}
+.word{fill:#57606a}
+@media (prefers-color-scheme:dark){.word{fill:#9aa4af}}
 """
 
 
@@ -111,67 +110,72 @@ def diff_json(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | No
 
 
 def diff_svg(a: Graph, b: Graph, difference: GraphDiff) -> str:
-    """Both graphs, one above the other, with what differs in colour, as a stand-alone SVG document."""
-    pictures = [svg(a, _marks_of_old(difference)), svg(b, _marks_of_new(difference))]
-    sizes = [_size(picture) for picture in pictures]
-    width = max(max(w for w, _ in sizes), 520.0)
-    height = sum(h for _, h in sizes) + 2 * _TITLE + _LEGEND
+    """The second graph with what only the first one has, differences in colour, as a stand-alone SVG document."""
+    shown, marks, pointed = _both(a, b, difference)
+    picture = draw(shown, marks, pointed)
+    wide, tall = _size(picture)
+    width, height = max(wide, 620.0), tall + _LEGEND
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
         f'height="{height:.0f}" font-family="system-ui,\'DejaVu Sans\',sans-serif" font-size="12">',
         f"<title>{escape(a.name)} and {escape(b.name)}</title>",
         f"<style>{_STYLE}</style>",
+        picture.rstrip(),
+        _legend(tall),
     ]
-    y = 0.0
-    for graph, picture, (_, tall) in zip((a, b), pictures, sizes, strict=True):
-        parts.append(f'<text class="title" x="24" y="{y + 24:.0f}">{escape(graph.name)}</text>')
-        parts.append(picture.replace("<svg ", f'<svg y="{y + _TITLE:.0f}" ', 1).rstrip())
-        y += tall + _TITLE
-    parts.append(_legend(y))
     return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def _both(a: Graph, b: Graph, difference: GraphDiff) -> tuple[Sheet, dict[str, Mark], dict[Link, str]]:
+    """Both graphs as one, nodes and links that only one of them has marked."""
+    old, new = sheet(a), sheet(b)
+    names = {node.id: difference.nodes.get(node.id, node.id) for node in a.nodes}
+    for node in difference.removed:
+        while names[node] in b:
+            names[node] += "′"
+    table = {card.id: card for card in new.cards}
+    table |= {names[card.id]: replace(card, id=names[card.id]) for card in old.cards if card.id in difference.removed}
+    was = [replace(link, source=names[link.source], target=names[link.target]) for link in old.links]
+    sockets = {names[card.id]: card for card in old.cards}
+    removed = [_backwards(link, new.links) for link in was if link not in new.links]
+    for link in removed:  # a node of another type may lack the port that was linked
+        table[link.source] = _with(table[link.source], "outputs", link.source_port, sockets[link.source])
+        table[link.target] = _with(table[link.target], "inputs", link.target_port, sockets[link.target])
+    pointed = {link: ADDED for link in new.links if link not in was} | dict.fromkeys(removed, f"-{REMOVED}")
+    marks = {new: Mark(RENAMED, (f"was {old}",)) for old, new in difference.renamed.items()}
+    marks |= {change.node: Mark(CHANGED) for change in difference.links if change.node in table}
+    marks |= {node: Mark(CHANGED, tuple(notes)) for node, notes in difference.changed(links=False).items()}
+    marks |= {node: Mark(ADDED, ("+ added",)) for node in difference.added}
+    for node in difference.removed:
+        marks[names[node]] = Mark(REMOVED, ("− disabled" if node in difference.disabled else "− removed",))
+    return Sheet(new.title, list(table.values()), [*new.links, *removed], new.outputs), marks, pointed
+
+
+def _backwards(link: Link, kept: Sequence[Link]) -> Link:
+    """A link of the first graph, drawn as one that leads back where the second has its ends the other way round."""
+    reached, waiting = {link.target}, [link.target]
+    while waiting:
+        at = waiting.pop()
+        following = {other.target for other in kept if other.source == at and not other.previous} - reached
+        reached |= following
+        waiting += following
+    return replace(link, previous=link.previous or link.source in reached)
+
+
+def _with(card: Card, side: Literal["inputs", "outputs"], port: str, old: Card) -> Card:
+    """A card that has the socket too."""
+    if any(socket.name == port for socket in getattr(card, side)):
+        return card
+    more = tuple(socket for socket in getattr(old, side) if socket.name == port)
+    if side == "inputs":
+        return replace(card, inputs=(*card.inputs, *more))
+    return replace(card, outputs=(*card.outputs, *more))
 
 
 def _size(picture: str) -> tuple[float, float]:
     found = re.search(r'viewBox="0 0 (\d+) (\d+)"', picture)
     assert found
     return float(found[1]), float(found[2])
-
-
-def _marks_of_old(difference: GraphDiff) -> dict[str, Mark]:
-    back = {new: old for old, new in difference.nodes.items()}
-    marks = {old: Mark(RENAMED, (f"→ {new}",)) for old, new in difference.renamed.items()}
-    inputs = _inputs(difference, old=True)
-    marks |= {back[node]: Mark(CHANGED, inputs=inputs.get(node, frozenset())) for node in difference.changed()}
-    for node in difference.removed:
-        word = "disabled" if node in difference.disabled else "removed"
-        marks[node] = Mark(REMOVED, (f"− {word}",), _EVERY)
-    return marks
-
-
-def _marks_of_new(difference: GraphDiff) -> dict[str, Mark]:
-    marks = {new: Mark(RENAMED, (f"was {old}",)) for old, new in difference.renamed.items()}
-    inputs = _inputs(difference, old=False)
-    for node, notes in difference.changed().items():
-        marks[node] = Mark(CHANGED, tuple(notes), inputs.get(node, frozenset()))
-    return marks | {node: Mark(ADDED, ("+ added",), _EVERY) for node in difference.added}
-
-
-class _Everything(frozenset[str]):
-    """All of a node's inputs, whatever their names."""
-
-    def __contains__(self, item: object) -> bool:
-        return True
-
-
-_EVERY = _Everything()
-
-
-def _inputs(difference: GraphDiff, *, old: bool) -> Mapping[str, frozenset[str]]:
-    table: dict[str, frozenset[str]] = {}
-    for change in difference.links:
-        if change.old if old else change.new:
-            table[change.node] = table.get(change.node, frozenset()) | {change.port}
-    return table
 
 
 def _legend(y: float) -> str:

@@ -105,7 +105,7 @@ class GraphDiff:
         own = (self.added, self.removed, self.renamed, self.retyped, self.links, self.parameters, self.outputs)
         return any(own) or self.sizes is not None
 
-    def changed(self) -> dict[str, list[str]]:
+    def changed(self, *, links: bool = True) -> dict[str, list[str]]:
         """The second graph's nodes that are in the first one and differ, each with what differs in short."""
         table: dict[str, list[str]] = {}
         for retyped in self.retyped:
@@ -116,7 +116,7 @@ class GraphDiff:
             table.setdefault(change.node, []).append(
                 f"{change.name} {value_text(change.old)} → {value_text(change.new)}"
             )
-        for link in self.links:
+        for link in self.links if links else ():
             table.setdefault(link.node, []).append(f"{link.port} ← {', '.join(link.new) or 'nothing'}")
         return table
 

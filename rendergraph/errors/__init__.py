@@ -111,6 +111,9 @@ class RendergraphError(Exception):
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type[RendergraphError], tuple[tuple[Problem, ...]]]:
+        return type(self), (self.problems,)  # what it is made of, for another process
+
 
 class InputError(RendergraphError):
     """Something named on the command line or in a file is missing or wrong: pipeline, scene, mesh, image, shader."""
@@ -122,6 +125,23 @@ class RenderError(RendergraphError):
     """It failed while running: disk, memory, GL."""
 
     exit_code = 1
+
+
+class Interruption(BaseException):
+    """Somebody wants the program to end; nothing on the way up takes it for a failure of its own.
+
+    Attributes:
+        number: the signal's.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+def is_interruption(error: BaseException) -> bool:
+    """Whether what came out of a stranger's code is none of that code's doing; anything else is, `SystemExit` too."""
+    return isinstance(error, KeyboardInterrupt | Interruption)
 
 
 class Misuse(Exception):
@@ -136,7 +156,7 @@ class Misuse(Exception):
 
 
 class SceneError(Exception):
-    """What a node says of a scene that it cannot work on, in a rule of its ports or in `record`: a message for users.
+    """What a node says of a scene that it cannot work on, in a rule of its ports, `record` or `update`: for users.
 
     Attributes:
         subject: the name that it speaks of, as a parameter has it; the message is shown there.

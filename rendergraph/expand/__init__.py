@@ -40,6 +40,7 @@ def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expans
     outputs = dict(graph.outputs if wanted is None else wanted)
     order = graph.reading_order()
     recorded, idle = record_all(graph, order, outputs)
+    idle |= dict.fromkeys(graph.unlit, "the scene has no environment")
     expansion = ended(graph, versioned(graph, recorded, idle), outputs)
     check_kept(expansion.steps, expansion.resources)
     return expansion

@@ -39,8 +39,10 @@ def _dependencies(step: Step, made: Sequence[str], resources: Mapping[str, Resou
         yield f"it makes '{kept}', which is kept, and '{others[0]}', which is not; make them in two steps"
     if step.kind == "geometry":
         yield f"it makes '{kept}', which is kept, from the scene's objects, which may move"
+    if step.region is not None:
+        yield f"it makes '{kept}', which is kept, in a region that `update` sets in each frame"
     for read in step.all_reads:
         if read.previous:
             yield f"it makes '{kept}', which is kept, from last frame's '{read.resource}', another in each frame"
-        elif read.resource not in resources or resources[read.resource].role != "kept":
+        elif read.resource not in resources or resources[read.resource].role not in ("kept", "scene"):
             yield f"it makes '{kept}', which is kept, from '{read.resource}', which is not; keep that too: `kept=True`"

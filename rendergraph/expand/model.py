@@ -10,6 +10,9 @@ from rendergraph.link import Endpoint
 from rendergraph.link.infer import CAMERA
 from rendergraph.steps import Resource, Step
 
+ENVIRONMENT = Endpoint("", "the scene's environment")
+"""What an input of an environment is linked to that the file links to nothing."""
+
 
 @dataclass(frozen=True)
 class ViewTable:
@@ -78,4 +81,4 @@ def is_empty(info: TextureInfo | None) -> bool:
     return info is not None and info.desc is not None and info.desc.layers == 0
 
 
-__all__ = ["CAMERA", "Expansion", "Versioned", "ViewTable", "behind", "is_empty"]
+__all__ = ["CAMERA", "ENVIRONMENT", "Expansion", "Versioned", "ViewTable", "behind", "is_empty"]

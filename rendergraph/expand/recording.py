@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
-from rendergraph.errors import InputError, Misuse, Problem, SceneError, node_named, suggestion
-from rendergraph.expand.model import is_empty
+from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
+from rendergraph.expand.model import ENVIRONMENT, is_empty
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.steps import StepRequest, Steps
+from rendergraph.steps import MOST_STEPS, StepRequest, Steps
 from rendergraph.textures import BufferDesc, TextureDesc
+
+_MOST_REQUESTS = 10 * MOST_STEPS
+"""Of one node, which might record without end; so many are told before they take all memory."""
 
 
 class Recording:
@@ -22,7 +26,7 @@ class Recording:
     Attributes:
         requests: what the node asked for, in order.
         unfilled: what it asked to draw and the scene has nothing of; left out where that changes nothing.
-        links: connected inputs whose textures have layers.
+        links: connected inputs whose textures have layers; `ENVIRONMENT` stands for the scene's.
         facts: what the node may ask.
     """
 
@@ -36,16 +40,15 @@ class Recording:
             name: tuple(end for end in ends if not is_empty(graph.textures.get(end.now)))
             for name, ends in node.inputs.items()
         }
-        self.facts = Facts(
-            viewport=graph.size,
-            lights=graph.lights,
-            objects=graph.objects or (),
-            inputs={
-                name: tuple(graph.textures[end.now] for end in ends if end.now in graph.textures)
-                for name, ends in self.links.items()
-                if ends
-            },
-        )
+        of_scene = [name for name, port in node.node.inputs().items() if isinstance(port, Input) and port.takes_scene]
+        inputs = {
+            name: tuple(graph.textures[end.now] for end in ends if end.now in graph.textures)
+            for name, ends in self.links.items()
+            if ends
+        }
+        facts = Facts(graph.size, graph.lights, objects=graph.objects or (), environment=graph.environment)
+        self.links |= {name: (ENVIRONMENT,) for name in of_scene if name not in inputs and facts.of_scene}
+        self.facts = replace(facts, inputs=inputs | {n: facts.of_scene for n in of_scene if n not in inputs})
 
     # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
 
@@ -79,7 +82,27 @@ class Recording:
             if all(part in begun or self.continues(part.port) for _, part in request.out):
                 self.unfilled.append(objects)
                 return
+        self._check_condition(request)
+        if request.kind == "geometry" and request.options["topology"] == "triangles_adjacency":
+            for one in self.facts.drawn(objects or "all"):
+                if not one.closed:
+                    raise SceneError(one.gap, one.name)
+        if len(self.requests) == _MOST_REQUESTS:
+            raise Misuse(f"it records more than {_MOST_REQUESTS} steps", "RG606")
         self.requests.append(request)
+
+    def _check_condition(self, request: StepRequest) -> None:
+        """Refuse a step that is to be left out after one that is not there, or that it need not follow."""
+        label = request.options.get("if_drawn")
+        if not label:
+            return
+        labels = {one.options["label"]: one for one in self.requests if one.options.get("label")}
+        if label not in labels:
+            raise Misuse(f"if_drawn is '{label}', but no earlier step has that label{suggestion(label, labels)}")
+        named = [*request.bindings.values(), *(part for _, part in request.out)]
+        touched = {(target.port if isinstance(target, Part) else target).name for target in named}
+        if touched.isdisjoint(part.port.name for _, part in labels[label].out):
+            raise Misuse(f"if_drawn is '{label}', but it neither reads nor continues what that step writes")
 
     def continues(self, port: Port) -> bool:
         """Whether a port goes on with a texture of somebody else's."""
@@ -93,8 +116,11 @@ class Recording:
         lasting = any(is_kept(part.port) for _, part in request.out)
         for name, port in self.node.node.inputs().items():
             ends = self.links.get(name, ()) if isinstance(port, Input) else ()
-            if ends and (not lasting or all(is_kept(self.graph[e.node].node.ports()[e.port]) for e in ends)):
+            if ends and (not lasting or all(self._lasts(end) for end in ends)):
                 yield name, port
+
+    def _lasts(self, end: Endpoint) -> bool:
+        return end == ENVIRONMENT or is_kept(self.graph[end.node].node.ports()[end.port])
 
     def demands(self) -> Iterator[Endpoint]:
         """The ports of other nodes that the recorded steps and the used functions read."""
@@ -113,8 +139,10 @@ class Recording:
             used = ports.get(name)
             if isinstance(used, Function):
                 names.update(used.read_names)
+            elif isinstance(used, InOut):  # whether or not a step writes it
+                names.add(name)
         for name in names:
-            yield from self.links.get(name, ())
+            yield from (end for end in self.links.get(name, ()) if end != ENVIRONMENT)
 
 
 def is_kept(port: Port) -> bool:
@@ -188,7 +216,9 @@ def _recorded(
             _returns_nothing(node.node.record(steps))  # type: ignore[func-returns-value]  # a stranger's may
         except InputError:
             raise
-        except (Exception, SystemExit) as error:  # whatever a stranger's node raises is a mistake in that node
+        except BaseException as error:  # whatever a stranger's node raises is a mistake in that node
+            if is_interruption(error):
+                raise
             raise InputError(_author_problem(node, error)) from error
         ports = node.node.ports()
         if not recording.requests and all(recording.continues(ports[port]) for port in used):

@@ -91,7 +91,7 @@ def onto_nothing(request: StepRequest, writes: Iterable[Write]) -> str | None:
     tested = request.kind != "fullscreen" if state.depth_test is None else state.depth_test
     for write in writes:
         if write.use == "depth" and write.load == "discard" and tested and state.depth_func != "always":
-            return f"it tests depth against '{write.resource}', which holds nothing yet; declare it with `clear=1.0`"
+            return f"it tests depth against '{write.resource}', which holds nothing yet; declare it with `clear=0.0`"
     return None
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, Versioned, ViewTable, behind, is_empty
+from rendergraph.expand.model import CAMERA, ENVIRONMENT, Versioned, ViewTable, behind, is_empty
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import (
@@ -56,6 +56,9 @@ class _Versions:
         self.at_end: dict[Endpoint, tuple[str, int]] = {}
         self.written: dict[str, set[tuple[int, int | None]]] = {}
         self.resources: dict[str, Resource] = {}
+        if graph.environment is not None:
+            self.resources[ENVIRONMENT.port] = Resource(ENVIRONMENT.port, graph.environment, "scene")
+            self.at_end[ENVIRONMENT] = ENVIRONMENT.port, 0
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
         self.passed = dict(_passed(graph, recordings))
@@ -93,7 +96,9 @@ class _Versions:
             if not isinstance(port, WrittenPort) or is_empty(self.graph.textures.get(end)):
                 continue
             if isinstance(port, InOut) and recording.links.get(port.name):
-                self.at_end[end] = self.at_end[behind(self.passed, recording.links[port.name][0])]
+                before = behind(self.passed, recording.links[port.name][0])
+                if before in self.at_end:  # else nothing that runs touches it, here or where it comes from
+                    self.at_end[end] = self.at_end[before]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -129,12 +134,15 @@ class _Versions:
         options = dict(request.options)
         reads: list[Read] = []
         functions: list[FunctionBinding] = []
+        called: set[str] = set()
         for name, target in recording.reads_of(request):
             port = target.port if isinstance(target, Part) else target
             if isinstance(port, Function):
                 functions += self._own_function(recording, port)
             elif isinstance(port, Input) and port.kind == "function":
-                functions += [f for end in recording.links.get(port.name, ()) for f in self._function(end)]
+                provided = [f for end in recording.links.get(port.name, ()) for f in self._function(end)]
+                functions += provided
+                called |= {name} if provided else set()
             elif not (isinstance(port, Input) and port.kind == "view"):
                 reads += self._reads(recording, name, target if isinstance(target, Part) else Part(port))
         writes: list[Write] = []
@@ -158,11 +166,13 @@ class _Versions:
         keep = (
             "label",
             "state",
+            "region",
             "objects",
             "materials",
             "order",
             "per_light",
             "topology",
+            "command",
             "instances",
             "groups",
             "invocations",
@@ -176,7 +186,7 @@ class _Versions:
             writes=tuple(writes),
             functions=tuple(functions),
             includes=_includes(node.choices),
-            defines=(*self._defines(recording, reads, functions), *request.defines.items()),
+            defines=(*self._defines(recording, request, reads, called), *request.defines.items()),
             uniforms=(*param_uniforms(node.node), *request.uniforms.items()),
             size=size,
             samples=samples,
@@ -187,6 +197,7 @@ class _Versions:
             type=node.type.name,
             place=node.place,
             caller=request.caller,
+            if_drawn=_numbered(recording, options.get("if_drawn", ""), index),
             **{key: options[key] for key in keep if key in options},
         )
 
@@ -199,8 +210,15 @@ class _Versions:
             ends = recording.links.get(port.name, ())
             sampler = part.sampler or recording.node.samplers.get(port.name, Sampler())
             return [
-                self._read(f"{name}_{number}" if port.many else name, end, part, sampler, part.use or port.use)
+                self._read(
+                    f"{name}_{number}" if port.many and part.link is None else name,
+                    end,
+                    part,
+                    sampler,
+                    part.use or port.use,
+                )
                 for number, end in enumerate(ends)
+                if part.link in (None, number)
             ]
         own = Endpoint(recording.node.id, port.name, part.previous)
         resource, _ = self.at_end[own.now]
@@ -210,8 +228,8 @@ class _Versions:
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
         resource, at_end = self.at_end.get(behind(self.passed, end)) or (str(self._maker(end)), 0)
-        port = self.graph[end.node].node.ports()[end.port]
-        if end.previous and isinstance(port, InOut) and port.first is not None:
+        port = self.graph[end.node].node.ports()[end.port] if end.previous else None
+        if isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
         desc = self._desc_of(end, resource)
         if isinstance(desc, BufferDesc):
@@ -323,15 +341,16 @@ class _Versions:
                 self.resources[write.resource] = replace(resource, view=view)
 
     def _defines(
-        self, recording: Recording, reads: list[Read], functions: list[FunctionBinding]
+        self, recording: Recording, request: StepRequest, reads: list[Read], called: set[str]
     ) -> Iterator[tuple[str, str]]:
         node = recording.node.node
-        read_names = {read.name for read in reads}
+        read_names = {read.name for read in reads} | called
         for name, port in node.inputs().items():
             many = isinstance(port, Input) and port.many
-            called = isinstance(port, Input) and port.kind == "function" and functions and recording.links.get(name)
-            if name in read_names or (many and f"{name}_0" in read_names) or called:
+            if name in read_names or (many and f"{name}_0" in read_names):
                 yield f"HAS_{name.upper()}", "1"
+        for name, _ in request.out:
+            yield f"WRITES_{name.upper()}", "1"
         yield from define_parameters(node, recording.node.choices)
 
     # Functions ------------------------------------------------------------------------------------------------------
@@ -372,6 +391,12 @@ class _Versions:
                 _includes(node.choices),
             )
         ]
+
+
+def _numbered(recording: Recording, label: str, index: int) -> int | None:
+    """The last step before another that has a label, by its number in the node; None without a label."""
+    numbers = [i for i, one in enumerate(recording.requests[:index]) if label and one.options.get("label") == label]
+    return numbers[-1] if numbers else None
 
 
 def _includes(choices: Mapping[str, Path]) -> tuple[tuple[str, Path], ...]:

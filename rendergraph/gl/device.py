@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import moderngl
@@ -39,12 +39,30 @@ class Device:
     limits: dict[str, int] = field(default_factory=dict)
     textures_made: int = 0
     _idle: moderngl.Framebuffer | None = None
+    _sample_positions: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
 
     def unbind(self) -> None:
         """Bind a framebuffer of the device's own: moderngl binds again what was bound last, freed or not."""
         if self._idle is None:
             self._idle = self.ctx.framebuffer([self.ctx.renderbuffer((1, 1))])
         self._idle.use()
+
+    def sample_positions(self, count: int) -> list[tuple[float, float]]:
+        """Where each sample of a multisampled texture lies in its texel, from 0 to 1, bottom left first."""
+        if count not in self._sample_positions:
+            texture = self.ctx.texture((1, 1), 4, samples=count)
+            framebuffer = self.ctx.framebuffer([texture])
+            framebuffer.use()
+            place = (ctypes.c_float * 2)()
+            found = []
+            for number in range(count):
+                self.raw.glGetMultisamplefv(0x8E50, number, ctypes.byref(place))
+                found.append((float(place[0]), float(place[1])))
+            self._sample_positions[count] = found
+            self.unbind()
+            framebuffer.release()
+            texture.release()
+        return self._sample_positions[count]
 
     def current(self) -> AbstractContextManager[Any]:
         """Where everything that touches GL is done.
@@ -69,6 +87,11 @@ class Device:
             saved.restore()
 
     @property
+    def gone(self) -> bool:
+        """Whether the context has been released, as its owner may do."""
+        return not hasattr(self.ctx.mglo, "fbo")
+
+    @property
     def can_time(self) -> bool:
         """Whether a time query can begin: the owner of a borrowed context may have one under way."""
         return self.owned or not self.raw.current_query(TIME_ELAPSED)
@@ -82,6 +105,11 @@ class Device:
     def software(self) -> bool:
         """Whether it is a rasteriser on the CPU, whose times say nothing about GPUs."""
         return any(name in self.renderer.lower() for name in SOFTWARE_RENDERERS)
+
+    @cached_property
+    def has_depth_bounds(self) -> bool:
+        """Whether fragments can be kept to a range of the depth that is there."""
+        return "GL_EXT_depth_bounds_test" in self.ctx.extensions
 
     def as_json(self) -> dict[str, object]:
         """What pictures and reports say about it."""
@@ -104,6 +132,12 @@ class Device:
             self.ctx.release()
 
 
+@cache
+def first_process() -> int:
+    """The process that asked first, which a forked one remembers."""
+    return os.getpid()
+
+
 def open_device(index: int | None = None) -> Device:
     """A headless context on the machine's GL device.
 
@@ -111,10 +145,16 @@ def open_device(index: int | None = None) -> Device:
         index: EGL device number as `doctor` lists them; None for the default, or RENDERGRAPH_DEVICE where set.
 
     Raises:
-        DeviceError: no driver, no such device, or OpenGL older than 4.5.
+        DeviceError: no driver, no such device, OpenGL older than 4.5, or a process forked from one that has drawn.
     """
     import glcontext  # type: ignore[import-untyped]  # ships no types
 
+    if first_process() != os.getpid():
+        text = (
+            "OpenGL has been used in the process that this one was forked from, and drivers do not survive that; "
+            "start processes anew, as multiprocessing does with 'spawn'"
+        )
+        raise DeviceError(Problem("RG611", text))
     named = os.environ.get("RENDERGRAPH_DEVICE", "0")
     if index is None and not named.isdecimal():
         text = f"RENDERGRAPH_DEVICE is '{named}', not the number of a device as `rendergraph doctor` lists them"
@@ -198,9 +238,11 @@ def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "samples": raw.integer(0x910E),  # of colour textures
         "depth_samples": raw.integer(0x910F),
         "integer_samples": raw.integer(0x9110),
+        "anisotropy": raw.integer(0x84FF),  # 0 where the driver has no such filter
         "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
         "images": raw.integer(0x8F38),
         "storage_bindings": raw.integer(0x90DD),
         **{f"groups_{axis}": raw.integer_at(0x91BE, number) for number, axis in enumerate("xyz")},
     }
+    raw.error()  # of limits that this driver does not know
     return Device(ctx, raw, owned, limits)

@@ -17,6 +17,7 @@ import moderngl
 import numpy as np
 
 from rendergraph.gl.device import Device
+from rendergraph.gl.raw import RawGL
 
 if TYPE_CHECKING:
     from rendergraph.steps import UniformValue
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _UNIFORM, _UNIFORM_BLOCK, _OUTPUT, _STORAGE_BLOCK = 0x92E1, 0x92E2, 0x92E4, 0x92E6
 _NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92FB, 0x92FD, 0x930E
 _ACTIVE, _BUFFER_DATA_SIZE = 0x92F5, 0x9303
+_LINK_STATUS = 0x8B82
 
 _WRITERS: dict[int, tuple[str, Any, int]] = {  # GL type: raw function, NumPy type, numbers per element
     0x1406: ("glProgramUniform1fv", np.float32, 1),
@@ -131,10 +133,12 @@ class Program:
         uniforms: active uniforms outside blocks, by name.
         blocks, storage: active uniform and storage blocks, name to index.
         storage_bytes: the least that a storage block's buffer holds, an array without a size counted as one element.
+        texts: stage to what was compiled.
     """
 
     device: Device
     object: Any
+    texts: Mapping[str, str] = field(default_factory=dict)
     uniforms: dict[str, Uniform] = field(default_factory=dict)
     blocks: dict[str, int] = field(default_factory=dict)
     storage: dict[str, int] = field(default_factory=dict)
@@ -190,18 +194,40 @@ def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) 
     Raises:
         ProgramError: the driver's message, as moderngl wraps it.
     """
-    if "compute" in texts:
-        made: Any = device.ctx.compute_shader(texts["compute"])
-    else:
-        made = device.ctx.program(
-            vertex_shader=texts["vertex"],
-            geometry_shader=texts.get("geometry"),
-            fragment_shader=texts.get("fragment"),
-            fragment_outputs={name: number for number, name in enumerate(outputs)},
-        )
-    program = Program(device, made)
+    before = device.raw.glCreateProgram()
+    try:
+        if "compute" in texts:
+            made: Any = device.ctx.compute_shader(texts["compute"])
+        else:
+            made = device.ctx.program(
+                vertex_shader=texts["vertex"],
+                geometry_shader=texts.get("geometry"),
+                fragment_shader=texts.get("fragment"),
+                fragment_outputs={name: number for number, name in enumerate(outputs)},
+            )
+    except ProgramError:
+        if device.owned:  # in a context of another's, what is found may be another's
+            _delete_left(device.raw, before)
+        raise
+    finally:
+        device.raw.glDeleteProgram(before)
+    program = Program(device, made, texts)
     _inspect(program)
     return program
+
+
+def _delete_left(raw: RawGL, before: int) -> None:
+    """Delete what moderngl leaves when a stage does not compile: the program, never linked, and the other stages."""
+    after = raw.glCreateProgram()
+    linked = ctypes.c_int()
+    for name in range(before + 1, after):
+        if raw.glIsShader(name):
+            raw.glDeleteShader(name)
+        elif raw.glIsProgram(name):
+            raw.glGetProgramiv(name, _LINK_STATUS, ctypes.byref(linked))
+            if not linked.value:
+                raw.glDeleteProgram(name)
+    raw.glDeleteProgram(after)
 
 
 def driver_message(error: Exception) -> tuple[str | None, str]:

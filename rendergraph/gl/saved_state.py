@@ -90,7 +90,7 @@ def _buffer(target: int, binding: int, needed: tuple[float, ...] | None = None) 
 
 SETTINGS: tuple[Setting, ...] = (
     # fixed function
-    Setting("glClipControl", _each(0x935C, 0x935D), needed=(0x8CA1, 0x935E)),  # LOWER_LEFT, NEGATIVE_ONE_TO_ONE
+    Setting("glClipControl", _each(0x935C, 0x935D), needed=(0x8CA1, 0x935F)),  # LOWER_LEFT, ZERO_TO_ONE
     Setting("glProvokingVertex", _each(0x8E4F), needed=(0x8E4E,)),  # LAST_VERTEX_CONVENTION
     Setting("glPointParameteri", _each(0x8CA0), (0x8CA0,), needed=(0x8CA2,)),  # SPRITE_COORD_ORIGIN, UPPER_LEFT
     Setting("glHint", _each(0x8B8B), (0x8B8B,), needed=(0x1100,)),  # FRAGMENT_SHADER_DERIVATIVE_HINT, DONT_CARE
@@ -212,6 +212,7 @@ class SavedState:
             for index in range(raw.integer(count))
         ]
         self.units = raw.integer(_ACTIVE_TEXTURE), list(_units(raw, raw.integer(_TEXTURE_UNITS)))
+        raw.glActiveTexture(self.units[0])  # which looking has moved
         self.images = list(_images(raw))
         self.blocks = list(_blocks(raw))
         self.settings = [

@@ -7,6 +7,7 @@ differ and aliased textures would otherwise share filter state.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +17,9 @@ import numpy.typing as npt
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device
 from rendergraph.textures import FORMATS, Sampler, TextureDesc
+
+MOST_READ = 1 << 30
+"""Bytes that are read back at once."""
 
 _TARGETS = {"texture2d": 0x0DE1, "texture2d_array": 0x8C1A, "texture_cube": 0x8513}
 _MULTISAMPLE_TARGETS = {"texture2d": 0x9100, "texture2d_array": 0x9102}
@@ -112,7 +116,7 @@ def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
         return _INTEGER_CHANNELS[fmt.components], _UINT, np.uint32, fmt.components
     if fmt.family == "int":
         return _INTEGER_CHANNELS[fmt.components], _INT, np.int32, fmt.components
-    if fmt.family == "unorm" and fmt.bytes == fmt.components:
+    if fmt.is_bytes:
         return _CHANNELS[fmt.components], _UBYTE, np.uint8, fmt.components
     return _CHANNELS[fmt.components], _FLOAT, np.float32, fmt.components
 
@@ -145,9 +149,10 @@ def read(
     texels: npt.NDArray[Any] = np.empty((layers, height, width, channels), dtype)
     device.ctx.finish()
     device.raw.glPixelStorei(0x0D05, 1)
-    device.raw.glGetTextureSubImage(
-        texture.glo, mip, 0, 0, first, width, height, layers, gl_format, gl_type, texels.nbytes, texels.ctypes.data
-    )
+    for at, count, low, rows in _bands(layers, height, texels[0, 0].nbytes):
+        into = texels[at : at + count, low : low + rows]
+        box = (0, low, first + at, width, rows, count)
+        device.raw.glGetTextureSubImage(texture.glo, mip, *box, gl_format, gl_type, into.nbytes, into.ctypes.data)
     error = device.raw.error()
     if error:
         raise RenderError(Problem("RG613", f"reading back a {desc.format} texture failed ({error})"))
@@ -159,6 +164,17 @@ def read(
         colors, alpha = np.take(linear, texels[..., :3]), texels[..., 3:] / np.float32(255)
         texels = np.concatenate([colors, alpha], axis=-1)
     return texels[:, ::-1]
+
+
+def _bands(layers: int, height: int, row: int) -> Iterator[tuple[int, int, int, int]]:
+    """First layer, layers, first row and rows of the parts read at once: OpenGL counts their bytes in 31 bits."""
+    if layers * height * row <= MOST_READ:
+        yield 0, layers, 0, height
+        return
+    rows = max(1, MOST_READ // row)
+    for layer in range(layers):
+        for low in range(0, height, rows):
+            yield layer, 1, low, min(rows, height - low)
 
 
 def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
@@ -229,7 +245,10 @@ def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.ND
 
 
 class Clear:
-    """A clear of a texture, one mip or one layer, prepared once and called in every frame."""
+    """A clear of a texture, one mip or one layer, prepared once and called in every frame.
+
+    Of a texture in its own format: Mesa stores wrong bits through views in some others.
+    """
 
     def __init__(
         self,
@@ -283,7 +302,7 @@ _WRAPS = {"clamp": 0x812F, "repeat": 0x2901, "mirror": 0x8370, "border": 0x812D}
 
 
 def create_sampler(device: Device, sampler: Sampler) -> int:
-    """A GL sampler object; the border is 1 in every channel, which is open and lit."""
+    """A GL sampler object; the border is 1 in every channel, which is open and lit; of what is compared 0, nothing."""
     names = (_MIN_FILTERS[sampler.filter], _MAG_FILTERS[sampler.filter], _WRAPS[sampler.wrap], _WRAPS[sampler.wrap])
     return create_gl_sampler(device, *names, compare=sampler.compare, anisotropy=sampler.anisotropy)
 
@@ -305,11 +324,13 @@ def create_gl_sampler(
     raw.glSamplerParameteri(glo, 0x2800, mag_filter)
     raw.glSamplerParameteri(glo, 0x2802, wrap_s)
     raw.glSamplerParameteri(glo, 0x2803, wrap_t)
-    border = (ctypes.c_float * 4)(1.0, 1.0, 1.0, 1.0)
+    border = (ctypes.c_float * 4)(*[0.0 if compare else 1.0] * 4)
     raw.glSamplerParameterfv(glo, 0x1004, ctypes.byref(border))
     if compare:
         raw.glSamplerParameteri(glo, 0x884C, 0x884E)  # COMPARE_MODE, COMPARE_REF_TO_TEXTURE
-        raw.glSamplerParameteri(glo, 0x884D, 0x0203)  # COMPARE_FUNC, LEQUAL
+        raw.glSamplerParameteri(
+            glo, 0x884D, 0x0206
+        )  # COMPARE_FUNC, GEQUAL: 1 for what is as near as the texel or nearer
     if anisotropy > 1:
         raw.glSamplerParameteri(glo, 0x84FE, anisotropy)
     return glo

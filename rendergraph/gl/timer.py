@@ -14,15 +14,15 @@ _NO_ANSWER = 1 << 40
 
 @dataclass(eq=False)
 class Timer:
-    """Measures what is drawn between `start` and `stop`."""
+    """Measures what is drawn between `start` and `stop`; its query is made when it is first started."""
 
     device: Device
-
-    def __post_init__(self) -> None:
-        self._glo = self.device.raw.make("glCreateQueries", TIME_ELAPSED)
+    _glo: int = 0
 
     def start(self) -> None:
         """Begin."""
+        if not self._glo:
+            self._glo = self.device.raw.make("glCreateQueries", TIME_ELAPSED)
         self.device.raw.glBeginQuery(TIME_ELAPSED, self._glo)
 
     def stop(self) -> None:
@@ -37,4 +37,5 @@ class Timer:
 
     def release(self) -> None:
         """Free it."""
-        self.device.raw.delete("glDeleteQueries", self._glo)
+        if self._glo:
+            self.device.raw.delete("glDeleteQueries", self._glo)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
-from rendergraph.glsl.names import declarators, function_of, head, statements, tokens
+from rendergraph.glsl.names import declarators, head, statements, tokens
 
 _DIRECTIVE = re.compile(r"\s*#\s*([a-z]+)\s*(.*)")
 _DEFINE = re.compile(r"([A-Za-z_]\w*)(?:\(([^()]*)\))?(.*)")
@@ -18,17 +19,21 @@ def reached(text: str) -> set[str]:
     Branches of `#ifdef` are followed as the text's own macros say; of other conditions every branch counts.
     """
     uses: dict[str, set[str]] = {}
-    lines = list(_taken(text, uses))
-    for statement, body in statements(tokens("\n".join(lines))):
+    words = tokens("\n".join(_taken(text, uses)))
+    if "##" in text:  # names that are put together are not known
+        return _names(words).union(*uses.values())
+    macros, waiting = set(uses), ["main"]
+    for statement, body in statements(words):
+        waiting += macros.intersection(statement)  # one that stands between functions may make one
         begin = head(statement)
-        name = function_of(begin.rest)
-        if name and body is not None:
-            uses.setdefault(name, set()).update(_names([*statement, *body]))
+        if body is not None and statement[-1:] == [")"]:
+            for name, after in pairwise(statement):
+                if after == "(":  # behind such a macro the function's own name is not the first
+                    uses.setdefault(name, set()).update(_names([*statement, *body]))
         elif body is None and begin.rest:
             for one, _, value in declarators(begin.rest[1:]):
                 uses.setdefault(str(one), set()).update(_names(value))
     found: set[str] = set()
-    waiting = ["main"]
     while waiting:
         name = waiting.pop()
         if name not in found:

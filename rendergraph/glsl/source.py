@@ -113,6 +113,7 @@ class Includes:
         self._guards: dict[tuple[Path, str], str] = {}
         self._plugged: dict[str, Path] = {}
         self._versions = False
+        self._inherited: tuple[Path, ...] = ()
         self._resolved: dict[Path, Path] = {}
 
     def expand(
@@ -123,6 +124,7 @@ class Includes:
         prefix: str = "",
         plugged: Mapping[str, Path] | None = None,
         versions: bool = False,
+        inherited: tuple[Path, ...] = (),
     ) -> SourceText:
         """The text of a file with all its includes.
 
@@ -133,6 +135,7 @@ class Includes:
             plugged: parameters in capitals with the file of their choice: `#include <SHADING>` is the file given here,
                 and nothing where none is.
             versions: take a `#version` of 330 to 460 in the file itself, and leave its line empty.
+            inherited: folders in which an include in quotes is looked for that is not beside the file, each a root.
 
         Raises:
             InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
@@ -143,6 +146,7 @@ class Includes:
         self._certain.add((self._resolve(source), prefix))
         self._plugged = dict(plugged or {})
         self._versions = versions
+        self._inherited = inherited
         self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
         return SourceText(tuple(lines), tuple(origins))
 
@@ -188,8 +192,7 @@ class Includes:
             if parameter is not None:
                 target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
             else:
-                target, shared = self._find(written, file, root, origin, raw, base.shared)
-                home = root if '"' in written else self.include_folder
+                target, shared, home = self._find(written, file, root, origin, raw, base.shared)
             if self._resolve(target) in stack:
                 chain = " includes ".join(path.name for path in [*stack, target])
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
@@ -244,8 +247,8 @@ class Includes:
 
     def _find(
         self, written: str, file: Path, root: Path, origin: Origin, raw: str, in_shared: bool
-    ) -> tuple[Path, bool]:
-        """The file an include names, and whether it is a shared one."""
+    ) -> tuple[Path, bool, Path]:
+        """The file an include names, whether it is a shared one, and the folder that its own includes must stay in."""
         match = _INCLUDE_NAME.match(written)
         if match is None:
             text = f"'#include {written[:60]}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
@@ -253,23 +256,39 @@ class Includes:
         name = match[1] or match[2]
         beside = match[1] is not None
         shared = not beside or in_shared
-        folder = file.parent if beside else self.include_folder
-        target = folder / name
-        inside = self._resolve(root if beside else self.include_folder)
-        if not self._resolve(target).is_relative_to(inside):
-            text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
-            raise _error("RG406", text, origin, raw)
-        look(target)
-        if not target.is_file():
-            known = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix == ".glsl"}
-            where = "beside the file" if beside else "in shaders/include"
-            raise _error("RG401", f"there is no include '{name}' {where}{suggestion(name, known)}", origin, raw)
-        return target, shared
+        places = [(file.parent, root)] if beside else [(self.include_folder, self.include_folder)]
+        if beside and not in_shared:
+            places += [(home, home) for home in self._inherited]
+        for folder, home in places:
+            target, inside = folder / name, self._resolve(home)
+            if not self._resolve(target).is_relative_to(inside):
+                text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
+                raise _error("RG406", text, origin, raw)
+            look(target)
+            if target.is_file():
+                return target, shared, home
+        known = {
+            path.relative_to(folder).as_posix()
+            for folder, _ in places
+            for path in folder.rglob("*")
+            if path.suffix == ".glsl"
+        }
+        where = "beside the file" if beside else "in shaders/include"
+        if len(places) > 1:
+            where += " or among the shaders of what its node extends"
+        raise _error("RG401", f"there is no include '{name}' {where}{suggestion(name, known)}", origin, raw)
 
 
-def expand(source: Path, include_folder: Path, *, root: Path | None = None, versions: bool = False) -> SourceText:
+def expand(
+    source: Path,
+    include_folder: Path,
+    *,
+    root: Path | None = None,
+    versions: bool = False,
+    inherited: tuple[Path, ...] = (),
+) -> SourceText:
     """One file with its includes resolved, as `Includes.expand`."""
-    return Includes(include_folder).expand(source, root=root, versions=versions)
+    return Includes(include_folder).expand(source, root=root, versions=versions, inherited=inherited)
 
 
 def read_text(file: Path) -> str:

@@ -5,7 +5,7 @@ into something an eye can read, and `save_outputs` says what of a frame goes int
 """
 
 from rendergraph.images.contact import contact_sheet
-from rendergraph.images.decode import decode, read, read_metadata
+from rendergraph.images.decode import decode, decode_light, read, read_metadata
 from rendergraph.images.encode import EXTENSIONS, write
 from rendergraph.images.pixels import ImageLimits
 from rendergraph.images.saving import (
@@ -18,6 +18,7 @@ from rendergraph.images.saving import (
     output_for,
     save_output,
     save_outputs,
+    stands_for,
     viewable_as,
 )
 from rendergraph.images.view import from_srgb, to_srgb, viewable
@@ -31,6 +32,7 @@ __all__ = [
     "check_target",
     "contact_sheet",
     "decode",
+    "decode_light",
     "from_srgb",
     "is_numbered",
     "numbered",
@@ -39,6 +41,7 @@ __all__ = [
     "read_metadata",
     "save_output",
     "save_outputs",
+    "stands_for",
     "to_srgb",
     "viewable",
     "viewable_as",

@@ -19,10 +19,12 @@ import numpy as np
 
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
-from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, finite, name_of
+from rendergraph.images.files import is_text
+from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, finite, name_of, not_negative
 from rendergraph.images.plugin_image import decode_by_plugin
+from rendergraph.images.view import from_srgb
 from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, image_kind
-from rendergraph.scene.model import ImageSource
+from rendergraph.scene.model import ImageSource, MadeImage
 
 if TYPE_CHECKING:
     import OpenImageIO as oiio
@@ -66,6 +68,30 @@ def decode(
     if light:
         pixels = finite(image.source, pixels, warn)
     return as_rgba(pixels)
+
+
+def decode_light(
+    source: ImageSource | MadeImage,
+    *,
+    warn: Callable[[Problem], None] | None = None,
+    limits: ImageLimits = ImageLimits(),
+) -> Pixels:
+    """The picture around a scene, ready to be uploaded: light, nowhere negative.
+
+    Returns:
+        (height, width, 4), top row first, float16.
+
+    Raises:
+        InputError: missing, of another kind, broken, or beyond a limit.
+    """
+    if isinstance(source, MadeImage):
+        return source.make()
+    pixels = decode(source, srgb=True, warn=warn, limits=limits)
+    if pixels.dtype == np.uint8:
+        return np.concatenate([from_srgb(pixels[..., :3]), pixels[..., 3:] / np.float32(255)], axis=-1).astype(
+            np.float16
+        )
+    return not_negative(source, pixels, warn)
 
 
 def read(path: Path | str) -> Pixels:
@@ -136,8 +162,9 @@ def _opened(source: ImageSource, limits: ImageLimits) -> Iterator[_Image]:
     kind = _kind_of(source, start)
     with contextlib.ExitStack() as stack:
         path = os.path.abspath(source.path)
-        if source.data is not None or Path(path).suffix.lower() != kind:
-            # OpenImageIO chooses the decoder by the extension and reads no memory: give the file the name it deserves.
+        if source.data is not None or Path(path).suffix.lower() != kind or not is_text(path):
+            # OpenImageIO chooses the decoder by the extension and reads no memory, and takes texts for names: give the
+            # file the name it deserves.
             import tempfile  # for such images alone
 
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.images.files import failed, staged
+from rendergraph.images.files import failed, is_text, staged
 from rendergraph.images.view import from_srgb, to_bytes, to_srgb
 
 Pixels: TypeAlias = npt.NDArray[Any]
@@ -163,12 +163,12 @@ def _safe_place(path: Path, part: Path) -> Iterator[str]:
     """The name to give to OpenImageIO.
 
     On a full disk libpng and the Radiance writer report success and libjpeg ends the process, so those write to memory
-    first; OpenEXR says what happened.
+    first; OpenEXR says what happened. So does a picture whose name is no text, which it cannot be given.
     """
-    if path.suffix.lower() == ".exr" or not hasattr(os, "memfd_create"):
+    if (path.suffix.lower() == ".exr" and is_text(str(part))) or not hasattr(os, "memfd_create"):
         yield str(part)
         return
-    memory = os.memfd_create(path.name[:100])
+    memory = os.memfd_create("picture")
     try:
         yield f"/proc/self/fd/{memory}"
         try:

@@ -9,10 +9,13 @@ from pathlib import Path
 
 from rendergraph.errors import Place, Problem, RenderError
 
+_PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+
 
 def failed(path: Path, reason: str) -> RenderError:
-    """The error for a picture that could not be written."""
-    return RenderError(Problem("RG507", f"the picture cannot be written: {reason}", Place(str(path))))
+    """The error for a file that could not be written."""
+    what = "picture" if path.suffix.lower() in _PICTURES else "file"
+    return RenderError(Problem("RG507", f"the {what} cannot be written: {reason}", Place(str(path))))
 
 
 @contextlib.contextmanager
@@ -49,6 +52,15 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
         for part in temporary:
             with contextlib.suppress(OSError):
                 part.unlink()
+
+
+def is_text(path: str) -> bool:
+    """Whether a path is text; the names of files may be any bytes."""
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def flush(path: Path) -> None:

@@ -50,6 +50,17 @@ def finite(source: ImageSource, pixels: Pixels, warn: Callable[[Problem], None] 
     return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0)
 
 
+def not_negative(source: ImageSource, pixels: Pixels, warn: Callable[[Problem], None] | None) -> Pixels:
+    """Light that is nowhere less than none; `warn` is told how much was replaced."""
+    below = (pixels[..., :3] < 0).any(axis=-1)
+    if not below.any():
+        return pixels
+    if warn:
+        text = f"{_pixels(int(below.sum()))} negative, taken as 0"
+        warn(Problem("RG355", text, Place(name_of(source)), severity="warning"))
+    return np.maximum(pixels, 0)
+
+
 def as_rgba(pixels: Pixels) -> Pixels:
     """Four channels from one to four: grey three times, and an alpha of one."""
     height, width, count = pixels.shape

@@ -170,6 +170,14 @@ def numbered(path: Path, frame: int) -> Path:
     return path.with_name(_HASHES.sub(lambda match: f"{frame:0{len(match[0])}d}", path.name))
 
 
+def stands_for(path: Path, file: str) -> bool:
+    """Whether a file, links followed, may be that of some frame."""
+    parts = [re.escape(part) for part in _HASHES.split(path.name)]
+    if len(parts) == 1 or os.path.dirname(file) != os.path.realpath(path.parent):
+        return False
+    return re.fullmatch(r"\d{2,}".join(parts), os.path.basename(file)) is not None
+
+
 def check_target(path: Path) -> None:
     """Says before rendering that a file cannot be written.
 

@@ -25,7 +25,7 @@ Pixels: TypeAlias = npt.NDArray[Any]
 Bytes: TypeAlias = npt.NDArray[np.uint8]
 
 _LIGHT = frozenset({"radiance", "albedo", "emissive", "luminance"})
-_DEPTH = frozenset({"depth", "linear_depth", "shadow_map"})
+_WINDOW_DEPTH = frozenset({"depth", "shadow_map"})  # reversed: greater is nearer
 _UNIT = frozenset({"display_color", "visibility", "occlusion", "material"})
 _NAN_COLOR = (255, 0, 255)
 
@@ -79,8 +79,10 @@ def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) 
 def _colors(array: Pixels, semantic: str, *, light: bool) -> Bytes:
     if np.issubdtype(array.dtype, np.integer) and array.dtype != np.uint8:
         return _palette(array)
-    if semantic in _DEPTH:
-        return to_bytes(_stretched(array, background=1.0 if semantic != "linear_depth" else math.inf))
+    if semantic in _WINDOW_DEPTH:
+        return to_bytes(_stretched(-array, background=0.0))
+    if semantic == "linear_depth":
+        return to_bytes(_stretched(array, background=math.inf))
     if array.dtype == np.uint8 and not light and semantic != "normal":
         return array
     values = array.astype(np.float32) / 255 if array.dtype == np.uint8 else array

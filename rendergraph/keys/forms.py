@@ -111,7 +111,16 @@ def number(low: float = -MOST, high: float = MOST, *, above: bool = False, infin
         return _is_number(value) and (limits.holds(value.data) or (infinite and value.data == math.inf))
 
     words = f"a number{_words(limits)}"
-    return Form("number", words, fits, lambda: _schema(limits, infinite), _float, moves=True)
+    return Form("number", words, fits, lambda: _schema(limits, infinite), _float, _too_large, moves=True)
+
+
+def _too_large(value: Value) -> str:
+    """That it is a number, or a list of numbers, and what is wrong is how large they are."""
+    parts = value.data if isinstance(value.data, list) else [value]
+    large = [part for part in parts if isinstance(part.data, int | float) and abs(part.data) > MOST]
+    if large and all(map(_is_number, parts)):
+        return f"; numbers end at {MOST:.3g}"
+    return ""
 
 
 def whole(low: int, high: float = MOST) -> Form:
@@ -149,7 +158,9 @@ def row(*forms: Form) -> Form:
 def vector(count: int = 3, low: float = -MOST, high: float = MOST, *, above: bool = False) -> Form:
     """A list of as many numbers, each within limits as `number` has them."""
     words = f"{count} numbers{_words(Range(low, high, above))}"
-    return replace(row(*[number(low, high, above=above)] * count), shown=f"[{count} numbers]", wanted=words)
+    return replace(
+        row(*[number(low, high, above=above)] * count), shown=f"[{count} numbers]", wanted=words, hint=_too_large
+    )
 
 
 def color(high: float = MOST, *, alpha: bool = False) -> Form:

@@ -165,7 +165,7 @@ def plain(value: Value, takes: Takes) -> Any:
     if isinstance(takes, Names):
         return {name: plain(child, takes.of) for name, child in given.items()}
     keys = takes.keys_of(value)
-    return {name: plain(child, keys[name].takes) for name, child in given.items()}
+    return {name: plain(child, keys[name].takes) for name, child in given.items() if name in keys}
 
 
 # --- JSON Schema (draft 07, which is what editors read) --------------------------------------------------------------

@@ -12,7 +12,7 @@ from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
-from rendergraph.link.disabled import lost, past, take_out
+from rendergraph.link.disabled import lost, mark_unlit, past, take_out
 from rendergraph.link.graph import Endpoint, Graph, GraphNode
 from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Draft, Link, References, Wrong, line_of
@@ -20,7 +20,7 @@ from rendergraph.link.order import cycles, needs, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.resolve import NodeSpec, PipelineSpec
-from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature
+from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature, TextureDesc
 
 
 def link(
@@ -28,6 +28,7 @@ def link(
     catalog: Catalog,
     lights: Sequence[LightFacts] = (),
     objects: Sequence[ObjectFacts] | None = None,
+    environment: TextureDesc | None = None,
 ) -> Graph:
     """A checked graph.
 
@@ -36,15 +37,16 @@ def link(
         catalog: the node types.
         lights: the scene's lights in its order; sizes and layers may depend on them.
         objects: the scene's objects; None where there is no scene, and any may be.
+        environment: the picture around the scene.
 
     Raises:
         InputError: something is wrong, here or already in `spec.problems`; with all mistakes.
     """
-    return _Linker(spec, catalog, lights, objects).graph()
+    return _Linker(spec, catalog, lights, objects, environment).graph()
 
 
 def sketch(
-    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = ()
+    spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), environment: TextureDesc | None = None
 ) -> tuple[Graph, tuple[Problem, ...]]:
     """A graph to look at, where nothing is wrong but that node types are missing; those are drawn as far as known.
 
@@ -55,9 +57,9 @@ def sketch(
         InputError: something else is wrong; with all mistakes.
     """
     try:
-        return link(spec, catalog, lights), ()
+        return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
-        linker = _Linker(spec, catalog, lights, None, sketching=True)
+        linker = _Linker(spec, catalog, lights, None, environment, sketching=True)
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):
@@ -75,6 +77,9 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
         return graph.aliases[text]
     node, _, port = text.rpartition(".")
     names = [known.id for known in graph.nodes]
+    if node in graph.unlit:
+        text = f"node '{node}' is left out: the scene has no environment; give it one (--environment)"
+        raise InputError(Problem("RG132", text))
     if node in graph.disabled:
         text = f"node '{node}' is disabled, and nothing stands in for '{port}'; enable it"
         raise InputError(Problem("RG132", text))
@@ -105,6 +110,7 @@ class _Linker:
         catalog: Catalog,
         lights: Sequence[LightFacts],
         objects: Sequence[ObjectFacts] | None,
+        environment: TextureDesc | None,
         *,
         sketching: bool = False,
     ) -> None:
@@ -114,6 +120,7 @@ class _Linker:
         self.catalog = spec.catalog or catalog
         self.lights = tuple(lights)
         self.objects = None if objects is None else tuple(objects)
+        self.environment = environment
         self.problems: list[Problem] = []
         self.warnings: list[Problem] = []
 
@@ -123,6 +130,8 @@ class _Linker:
         nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
         for draft in nodes.values():
             self._connect(draft, references)
+        if self.environment is None:
+            mark_unlit(nodes)
         written, nodes = nodes, take_out(nodes, references)
         for draft in nodes.values():
             self._complete(draft, written)
@@ -130,7 +139,9 @@ class _Linker:
         knots = cycles(nodes)
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
-        infer = Infer(nodes, Facts(self.spec.size, self.lights, objects=self.objects or ()), used)
+        infer = Infer(
+            nodes, Facts(self.spec.size, self.lights, objects=self.objects or (), environment=self.environment), used
+        )
         textures: dict[Endpoint, TextureInfo] = {}
         if knots:
             self.problems += knots
@@ -154,7 +165,9 @@ class _Linker:
             objects=self.objects,
             textures=textures,
             aliases=self._aliases(references, written),
-            disabled=tuple(name for name in written if name not in nodes),
+            disabled=tuple(name for name, draft in written.items() if draft.spec.disabled is not None),
+            environment=self.environment,
+            unlit=tuple(name for name, draft in written.items() if draft.unlit),
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )
 
@@ -218,6 +231,8 @@ class _Linker:
         by_link: dict[int, list[str]] = {}
         for name, port in draft.inputs.items():
             if draft.links[name] or port.optional or name in draft.failed or self._dropped(draft, name):
+                continue
+            if isinstance(port, Input) and port.takes_scene and name not in draft.lost:
                 continue
             if name in draft.lost:
                 by_link.setdefault(id(draft.lost[name].value), []).append(name)
@@ -316,7 +331,7 @@ class _Linker:
             if followed is None:
                 continue
             led = past(followed, written, references)
-            if written[led.source.node].spec.disabled is None:
+            if not written[led.source.node].out:
                 found[name] = led
             else:
                 self._say(lost(f"output '{name}' shows '{led.source}'", led, written))
@@ -383,11 +398,11 @@ class _Linker:
                 if followed is not None:
                     found[f"{scope[:-1]}.{name}"] = followed
         for draft in written.values():
-            for name in draft.type.cls.outputs() if draft.spec.disabled is not None else ():
+            for name in draft.type.cls.outputs() if draft.out else ():
                 end = Endpoint(draft.spec.id, name)
                 found[str(end)] = Link(end, draft.spec.value)
         led = {name: past(link, written, references).source for name, link in found.items()}
-        return {name: end for name, end in led.items() if written[end.node].spec.disabled is None}
+        return {name: end for name, end in led.items() if not written[end.node].out}
 
 
 def _upstream_first(nodes: Mapping[str, Draft]) -> list[str]:
@@ -413,7 +428,10 @@ def _upstream_first(nodes: Mapping[str, Draft]) -> list[str]:
 def _member(draft: Draft, infer: Infer) -> GraphNode:
     spec, ports = draft.spec, draft.ports
     links = {name: tuple(found.source for found in ends) for name, ends in draft.links.items() if ends}
-    samplers = {name: infer.sampler(Endpoint(spec.id, name)) for name in links if isinstance(ports[name], Input)}
+    read = {name: port for name, port in draft.inputs.items() if isinstance(port, Input)}
+    samplers = {
+        name: infer.sampler(Endpoint(spec.id, name)) for name, port in read.items() if name in links or port.takes_scene
+    }
     written = [name for name, port in ports.items() if isinstance(port, WrittenPort)]
     clears = {name: infer.clear(Endpoint(spec.id, name)) for name in written}
     return GraphNode(spec.id, draft.type, draft.node, links, spec.place, draft.choices, samplers, clears)

@@ -88,6 +88,8 @@ class Checker:
     def _samples(self, draft: Draft, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         samples = info.desc.samples
+        if port.use == "depth_test":
+            return  # attached, not sampled: what is drawn beside it follows
         if port.samples == "single" and samples > 1:
             carries = f"has {samples} samples a texel"
             self._say(draft, port, link, "RG214", "takes one sample a texel", carries, self._resolving(info))
@@ -114,7 +116,8 @@ class Checker:
         self, draft: Draft, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
     ) -> None:
         text = f"'{draft.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
-        way = self._neighbour(port, link) or self._converters(hint)
+        way = "" if code == "RG214" else self._neighbour(port, link)  # all of a node has as many samples
+        way = way or self._converters(hint)
         if not way and code == "RG201":
             way = self._elsewhere(draft, port)
         self.problems.append(link.value.problem(code, text + way))
@@ -219,7 +222,7 @@ class Checker:
         return lambda cls: any(
             port.samples != "single"
             and _means(port, info.semantic, any_too=True)
-            and any(_continues(out, port, info) and out.samples == 1 for out in _outputs(cls))
+            and any(_continues(out, port, info) and _is_single(out) for out in _outputs(cls))
             for port in _only_input(cls)
         )
 
@@ -266,6 +269,10 @@ def _means(port: Any, semantic: Semantic, *, any_too: bool = False) -> bool:
 
 def _continues(out: WrittenPort, port: Input, info: TextureInfo) -> bool:
     return out.like == port.name or (out.semantic is not None and _means(out, info.semantic, any_too=True))
+
+
+def _is_single(out: WrittenPort) -> bool:
+    return out.samples == 1 or (out.samples is None and out.like is None)
 
 
 def _size(size: Iterable[int]) -> str:

@@ -1,19 +1,43 @@
-"""Nodes that `enabled: false` takes out: whoever read an output reads what went into the node instead."""
+"""Nodes that are taken out, by `enabled: false` or for want of an environment that they need.
+
+Whoever read an output reads what went into the node instead.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from rendergraph.declare import Function, InOut, Port, WrittenPort
+from rendergraph.declare import Function, InOut, Input, Port, WrittenPort
 from rendergraph.errors import Problem
 from rendergraph.link.names import Draft, Link, References, Wrong, line_of
 from rendergraph.read import word
 
 
+def mark_unlit(nodes: Mapping[str, Draft]) -> None:
+    """Note the nodes that need an environment, in a scene without: neither another node nor the scene gives it."""
+    waiting = list(nodes.values())
+    while waiting:
+        dark = [draft for draft in waiting if not draft.out and _is_dark(draft, nodes)]
+        for draft in dark:
+            draft.unlit = True
+        waiting = waiting if dark else []
+
+
+def _is_dark(draft: Draft, nodes: Mapping[str, Draft]) -> bool:
+    return any(
+        isinstance(port, Input)
+        and port.takes_scene
+        and not port.optional
+        and name not in draft.failed
+        and all(nodes[link.source.node].out for link in draft.links[name])
+        for name, port in draft.inputs.items()
+    )
+
+
 def take_out(nodes: Mapping[str, Draft], references: References) -> dict[str, Draft]:
-    """The enabled nodes, their links led past the others; what leads nowhere then is in the `lost` of its reader."""
-    enabled = {name: draft for name, draft in nodes.items() if draft.spec.disabled is None}
+    """The nodes that stay, their links led past the others; what leads nowhere then is in the `lost` of its reader."""
+    enabled = {name: draft for name, draft in nodes.items() if not draft.out}
     for draft in enabled.values() if len(enabled) < len(nodes) else ():
         for name, links in draft.links.items():
             led = [past(link, nodes, references) for link in links]
@@ -24,9 +48,9 @@ def take_out(nodes: Mapping[str, Draft], references: References) -> dict[str, Dr
 
 
 def past(link: Link, nodes: Mapping[str, Draft], references: References) -> Link:
-    """A link led past disabled nodes; it still ends at one where nothing that goes into it can stand in."""
+    """A link led past nodes that are out; it still ends at one where nothing that goes into it can stand in."""
     seen = set()
-    while (draft := nodes[link.source.node]).spec.disabled is not None and link.source.now not in seen:
+    while (draft := nodes[link.source.node]).out and link.source.now not in seen:
         seen.add(link.source.now)
         into = next(_into(draft, link.source.port, references), None)
         if into is None:
@@ -37,15 +61,17 @@ def past(link: Link, nodes: Mapping[str, Draft], references: References) -> Link
 
 
 def lost(user: str, link: Link, nodes: Mapping[str, Draft]) -> Problem:
-    """That a disabled node is needed.
+    """That a node is needed which is out.
 
     Args:
         user: for what, `'display.radiance' needs 'light.radiance'`.
-        link: the link to it, led past as many disabled nodes as can be.
+        link: the link to it, led past as many of those as can be.
         nodes: all nodes.
     """
     value = nodes[link.source.node].spec.disabled
-    assert value is not None
+    if value is None:
+        text = f"{user}, but '{link.source.node}' is left out: the scene has no environment"
+        return link.value.problem("RG132", f"{text}; give it one (--environment), or link another node here")
     where = line_of(value.place, link.value.place)
     text = f"{user}, but '{link.source.node}' is disabled ({where}) and nothing that goes into it can stand in"
     return link.value.problem("RG132", f"{text}; enable it, or link another node here")

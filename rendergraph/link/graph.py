@@ -13,7 +13,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.declare import LightFacts, Node, Texel, TextureInfo
 from rendergraph.errors import Place, Problem
 from rendergraph.facts import SELECTIONS, ObjectFacts
-from rendergraph.textures import Sampler
+from rendergraph.textures import Sampler, TextureDesc
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -77,6 +77,8 @@ class Graph:
         aliases: the outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports that they stand for.
         disabled: the nodes that `enabled: false` takes out; they are no members.
         objects: the scene's objects; None where there is no scene.
+        environment: the picture around the scene, which inputs of an environment read that nothing is linked to.
+        unlit: the nodes that need one where the scene has none; they are no members either.
     """
 
     name: str
@@ -89,6 +91,12 @@ class Graph:
     aliases: Mapping[str, Endpoint] = field(default_factory=dict)
     disabled: tuple[str, ...] = ()
     objects: tuple[ObjectFacts, ...] | None = None
+    environment: TextureDesc | None = None
+    unlit: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return f"<Graph {self.name}, {width}×{height}: {', '.join(self.members)} → {', '.join(self.outputs)}>"
 
     def __getitem__(self, node: str) -> GraphNode:
         return self.members[node]

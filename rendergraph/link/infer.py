@@ -27,7 +27,7 @@ from rendergraph.declare import (
 )
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
-from rendergraph.errors import Mistake, Place, Problem, SceneError, node_named
+from rendergraph.errors import Mistake, Place, Problem, SceneError, is_interruption, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Draft
 from rendergraph.ports import Count, FormatName, Positive, Samples, Sides
@@ -86,14 +86,17 @@ class _Inputs(Mapping[str, Any]):
         self._infer = infer
         self._draft = draft
 
-    def __getitem__(self, name: str) -> _Infos:
+    def __getitem__(self, name: str) -> Sequence[TextureInfo]:
         links = self._draft.links[name]
         if not links:
+            port, given = self._draft.inputs[name], self._infer.scene.of_scene
+            if isinstance(port, Input) and port.takes_scene and given:
+                return given
             raise KeyError(name)
         return _Infos(self._infer, [link.source for link in links])
 
     def __iter__(self) -> Iterator[str]:
-        return (name for name, links in self._draft.links.items() if links)
+        return (name for name in self._draft.links if self.get(name))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -217,10 +220,12 @@ class Infer:
             return rule(draft.node, self._facts_of(draft))
         except _Unknown:
             raise
-        except (Exception, SystemExit) as error:  # a stranger's function
+        except BaseException as error:  # a stranger's function
+            if is_interruption(error):
+                raise
             missing = isinstance(error, KeyError) and bool(error.args) and error.args[0] in draft.inputs
-            if missing and end not in self.used:
-                raise _Unknown from None  # nobody uses what lacks an input
+            if missing and (end not in self.used or not draft.inputs[error.args[0]].optional):
+                raise _Unknown from None  # nobody uses what lacks an input, or that it must have it is said
             if missing:
                 self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
             elif isinstance(error, SceneError):
@@ -249,12 +254,15 @@ class Infer:
             return TextureInfo(None, port.semantic or textures.Any, bytes=size)
         semantic = port.semantic or (like.semantic if like is not None else textures.Any)
         view, lights = self._view(end, draft, port, semantic)
+        seen = self._seen_with(draft) if view is None and port.like is None else None
         table = draft.ports.get(port.view) if port.view else None
         lit = callable(port.lights) or (isinstance(table, Views) and table.lights is not None)
         layers = len(lights) if lit and port.kind == "texture2d_array" else 1
         desc = self._desc(end, port, like.desc if like is not None else None, layers)
         if like is not None:
             view, lights = view or like.view, lights or like.lights
+        if seen is not None and desc.size == self._view_size(seen):
+            view = str(seen)  # texel by texel what was drawn with it
         return TextureInfo(desc, semantic, view, lights)
 
     def _linked(self, draft: Draft, name: str | None) -> TextureInfo | None:
@@ -262,6 +270,7 @@ class Infer:
         return self.known(links[0].source) if links else None
 
     def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None, usual: int) -> TextureDesc:
+        draft = self.nodes[end.node]
         size = self._size(end, port, like)
         name = self._fitting(end, "format", port.format, FormatName | None, "RG211")
         name = name or (like.format if like is not None else DEFAULT_FORMAT)
@@ -272,7 +281,9 @@ class Infer:
         layers = 6 if kind == "texture_cube" else layers
         full = full_mip_count(*size)
         mips = self._fitting(end, "mips", port.mips, Count) or full
-        samples = self._fitting(end, "samples", port.samples, Samples)
+        samples = self._fitting(end, "samples", port.samples, Samples | None)
+        if samples is None:
+            samples = 1 if mips > 1 or kind == "texture_cube" else self._samples_of(draft, like, size)
         if kind == "texture2d" and layers != 1:
             self._stop(end, "RG208", f"a {kind} cannot have {layers} layers")
         if mips > full:
@@ -281,7 +292,17 @@ class Infer:
             self._stop(end, "RG208", f"a texture cannot have {samples} samples a texel with mips or in a cube")
         return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
 
-    def _size(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None) -> tuple[int, int]:
+    def _samples_of(self, draft: Draft, like: TextureDesc | None, size: tuple[int, int]) -> int:
+        """What a texture follows that says nothing of samples: what it is like, or a depth attached beside it."""
+        if like is not None:
+            return like.samples
+        tested = (name for name, one in draft.inputs.items() if isinstance(one, Input) and one.use == "depth_test")
+        for info in (self._linked(draft, name) for name in tested):
+            if info is not None and info.desc is not None and info.desc.size == size:
+                return info.desc.samples
+        return 1
+
+    def _size(self, end: Endpoint, port: WrittenPort | Views, like: TextureDesc | None) -> tuple[int, int]:
         rule: Any = 1.0 if port.size is None else port.size
         draft = self.nodes[end.node]
         factor, base = 1.0, self.scene.viewport
@@ -295,11 +316,36 @@ class Infer:
             base = rule
         else:
             factor = float(rule)
-            base = like.size if like is not None and port.size is None else base
+            if like is not None and port.size is None:
+                base = like.size
+            elif isinstance(port, WrittenPort) and (seen := self._seen_with(draft)) is not None:
+                base = self._view_size(seen)
         width, height = (max(1, math.ceil(side * factor - 1e-9)) if factor != 1.0 else side for side in base)
         if min(width, height) < 1 or max(width, height) > MOST_SIDE:
             self._stop(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
         return width, height
+
+    def _seen_with(self, draft: Draft) -> Endpoint | None:
+        """The view with a size of its own that a node draws with, or what it reads texel by texel was drawn with."""
+        for given, links in draft.links.items():
+            port = draft.inputs[given]
+            if isinstance(port, Input) and port.kind != "view" and port.size == "any":
+                continue
+            for link in links:
+                info = self.info(link.source) if not link.source.previous else None
+                if info is None or info.view is None or info.view == CAMERA:
+                    continue
+                maker, _, name = info.view.rpartition(".")
+                end = Endpoint(maker, name)
+                table = self.nodes[end.node].ports[end.port]
+                if isinstance(table, Views) and table.size is not None:
+                    return end
+        return None
+
+    def _view_size(self, end: Endpoint) -> tuple[int, int]:
+        table = self.nodes[end.node].ports[end.port]
+        assert isinstance(table, Views)
+        return self._size(end, table, None)
 
     # Views and lights -------------------------------------------------------------------------------------------------
 

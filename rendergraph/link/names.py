@@ -61,8 +61,9 @@ class Draft:
         inputs: the ports that take links.
         links: by input, what is connected.
         failed: inputs whose link is wrong, so that nobody says they lack one.
-        lost: inputs that lack a link because it leads to a disabled node that nothing stands in for.
+        lost: inputs that lack a link because it leads to a node that is out and that nothing stands in for.
         choices: parameters whose value a plugin brings.
+        unlit: it needs an environment, and neither the file nor the scene has one.
     """
 
     spec: NodeSpec
@@ -74,6 +75,12 @@ class Draft:
     failed: set[str]
     choices: Mapping[str, Path]
     lost: dict[str, Link] = field(default_factory=dict)
+    unlit: bool = False
+
+    @property
+    def out(self) -> bool:
+        """Whether it is no node of the graph: disabled, or without the environment that it needs."""
+        return self.unlit or self.spec.disabled is not None
 
 
 class Wrong(Exception):

@@ -13,7 +13,7 @@ from rendergraph.declare import Extensions, Node, Parameter
 from rendergraph.declare.blame import happened
 from rendergraph.declare.mistakes import complaint
 from rendergraph.document import Value, said, shown
-from rendergraph.errors import InputError, Problem, node_named, suggestion
+from rendergraph.errors import InputError, Problem, is_interruption, node_named, suggestion
 from rendergraph.glsl.source import needs, needs_place
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec
@@ -34,7 +34,9 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
             problems.append(_unknown(spec.params[name], name, node_type))
     try:
         return cls.model_validate_json(json.dumps(values)), problems
-    except (Exception, SystemExit) as error:  # validators are the author's code
+    except BaseException as error:  # validators are the author's code
+        if is_interruption(error):
+            raise
         if not isinstance(error, ValidationError):
             text = f"{node_named(spec.id, node_type.name)}: its own checks fail: {happened(error, cls)}"
             return cls.model_construct(), [*problems, spec.value.problem("RG209", text, key=True)]
@@ -43,7 +45,9 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
             problems.append(_wrong(spec, node_type, name, details))
     try:
         return cls.model_validate_json(json.dumps(values)), problems
-    except (Exception, SystemExit):  # a rule between parameters fails, and has been said
+    except BaseException as error:  # a rule between parameters fails, and has been said
+        if is_interruption(error):
+            raise
         return cls.model_construct(), problems
 
 

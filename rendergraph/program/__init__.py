@@ -20,19 +20,22 @@ author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, wh
 
 from __future__ import annotations
 
-from rendergraph.program.checks import Texts, check_kept_text, check_texts, named_reads, unfit_sampler
+from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
 from rendergraph.program.messages import compile_problems, declared_at, link_problems
-from rendergraph.program.text import StageText, prefix, stage_texts
+from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts
 
 __all__ = [
     "StageText",
+    "StepTexts",
     "Texts",
     "check_kept_text",
     "check_texts",
     "compile_problems",
     "declared_at",
     "link_problems",
+    "looked_at",
     "named_reads",
+    "positions_macro",
     "prefix",
     "stage_texts",
     "unfit_sampler",

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Node
-from rendergraph.errors import InputError, Problem
+from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import ViewTable
+from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
 from rendergraph.glsl.reached import reached
 from rendergraph.program.messages import declared_at, mentioned_at
@@ -25,6 +26,7 @@ _MOVING = {
     "camera_block": "the camera",
     "frame_block": "the frame's time and number",
     "light_block": "the scene's lights, which may move",
+    "environment_block": "how bright the environment is and how it is turned, which may move",
     "pass_view_block": "the view it is drawn with",
 }
 _SAMPLER = re.compile(r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);")
@@ -42,7 +44,7 @@ def check_texts(
 
     Raises:
         InputError: files are missing or cannot be put together (RG400 to RG408), a sampler does not fit what is bound
-            to it (RG447), or a kept value comes from what moves (RG439).
+            to it (RG447), an `out` goes nowhere (RG448), or a kept value comes from what moves (RG439).
     """
     problems: list[Problem] = []
     seen: set[object] = set()
@@ -56,6 +58,7 @@ def check_texts(
             texts = stage_texts(step, types, resources, views)
             check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
             _check_samplers(step, texts, resources)
+            _check_outs(step, texts, types[step.node].cls)
         except InputError as error:
             problems += error.problems
     if problems:
@@ -120,6 +123,33 @@ def _check_samplers(step: Step, texts: Mapping[str, StageText], resources: Mappi
         raise InputError(list(dict.fromkeys(problems)))
 
 
+def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> None:
+    """Each `out` is a target of the step or a port of the node; a single one may have any name.
+
+    What stands inside `#if` is another step's or another variant's.
+    """
+    text = texts.get("fragment")
+    if text is None:
+        return
+    outs = [found.name for found in globals_of(_always(text.text)).declared if found.storage == "out"]
+    known = {write.name for write in step.writes} | cls.ports().keys()
+    spare = [name for name in outs if name not in known]
+    if len(outs) > 1 and spare:
+        hint = suggestion(spare[0], cls.outputs())
+        what = f"{dict(step.shaders)['fragment']} writes '{spare[0]}', which the node does not declare{hint}"
+        raise InputError(_placed(step.problem("RG448", what), text, spare[:1]))
+
+
+def _always(text: str) -> str:
+    """A text without what stands inside `#if`."""
+    depth, kept = 0, []
+    for line in text.split("\n"):
+        directive = re.match(r"\s*#\s*(ifdef|ifndef|if|endif)\b", line)
+        depth += 0 if directive is None else -1 if directive[1] == "endif" else 1
+        kept.append(line if depth == 0 and directive is None else "")
+    return "\n".join(kept)
+
+
 def _samplers(text: str) -> dict[str, list[str]]:
     """The types that a text declares each of its samplers with."""
     found: dict[str, list[str]] = {}
@@ -170,11 +200,19 @@ def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
 
 
 def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
-    """Each uniform or storage block with the names of its members."""
+    """Each uniform or storage block with the names a text uses it by: its members', or its own (`block {…} own`)."""
     for statement, body in statements(tokens(without_directives(text))):
         begin = head(statement)
         if begin.storage in ("uniform", "buffer") and body is not None and begin.rest:
-            yield begin.rest[0], {name for one, _ in statements(body) for name, _, _ in declarators(head(one).rest[1:])}
+            members = {name for one, _ in statements(body) for name, _, _ in declarators(head(one).rest[1:])}
+            yield begin.rest[0], members | set(statement[statement.index("}") + 1 :][:1])
+
+
+@lru_cache(maxsize=256)
+def looked_at(text: str) -> frozenset[str]:
+    """The blocks of which `main` of a program text, or what it calls, uses a member."""
+    names = reached(text)
+    return frozenset(block for block, members in _blocks(text) if not names.isdisjoint(members))
 
 
 def _placed(problem: Problem, text: StageText, names: Sequence[str]) -> Problem:

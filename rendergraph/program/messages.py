@@ -5,19 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
+from typing import Literal
 
 from rendergraph.errors import Place, Problem
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.source import Origin, SourceText
+from rendergraph.program.causes import Said, causes
 from rendergraph.program.text import StageText
 
-_FORMS = (
-    re.compile(
-        r"\s*\d+:(?P<line>\d+)\((?P<column>\d+)\):\s*(?P<kind>(?:preprocessor )?error|warning)\s*:\s*(?P<text>.*)"
-    ),
-    re.compile(r"\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<kind>(?:fatal )?error|warning)\s+(?:[A-Z]\d+\s*)?:\s*(?P<text>.*)"),
-    re.compile(r"\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?:(?:error|warning)\(#\d+\)\s*)?(?P<text>.*)"),
-)
 _SECTION = re.compile(r"\s*(Vertex|Geometry|Fragment|Compute) info\s*\Z")
 _QUOTED = re.compile(r"[`'\"]([A-Za-z_]\w*)['\"`]")
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -99,24 +94,16 @@ def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] 
 
 def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
     """The messages that name a line; warnings only where there is no error."""
-    found: list[Problem] = []
-    for row in rows:
-        match = next((match for form in _FORMS if (match := form.match(row))), None)
-        if match is None:
-            continue
-        severity = "warning" if "warning" in match["kind"].lower() else "error"
-        column = int(match.groupdict().get("column") or 0)
-        found.append(_problem(code, match["text"].strip(), int(match["line"]), column, severity, text))
-    errors = [problem for problem in found if problem.severity == "error"]
-    return list(dict.fromkeys(errors or found))
+    return list(dict.fromkeys(_problem(code, said, text) for said in causes(rows, text.source)))
 
 
-def _problem(code: str, said: str, line: int, column: int, severity: str, stage: StageText) -> Problem:
-    rows = stage.source
+def _problem(code: str, message: Said, stage: StageText) -> Problem:
+    rows, said, line = stage.source, message.text.strip(), message.line
+    severity: Literal["error", "warning"] = "warning" if message.is_warning else "error"
     if not 1 <= line <= len(rows.lines):
-        return Problem(code, f"{stage.who}: {said}", severity=severity)  # type: ignore[arg-type]
+        return Problem(code, f"{stage.who}: {said}", severity=severity)
     origin, shown_line = rows.origins[line - 1], rows.lines[line - 1]
-    column = _unsqueezed(shown_line, column)
+    column = _unsqueezed(shown_line, message.column)
     if origin.prefix:
         said = said.replace(origin.prefix, "")
         column = len(shown_line[: column - 1].replace(origin.prefix, "")) + 1
@@ -126,7 +113,7 @@ def _problem(code: str, said: str, line: int, column: int, severity: str, stage:
         what = f"what rendergraph writes for {origin.made}" if origin.made else "generated text"
         said += f" (in {what}: {shown_line.strip()})"
         place = near.place() if near else None
-        return Problem(code, f"{stage.who}: {said}", place, severity=severity)  # type: ignore[arg-type]
+        return Problem(code, f"{stage.who}: {said}", place, severity=severity)
     macro = _macro(rows, shown_line, said)
     if macro is not None:
         column, where = macro
@@ -134,7 +121,7 @@ def _problem(code: str, said: str, line: int, column: int, severity: str, stage:
     else:
         column = _of_name(shown_line, said, column)
     said += _included(origin)
-    return Problem(code, f"{stage.who}: {said}", origin.place(column), shown_line, severity)  # type: ignore[arg-type]
+    return Problem(code, f"{stage.who}: {said}", origin.place(column), shown_line, severity)
 
 
 def _unsqueezed(line: str, column: int) -> int:

@@ -15,6 +15,7 @@ from rendergraph.glsl.names import declared, without_directives
 from rendergraph.glsl.source import Origin, SourceText
 from rendergraph.program.text import StageText, prefix, read_defines, screen_reads, signatures_of
 from rendergraph.resources import folder
+from rendergraph.scene.pack import SLOTS
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -79,6 +80,9 @@ def in_scope(
     return sorted(rows, key=lambda row: SECTIONS.index(row.section))
 
 
+_OF_MATERIALS = frozenset(f"{slot}_texture" for slot in SLOTS)
+
+
 @dataclass(frozen=True)
 class _Scope:
     step: Step
@@ -100,7 +104,7 @@ class _Scope:
 
     def uniforms(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
         types = {one.name: one for text in texts.values() for one, _ in _globals(text.source, "uniform")}
-        textures = {before + read.name for before, read in self._reads()}
+        textures = {before + read.name for before, read in self._reads()} | {one.name for one in self.step.writes}
         values = [("", self.step.node, name, value) for name, value in self.step.uniforms]
         for one in self.step.functions:
             values += [(prefix(one.node), one.node, name, value) for name, value in one.uniforms]
@@ -115,7 +119,8 @@ class _Scope:
         inputs = self.types[self.step.node].cls.inputs()
         for name, declaration in types.items():
             if name not in textures:
-                where = "the step's view" if name == "view_index" else "the scene's materials, where they have one"
+                where = "the step's view" if name == "view_index" else "nothing in this step, which has no use for it"
+                where = "the scene's materials, where they have one" if name in _OF_MATERIALS else where
                 where = f"input '{name}', not connected" if name in inputs else where
                 section = "textures" if "sampler" in declaration.type or "image" in declaration.type else "uniforms"
                 yield InScope(section, f"uniform {_type(declaration)} {name}", where)

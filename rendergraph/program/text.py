@@ -95,6 +95,8 @@ def stage_texts(
     if step.kind == "fullscreen":
         shaders.setdefault("vertex", "<fullscreen.vert>")
     macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
+    if step.kind != "compute":
+        macros = {**dict(_sample_macros("PASS", step.samples)), **macros}
     wanted = signatures_of(step, types)
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
@@ -107,10 +109,48 @@ def stage_texts(
     return texts
 
 
+@dataclass(eq=False)
+class StepTexts:
+    """Program texts of many steps; those of steps that differ in nothing a text depends on are put together once.
+
+    Attributes:
+        types, resources, views: as `stage_texts` takes them.
+    """
+
+    types: Mapping[str, NodeType]
+    resources: Mapping[str, Resource]
+    views: Mapping[str, ViewTable]
+    _made: dict[object, dict[str, StageText]] = field(default_factory=dict)
+
+    def of(self, step: Step, defines: Mapping[str, str]) -> dict[str, StageText]:
+        """The text of every stage of a step with these macros.
+
+        Raises:
+            InputError: a file is missing or cannot be put together (RG400 to RG409).
+        """
+        node = self.types[step.node]
+        key = (
+            (node.cls, node.shaders),
+            replace(step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None),
+            tuple(replace(f, uniforms=tuple((name, 0) for name, _ in f.uniforms)) for f in step.functions),
+            tuple((replace(use, resource="", version=0), self._seen(use.resource)) for use in step.reads),
+            tuple((replace(use, resource="", version=0), self._seen(use.resource)) for use in step.writes),
+            tuple(defines.items()),
+        )
+        if key not in self._made:
+            self._made[key] = stage_texts(step, self.types, self.resources, self.views, defines=defines)
+        return {stage: replace(text, node=step.node) for stage, text in self._made[key].items()}
+
+    def _seen(self, id: str) -> object:
+        """What a text may tell of a resource."""
+        resource = self.resources[id]
+        return resource.desc, resource.lights, resource.view and self.views.get(resource.view, ViewTable()).count
+
+
 def read_defines(
     reads: Iterable[Read], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
 ) -> dict[str, str]:
-    """`<X>_LAYERS` and `<X>_VIEW_COUNT` of every texture read, `<X>_COUNT` of every input that takes a list."""
+    """`<X>_LAYERS`, `<X>_SAMPLES` and `<X>_VIEW_COUNT` of every texture read, `<X>_COUNT` of every list of inputs."""
     macros: dict[str, str] = {}
     counts: dict[str, int] = {}
     for read in reads:
@@ -119,11 +159,23 @@ def read_defines(
             continue
         name = read.name.upper()
         macros[f"{name}_LAYERS"] = str(resource.desc.layers)
+        macros |= dict(_sample_macros(name, resource.desc.samples))
         if resource.view is not None:
             macros[f"{name}_VIEW_COUNT"] = str(views.get(resource.view, ViewTable()).count)
         if match := re.match(r"(.+)_(\d+)\Z", name):
             counts[match[1]] = max(counts.get(match[1], 0), int(match[2]) + 1)
     return {f"{name}_COUNT": str(count) for name, count in counts.items()} | macros
+
+
+def _sample_macros(name: str, samples: int) -> Iterator[tuple[str, str]]:
+    yield f"{name}_SAMPLES", str(samples)
+    if samples > 1:
+        yield f"{name}_SAMPLE_POSITIONS", positions_macro(samples)
+
+
+def positions_macro(samples: int) -> str:
+    """The macro that holds where a device has so many samples; with GL it is known what it stands for."""
+    return f"SAMPLE_POSITIONS_{samples}"
 
 
 # --- one stage -------------------------------------------------------------------------------------------------------
@@ -143,18 +195,24 @@ def _stage(
     includes = Includes(include_folder)
     view = includes.expand(include_folder / "view.glsl")
     view = SourceText(view.lines, tuple(replace(origin, shared=True) for origin in view.origins))
-    file, root = types[step.node].shader_file(name, include_folder)
+    node = types[step.node]
+    file, root = node.shader_file(name, include_folder)
     # What the file calls decides which functions stand before it, so it is read once with includes of its own.
-    versions = types[step.node].is_shader and not name.startswith("<")
-    called = Includes(include_folder).expand(file, root=root, plugged=dict(step.includes), versions=versions).text
+    versions = node.is_shader and not name.startswith("<")
+
+    def expanded(by: Includes) -> SourceText:
+        plugged = dict(step.includes)
+        return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
+
+    called = expanded(Includes(include_folder)).text
     functions = SourceText()
     for signature in wanted.values():
         if calls(called, signature.name):
             functions += _functions(stage, signature, step, types, resources, views, includes)
         if mentions(called, f"{signature.name.upper()}_LIGHT_COUNT"):
-            table = _light_table(signature, step, types[step.node], resources)
+            table = _light_table(signature, step, node, resources)
             functions += generated(table, f"the lights of {signature.name}()")
-    source = includes.expand(file, root=root, plugged=dict(step.includes), versions=versions)
+    source = expanded(includes)
     if stage == "compute":
         source = with_formats(source, step, resources)
     extensions, source = _hoisted(source)
@@ -190,6 +248,12 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
         if resource.view is not None and mentions(body, f"{name}_views"):
             block = f"layout(std140) uniform {name}_view_block {{ View {name}_views[{macro}_VIEW_COUNT]; }};"
             text += generated([block], f"the views of '{read.name}'")
+        if resource.view is not None and not read.previous and mentions(body, f"{before}previous_{read.name}_views"):
+            block = (
+                f"layout(std140) uniform {before}previous_{read.name}_view_block "
+                f"{{ View {before}previous_{read.name}_views[{macro}_VIEW_COUNT]; }};"
+            )
+            text += generated([block], f"the views of '{read.name}' in the frame before")
         if resource.lights and mentions(body, f"{name}_lights"):
             table = ", ".join(str(light) for light in resource.lights)
             line = f"const int {name}_lights[{len(resource.lights)}] = int[]({table});"
@@ -301,7 +365,8 @@ def provider_text(
     """
     before = prefix(binding.node)
     file, root = node.shader_file(binding.shader)
-    source = includes.expand(file, root=root, prefix=before, plugged=dict(binding.includes))
+    plugged = dict(binding.includes)
+    source = includes.expand(file, root=root, prefix=before, plugged=plugged, inherited=node.inherited)
     own = SourceText(*_rows((line, origin) for line, origin in _pairs(source) if not origin.shared))
     names = declared(own.text)
     if binding.signature not in names:
@@ -311,8 +376,15 @@ def provider_text(
     macros = {**read_defines(binding.reads, resources, views), **dict(binding.defines)}
     names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
     for port in (*node.cls.ports(), *(read.name for read in binding.reads)):
-        endings = ("_LAYERS", "_COUNT", "_VIEW_COUNT")
-        names |= {port, f"{port}_views", f"{port}_lights", f"HAS_{port.upper()}", *(port.upper() + e for e in endings)}
+        endings = ("_LAYERS", "_SAMPLES", "_SAMPLE_POSITIONS", "_COUNT", "_VIEW_COUNT")
+        names |= {
+            port,
+            f"{port}_views",
+            f"previous_{port}_views",
+            f"{port}_lights",
+            f"HAS_{port.upper()}",
+            *(port.upper() + e for e in endings),
+        }
 
     def rename(word: str) -> str:
         return before + word if word in names else word

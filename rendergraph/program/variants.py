@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.scene import pack
-from rendergraph.scene.model import Material, Mesh, Scene, Texture
+from rendergraph.scene.model import Material, Scene, Texture
 from rendergraph.scene.objects import selected
 from rendergraph.scene.pack import PackedScene
 from rendergraph.steps import Step
@@ -42,8 +42,7 @@ def variants(
     macros |= scene_macros(scene, packed, stored)
     found = []
     for index in select(scene, step):
-        placed = scene.objects[index]
-        batch, _ = features(scene.materials[placed.material], scene.meshes[placed.mesh], step.materials)
+        batch, _ = features(scene, index, step.materials)
         if macros | batch not in found:
             found.append(macros | batch)
     return found
@@ -110,11 +109,13 @@ def select(scene: Scene, step: Step) -> list[int]:
     return [names[name] for name in step.objects]
 
 
-def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
-    """Macros and textures a material needs of a shader that looks at `level` of it.
+def features(scene: Scene, index: int, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
+    """Macros and textures an object's material needs of a shader that looks at `level` of it, whatever moves.
 
     Only what makes a difference is named, so that objects which differ in nothing else share a batch.
     """
+    placed = scene.objects[index]
+    material, mesh = scene.materials[placed.material], scene.meshes[placed.mesh]
     defines: dict[str, str] = {}
     if level == "none":
         return defines, {}
@@ -145,8 +146,8 @@ def features(material: Material, mesh: Mesh, level: str) -> tuple[dict[str, str]
             defines["DOUBLE_SIDED"] = "1"
         if material.unlit:
             defines["UNLIT"] = "1"
-        if material.anisotropy_strength > 0:
+        if scene.has_grain(material):
             defines["ANISOTROPIC"] = "1"
-        if mesh.tangents is not None and ("normal" in slots or material.anisotropy_strength > 0):
+        if mesh.tangents is not None and ("normal" in slots or scene.has_grain(material)):
             defines["HAS_TANGENT"] = "1"
     return defines, found

@@ -139,7 +139,8 @@ def _complete(tree: Value, files: Files) -> None:
     for part, example in (("nodes", "{display: {type: tonemap, …}}"), ("outputs", "{image: display.color}")):
         if not entries(tree, part) and not files.problems:
             text = f"the pipeline has no {part}; add {part}: {example}"
-            files.say(tree.problem("RG125", text))
+            empty = tree.get(part)
+            files.say(tree.problem("RG125", text) if empty is None else empty.problem("RG125", text, key=True))
     for name, declared in entries(tree, "inputs").items():
         optional = declared.get("optional")
         if not (optional and optional.data):

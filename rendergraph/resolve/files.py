@@ -110,9 +110,9 @@ class Files:
         """
         self.problems += document.problems
         base = document.root.get("extends")
-        root = document.root.with_data({key: v for key, v in entries(document.root).items() if key != "extends"})
         if base is None or base.data is None:
-            return root
+            return document.root.with_data({key: v for key, v in entries(document.root).items() if key != "extends"})
+        written = {key: value for key, value in document.root.items() if key != "extends"}  # a null removes
         found = self.locate(base, shipped_pipelines(), "pipeline")
         if found is None:
             raise InputError(self.problems)
@@ -131,7 +131,7 @@ class Files:
             target = self.chain(below)
         finally:
             self._open.pop()
-        merged, notes = merge_pipeline(target, root, self.names_of)
+        merged, notes = merge_pipeline(target, document.root.with_data(written), self.names_of)
         self.notes += notes
         return merged
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rendergraph.document import Source, Value, from_plain, parse, shown
-from rendergraph.errors import InputError, Problem, UsageError, suggestion
+from rendergraph.errors import InputError, Problem, UsageError, nearest, suggestion
 from rendergraph.read import entries
 from rendergraph.resolve.merge import NamesOf, TypeNames
 
@@ -105,7 +105,7 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
             if setting.name in parameters:
                 _put(root, setting.value, "parameters", setting.name, "default")
             else:
-                problems.append(_no_parameter(setting, parameters, nodes))
+                problems.append(_no_parameter(setting, parameters, nodes, names_of))
         elif setting.node not in nodes:
             text = f"there is no node '{setting.node}'{suggestion(setting.node, nodes)}"
             problems.append(setting.problem("RG109", text))
@@ -156,15 +156,31 @@ def _is_link(value: Value) -> bool:
     return all(isinstance(part.data, str) for part in parts) or value.data is None
 
 
-def _no_parameter(setting: Setting, parameters: Mapping[str, Value], nodes: Mapping[str, Value]) -> Problem:
+def _no_parameter(
+    setting: Setting, parameters: Mapping[str, Value], nodes: Mapping[str, Value], names_of: NamesOf
+) -> Problem:
     text = f"the pipeline has no parameter '{setting.name}'"
     if setting.name in ("size", "scene"):
         text += f"; --{setting.name} sets the {setting.name}"
     elif setting.name in nodes:
         text += f"; to set one of node '{setting.name}', write {setting.name}.PARAM=VALUE"
+    elif nearest(setting.name, parameters) is None and (meant := _of_nodes(setting.name, nodes, names_of)):
+        text += f"; did you mean {' or '.join(meant)}?"
     else:
         text += suggestion(setting.name, parameters)
     return setting.problem("RG119", text)
+
+
+def _of_nodes(name: str, nodes: Mapping[str, Value], names_of: NamesOf) -> list[str]:
+    """Parameters of nodes that are called so, or nearly, as a setting names them."""
+    known: dict[str, list[str]] = {}
+    for node, value in nodes.items():
+        of_type = value.get("type")
+        names = names_of(of_type) if of_type is not None else None
+        for parameter in sorted(names.params) if names else ():
+            known.setdefault(parameter, []).append(f"'{node}.{parameter}'")
+    near = nearest(name, known)
+    return known[near] if near else []
 
 
 def _put(root: Value, value: Value, *path: str) -> None:

@@ -9,48 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from rendergraph.api.viewing import look_at, unit
+from rendergraph.api.viewing import unit
 from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.scene import scene_build
+from rendergraph.scene.environments import shipped
+from rendergraph.scene.framing import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.geometry import rigid, vec3
-from rendergraph.scene.model import Camera, Light, Matrix, Scene, Vec3
+from rendergraph.scene.model import Camera, Light, Matrix, Scene
 
-FRAMING_DIRECTION = (1.0, 0.6, 1.5)
-FRAMING_FOV = math.radians(45.0)
 KEY_LUX = 3.0
-
-
-def bounds(scene: Scene) -> tuple[Vec3, Vec3]:
-    """Minimum and maximum corner of what is drawn; a unit cube where nothing is.
-
-    Boxes of meshes are transformed, so a turned object's box may be larger than the object.
-    """
-    corners = []
-    for entry in scene.objects:
-        if entry.hidden:
-            continue
-        low, high = (np.asarray(corner, np.float64) for corner in scene.meshes[entry.mesh].box)
-        center = entry.transform[:3, :3] @ ((low + high) / 2) + entry.transform[:3, 3]
-        extent = np.abs(entry.transform[:3, :3]) @ ((high - low) / 2)
-        corners += [center - extent, center + extent]
-    if not corners:
-        return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
-    table = np.array(corners)
-    return vec3(table.min(axis=0)), vec3(table.max(axis=0))
-
-
-def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
-    """Centre and radius of a sphere around everything drawn."""
-    low, high = (np.array(corner) for corner in bounds(scene))
-    return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
-
-
-def framing_camera(scene: Scene) -> Camera:
-    """The camera of a scene without one: the bounding sphere seen from (1, 0.6, 1.5), 45° high."""
-    center, radius = bounding_sphere(scene)
-    distance = radius / math.sin(FRAMING_FOV / 2)
-    eye = np.array(center) + unit(FRAMING_DIRECTION) * distance
-    return Camera("default", look_at(eye, center), fov_y=FRAMING_FOV, near=0.1 * radius, far=20 * radius, target=center)
+STUDIO_FILL = 0.6
+"""Of the studio beside the key light: both at their full strength are more than a white surface can show."""
 
 
 def key_light(scene: Scene, camera: Camera) -> Light:
@@ -62,25 +31,35 @@ def key_light(scene: Scene, camera: Camera) -> Light:
     )
 
 
-def complete(scene: Scene, camera_name: str | None = None) -> Scene:
-    """The scene with a camera and a light, added where it has none; the chosen camera comes first.
+def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE) -> Scene:
+    """The scene with a camera, and with light, added where it has none; the chosen camera comes first.
+
+    What has neither lights nor an environment gets a key light and the `studio`.
 
     Call it once, before `at`: the added light stays where it is while the camera moves.
+
+    Args:
+        scene: as it was read.
+        camera_name: the camera that is asked for.
+        aspect: width over height of the picture that an added camera is for.
 
     Raises:
         InputError: there is no camera of that name.
     """
     cameras = dict(scene.cameras)
     if not cameras:
-        cameras["default"] = framing_camera(scene)
+        cameras["default"] = framing_camera(scene, aspect)
     if camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"
             raise InputError(Problem("RG322", text, Place(f"--camera {camera_name}")))
         cameras = {camera_name: cameras[camera_name], **cameras}
     first = next(iter(cameras.values()))
-    lights = scene.lights or (key_light(scene, first),)
-    return replace(scene, cameras=cameras, lights=lights)
+    scene = replace(scene, cameras=cameras)
+    if scene.lights or scene.environment is not None:
+        return scene
+    studio = replace(shipped("studio"), intensity=STUDIO_FILL)
+    return replace(scene, lights=(key_light(scene, first),), environment=studio)
 
 
 def moves(scene: Scene) -> bool:
@@ -92,6 +71,7 @@ def at(scene: Scene, time_s: float) -> Scene:
     """The scene at a time in seconds: keyframes first, then the orbit. Meshes are shared, never copied."""
     if not moves(scene):
         return scene
+    first = scene
     changed: dict[tuple[str, str], dict[str, Any]] = {}
     for path, frames in scene.keyframes.items():
         section, _, rest = path.partition(".")
@@ -100,7 +80,7 @@ def at(scene: Scene, time_s: float) -> Scene:
     for (section, name), values in changed.items():
         merged = {**scene.recipe.get((section, name), {}), **values}
         scene = _CHANGE[section](scene, name, merged)
-    return scene if scene.orbit is None else _orbited(scene, time_s)
+    return scene if scene.orbit is None else _orbited(scene, time_s, first if first.objects is scene.objects else scene)
 
 
 def interpolated(frames: tuple[tuple[float, Any], ...], time_s: float) -> Any:
@@ -112,13 +92,14 @@ def interpolated(frames: tuple[tuple[float, Any], ...], time_s: float) -> Any:
     return tuple(float(np.interp(time_s, times, column)) for column in values.T)
 
 
-def _orbited(scene: Scene, time_s: float) -> Scene:
+def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
+    """The scene with its camera turned; `placed` has the same objects, and their bounds where they were asked for."""
     assert scene.orbit is not None  # the caller asked
     name = scene.orbit.camera or next(iter(scene.cameras), "")
     if name not in scene.cameras:
         return scene
     camera = scene.cameras[name]
-    target = camera.target or bounding_sphere(scene)[0]
+    target = camera.target or bounding_sphere(placed)[0]
     angle = math.radians(scene.orbit.degrees_per_second * time_s)
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])

@@ -1,4 +1,4 @@
-"""Cameras as matrices, in float64, and what is known of lights before the schedule."""
+"""Cameras as matrices, in float64, and what is known of lights and environment before the schedule."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from rendergraph.api import viewing
 from rendergraph.declare import LightFacts
 from rendergraph.scene.model import Camera, Matrix, Scene
 from rendergraph.steps import ViewMatrices
+from rendergraph.textures import TextureDesc, full_mip_count
 
 
 def view_matrices(camera: Camera, size: tuple[int, int]) -> ViewMatrices:
@@ -38,3 +39,12 @@ def projection(camera: Camera, aspect: float) -> Matrix:
 def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
     """What is known of every light before the schedule, in the scene's order."""
     return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)
+
+
+def environment_facts(scene: Scene) -> TextureDesc | None:
+    """The texture that a scene's environment becomes; None where it has none."""
+    if scene.environment is None:
+        return None
+    size = scene.environment.size
+    assert size is not None  # whoever reads a scene has seen to that
+    return TextureDesc("texture2d", "rgba16f", *size, mips=full_mip_count(*size))

@@ -17,7 +17,7 @@ from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene import image_header
-from rendergraph.scene.model import ImageSource
+from rendergraph.scene.model import ImageSource, Material, Mesh
 from rendergraph.stamps import look
 
 CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
@@ -146,6 +146,27 @@ class Reading:
                 "RG301", f"'{shown(name)}' cannot be followed: {reason(problem)}", line=line, file=holder
             ) from None
 
+    def beside_if_there(self, name: str, *, line: int = 0, file: Path | None = None) -> Path | None:
+        """The file `name` means, None where there is none.
+
+        Raises:
+            InputError: it is a URL, holds a NUL, or leaves the roots.
+        """
+        try:
+            path = self.beside(name, line=line, file=file)
+        except InputError as error:
+            if error.problems[0].code not in _NOT_THERE:
+                raise
+            return None
+        return path if file_kind(path) == "file" else None
+
+    def say_unmapped(self, name: str, material: Material, mesh: Mesh) -> None:
+        """Warn where a material has textures, and the mesh no coordinates for them."""
+        for slot, texture in material.textures.items():
+            if (mesh.uv1 if texture.uv else mesh.uv0) is None:
+                text = f"'{shown(name)}' has no coordinates for its {slot} texture, whose first texel is everywhere"
+                self.warn("RG333", "unmapped", text)
+
     def read(self, path: Path, what: str, *, line: int = 0) -> bytes:
         """The bytes of a regular file within `file_bytes`.
 
@@ -236,6 +257,8 @@ class Reading:
         return facts
 
 
+_NOT_THERE = ("RG011", "RG301")
+"""What the root rule says of a path that leads nowhere."""
 _NOT = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}
 
 

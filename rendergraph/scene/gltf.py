@@ -22,7 +22,7 @@ from rendergraph.scene.gltf_buffers import Buffers, split_glb
 from rendergraph.scene.gltf_json import JsonObject, parse
 from rendergraph.scene.gltf_materials import Materials
 from rendergraph.scene.gltf_meshes import Primitives
-from rendergraph.scene.model import Camera, Light, Material, Matrix, Mesh, Object, Scene, Vec3
+from rendergraph.scene.model import FARTHEST, Camera, Light, Material, Matrix, Mesh, Object, Scene, Vec3
 
 _READ = frozenset(
     {
@@ -88,6 +88,8 @@ class _Reader:
         holder = top.extension("KHR_lights_punctual")
         self._lights = [self._light(part) for part in holder.parts("lights")] if holder else []
         names, nodes = UniqueNames(), top.parts("nodes")
+        if len(nodes) > reading.limits.objects:
+            raise reading.over(f"has {len(nodes):,} nodes", "objects")
         self._node_count, self._skin_count = len(nodes), len(top.parts("skins"))
         self._nodes = [self._node(part, index, names) for index, part in enumerate(nodes)]
 
@@ -266,9 +268,10 @@ class _Reader:
             if node.local is not _IDENTITY:
                 with np.errstate(over="ignore", invalid="ignore"):
                     world = above @ node.local
-                    finite = np.isfinite(world.astype(np.float32)).all()
-                if not finite:
-                    raise self._reading.error("RG306", f"{node.part.path}: its place in the world is not finite")
+                    near = (np.abs(world) <= FARTHEST).all()
+                if not near:
+                    text = f"{node.part.path}: its place in the world is not finite, or beyond {FARTHEST:g} m"
+                    raise self._reading.error("RG306", text)
             stack += [(child, world) for child in reversed(node.children)]
             if node.mesh is not None:
                 default = self._place(node, world, objects, names, materials, default)
@@ -315,6 +318,7 @@ class _Reader:
                         materials.append(self._materials.default)
                     material = default
                 name = names.unique(instance if k == 0 else f"{instance}#{k}", "object")
+                self._reading.say_unmapped(name, materials[material], self._primitives.meshes[mesh])
                 objects.append(Object(name, mesh, material, place, not node.name.endswith("NS"), node=node.name))
         return default
 

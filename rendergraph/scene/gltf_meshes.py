@@ -10,7 +10,7 @@ from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
 from rendergraph.scene.gltf_buffers import Accessor, Buffers
 from rendergraph.scene.gltf_json import JsonObject
-from rendergraph.scene.model import Floats, Mesh
+from rendergraph.scene.model import FARTHEST, Floats, Mesh
 
 _FLOAT = (5126,)
 _SMALL = (5126, 5121, 5123)
@@ -84,6 +84,8 @@ class Primitives:
             return self._buffers.floats(numbers[key]) if key in numbers else None
 
         positions = self._buffers.floats(numbers["POSITION"])
+        if np.abs(positions).max() > FARTHEST:
+            raise self._reading.error("RG306", f"{part.path}: a vertex lies beyond {FARTHEST:g} m")
         normals, tangents = values("NORMAL"), values("TANGENT")
         uv0, uv1, colors = values("TEXCOORD_0"), values("TEXCOORD_1"), self._colors(part, values("COLOR_0"))
         if normals is None:  # glTF: without normals the client computes flat ones and ignores tangents

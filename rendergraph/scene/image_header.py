@@ -34,6 +34,7 @@ class Header:
         width, height: the larger of what is stored and what is shown.
         channels: in the file.
         channel_bytes: of a decoded channel.
+        cropped: what is stored and what is shown differ.
     """
 
     format: str
@@ -41,6 +42,12 @@ class Header:
     height: int | None = None
     channels: int = 4
     channel_bytes: int = 1
+    cropped: bool = False
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the decoded image; None where only decoding tells."""
+        return None if self.width is None or self.height is None or self.cropped else (self.width, self.height)
 
     @property
     def decoded_bytes(self) -> int | None:
@@ -153,7 +160,7 @@ def _exr(head: bytes) -> Header:
         raise ValueError("has a broken EXR header")
     if flags & 0x800:
         raise ChannelsError("is deep (several samples a pixel); flatten it first")
-    at, sides, names = 8, [], list[str]()
+    at, sides, windows, names = 8, [], [], list[str]()
     while at < len(head) and head[at]:
         name, at = _zero_ended(head, at)
         kind, at = _zero_ended(head, at)
@@ -162,6 +169,7 @@ def _exr(head: bytes) -> Header:
         if name in (b"dataWindow", b"displayWindow") and kind == b"box2i":
             x0, y0, x1, y1 = struct.unpack("<iiii", value)
             sides.append((x1 - x0 + 1, y1 - y0 + 1))
+            windows.append(value)
         if name == b"channels" and kind == b"chlist":
             names = _channel_names(value)
     if not sides:
@@ -172,7 +180,7 @@ def _exr(head: bytes) -> Header:
         if min(width, height) < 1:
             raise ValueError(f"is {width}×{height} texels")
     width, height = (max(side) for side in zip(*sides, strict=True))
-    return Header("exr", width, height, max(1, len(names)), 2)
+    return Header("exr", width, height, max(1, len(names)), 2, cropped=len(set(windows)) > 1)
 
 
 def _channel_names(value: bytes) -> list[str]:

@@ -6,7 +6,7 @@ the origin at the image's top left.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,11 +17,19 @@ import numpy.typing as npt
 
 from rendergraph.declare import Added
 from rendergraph.declare.extension import ImageLoader
+from rendergraph.scene.edges import Edges, find_edges
 from rendergraph.stamps import Stamp
 
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
 Vec3: TypeAlias = tuple[float, float, float]
+
+
+FARTHEST = 1e12
+"""No number of a mesh is larger: products of a few would leave single precision."""
+
+_MOST_CONVEX = 10_000_000
+"""Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +60,44 @@ class Mesh:
         """Minimum and maximum corner, float32 (3,) each."""
         return self.positions.min(axis=0), self.positions.max(axis=0)
 
+    @cached_property
+    def plane(self) -> tuple[float, float, float, float] | None:
+        """The plane (a, b, c, d), a x + b y + c z + d = 0, that all its triangles lie in, or None.
+
+        Its normal is of unit length, and on the side that the triangles show.
+        """
+        a, b, c = np.moveaxis(self.positions.astype(np.float64)[self.indices], 1, 0)
+        normal = np.cross(b - a, c - a).sum(axis=0)
+        length = float(np.linalg.norm(normal))
+        if not length:
+            return None
+        normal /= length
+        away = np.stack([a, b, c]) @ normal
+        low, high = self.box
+        if float(np.ptp(away)) > 1e-5 * float(np.linalg.norm(high - low)):
+            return None
+        x, y, z = (float(value) for value in normal)
+        return x, y, z, -float(away.mean())
+
+    @cached_property
+    def convex(self) -> bool:
+        """Whether it is closed with every vertex behind every triangle; False, too, where it is too large to ask."""
+        triangles = self.edges.triangles
+        if self.edges.gap or len(triangles) * len(self.positions) > _MOST_CONVEX:
+            return False
+        positions = self.positions.astype(np.float64)
+        a, b, c = np.moveaxis(positions[triangles], 1, 0)
+        normals = np.cross(b - a, c - a)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        out = (positions @ normals.T).max(axis=0) - (a * normals).sum(axis=1)
+        low, high = self.box
+        return bool(out.max() <= 1e-5 * float(np.linalg.norm(high - low)))
+
+    @cached_property
+    def edges(self) -> Edges:
+        """How its triangles meet."""
+        return find_edges(self.positions, self.indices)
+
 
 @dataclass(frozen=True)
 class ImageSource:
@@ -68,6 +114,21 @@ class ImageSource:
     data: bytes | None = None
     label: str = ""
     loader: Added[ImageLoader] | None = None
+
+
+@dataclass(frozen=True)
+class MadeImage:
+    """An image that is made in code.
+
+    Attributes:
+        label: how messages name it.
+        size: width and height.
+        make: gives float16 (height, width, 4), top row first.
+    """
+
+    label: str
+    size: tuple[int, int]
+    make: Callable[[], npt.NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -218,12 +279,14 @@ class Environment:
     """An equirectangular image around the scene.
 
     Attributes:
-        image: the file.
+        image: the file, or what makes one that comes with the program.
+        size: width and height of what it decodes to; None where only decoding tells.
         intensity: factor on its radiance.
         rotate: radians about +Y.
     """
 
-    image: ImageSource
+    image: ImageSource | MadeImage
+    size: tuple[int, int] | None
     intensity: float = 1.0
     rotate: float = 0.0
 
@@ -282,3 +345,30 @@ class Scene:
     recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
     placements: Mapping[str, Placement] = field(default_factory=dict)
     files: Mapping[Path, Stamp] = field(default_factory=dict)
+
+    @cached_property
+    def bounds(self) -> tuple[Vec3, Vec3]:
+        """Least and greatest corner of what is drawn; a unit cube where nothing is.
+
+        Boxes of meshes are transformed, so a turned object's box may be larger than the object.
+        """
+        shown = [entry for entry in self.objects if not entry.hidden]
+        if not shown:
+            return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
+        transforms = np.array([entry.transform for entry in shown])
+        used = {number: place for place, number in enumerate(dict.fromkeys(entry.mesh for entry in shown))}
+        boxes = np.array([self.meshes[number].box for number in used], np.float64)
+        low, high = boxes[[used[entry.mesh] for entry in shown]].swapaxes(0, 1)
+        center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
+        extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
+        (x, y, z), (u, v, w) = (center - extent).min(axis=0).tolist(), (center + extent).max(axis=0).tolist()
+        return (x, y, z), (u, v, w)
+
+    def has_grain(self, material: Material) -> bool:
+        """Whether a material is rougher along one direction than across, now or at another time."""
+        return material.anisotropy_strength > 0 or f"materials.{material.name}.anisotropy_strength" in self.keyframes
+
+    def __repr__(self) -> str:
+        return (
+            f"<Scene {self.name}: {len(self.objects)} objects, {len(self.lights)} lights, {len(self.cameras)} cameras>"
+        )

@@ -13,7 +13,7 @@ from typing import Any
 
 from rendergraph.document import shown
 from rendergraph.errors import InputError
-from rendergraph.scene.files import Reading, file_kind, named
+from rendergraph.scene.files import Reading, named
 from rendergraph.scene.model import Material, Texture, Vec3
 from rendergraph.scene.obj_block import text_of
 from rendergraph.scene.phong import dielectric_f0, roughness_of
@@ -176,10 +176,8 @@ def _options(rest: bytes) -> tuple[dict[bytes, list[float]], bytes]:
 
 def _follow(name: str, path: Path, line: int, reading: Reading) -> Path | None:
     """The file a map names; Windows' separators are understood; None with a warning where it does not exist."""
-    found: Path | None = None
     for candidate in dict.fromkeys((name, name.replace("\\", "/"))):
-        found = reading.beside(candidate, line=line, file=path)
-        if file_kind(found) == "file":
+        if (found := reading.beside_if_there(candidate, line=line, file=path)) is not None:
             return found
     reading.warn("RG330", f"map {name}", f"map '{shown(name)}' cannot be read; it is left out", line=line, file=path)
     return None

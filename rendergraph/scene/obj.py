@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from rendergraph.api.viewing import unit
 from rendergraph.document import shown
-from rendergraph.scene.files import Reading, UniqueNames, file_kind, named
+from rendergraph.scene.files import Reading, UniqueNames, named
 from rendergraph.scene.geometry import Doubles, face_normals, mean_normals
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
 from rendergraph.scene.mtl import read_mtl
@@ -82,11 +82,11 @@ def _libraries(found: Statements, reading: Reading) -> dict[str, Material]:
     if len(found.libraries) > _MOST_LIBRARIES:
         raise reading.error("RG307", f"names more than {_MOST_LIBRARIES} material libraries")
     for text, line in found.libraries:
-        whole = reading.beside(text, line=line)
-        names = [text] if file_kind(whole) == "file" else re.split(r"\s+(?=\S)", text)
+        whole = reading.beside_if_there(text, line=line)
+        names = [text] if whole is not None else re.split(r"\s+(?=\S)", text)
         for name in names:
-            path = reading.beside(name.replace("\\", "/"), line=line)
-            if file_kind(path) == "file":
+            path = whole or reading.beside_if_there(name.replace("\\", "/"), line=line)
+            if path is not None:
                 library |= {key: value for key, value in read_mtl(path, reading).items() if key not in library}
             else:
                 text = f"material library '{shown(name)}' cannot be read; materials are the default one"
@@ -188,6 +188,7 @@ def _assemble(
         name = names.unique(f"{node}#{parts_of[node]}" if parts_of[node] else node, "object")
         parts_of[node] += 1
         meshes.append(columns.mesh(name, a, b, indices))
+        reading.say_unmapped(name, materials[word][1], meshes[-1])
         objects.append(Object(name, k, materials[word][0], np.eye(4), casts, hidden, node))
     listed = tuple(material for _, material in materials.values())
     return Scene(path.stem, path, tuple(objects), tuple(meshes), listed, warnings=reading.warnings)
@@ -230,10 +231,10 @@ def _owners(found: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
 def _material(word: str, library: dict[str, Material], found: Statements, reading: Reading) -> Material:
     if named(word) in library:
         return library[named(word)]
-    if word and found.libraries:
-        reading.warn(
-            "RG330", f"usemtl {word}", f"material '{shown(word)}' is in no material library; it is the default one"
-        )
+    if word:
+        kind = f"usemtl {word}" if found.libraries else "usemtl"  # where none is named, once for all
+        text = f"material '{shown(word)}' is in no material library; it is the default one"
+        reading.warn("RG330", kind, text)
     return Material(named(word) or _DEFAULT, base_color=(0.8, 0.8, 0.8, 1.0))
 
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from rendergraph.document import shown
 from rendergraph.scene.files import Reading
+from rendergraph.scene.model import FARTHEST
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -208,12 +209,13 @@ class Block:
                     raise self._wrong(row, f"'{shown(text_of(word), 30)}' is no number")
             raise self._wrong(row, "its numbers cannot be told apart")
         at = np.cumsum(counts) - counts
-        with np.errstate(over="ignore"):
-            bad = ~np.isfinite(values.astype(np.float32))
+        bad = ~(np.abs(values) <= FARTHEST)
         if bad.any():
             row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
             raise self.reading.error(
-                "RG306", f"'{shown(text_of(self._rest(row)), 60)}' is not finite", line=self.line(row)
+                "RG306",
+                f"'{shown(text_of(self._rest(row)), 60)}' is not finite, or beyond {FARTHEST:g}",
+                line=self.line(row),
             )
         return values.astype(np.float64), counts, at
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
-
-import numpy as np
+from functools import partial
+from operator import attrgetter
 
 from rendergraph.facts import SELECTIONS, ObjectFacts
-from rendergraph.scene.model import Mesh, Scene
+from rendergraph.scene.model import Scene
 
 
 def selected(scene: Scene, name: str) -> list[int]:
@@ -22,7 +21,6 @@ def selected(scene: Scene, name: str) -> list[int]:
 
 def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
     """What is known of the objects, in the scene's order."""
-    closed = [cache(partial(is_closed, mesh)) for mesh in scene.meshes]
     found = []
     for placed in scene.objects:
         mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
@@ -35,25 +33,11 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
                 material.alpha_mode == "blend",
                 material.double_sided,
                 placed.hidden,
-                closed[placed.mesh],
+                scene.has_grain(material),
+                mesh.name,
+                partial(attrgetter("edges.gap"), mesh),
+                partial(attrgetter("plane"), mesh),
+                partial(attrgetter("convex"), mesh),
             )
         )
     return tuple(found)
-
-
-def is_closed(mesh: Mesh) -> bool:
-    """Whether each edge of a mesh, welded by position, has one triangle that runs it one way, and one the other way.
-
-    Triangles without area count for nothing.
-    """
-    if not len(mesh.indices):
-        return False
-    _, welded = np.unique(mesh.positions, axis=0, return_inverse=True)
-    corners = welded.reshape(-1)[mesh.indices].astype(np.int64)
-    a, b, c = corners.T
-    corners = corners[(a != b) & (b != c) & (c != a)]
-    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    count = int(corners.max(initial=0)) + 1
-    one_way, times = np.unique(edges[:, 0] * count + edges[:, 1], return_counts=True)
-    other_way = np.unique(edges[:, 1] * count + edges[:, 0])
-    return len(corners) > 0 and bool((times == 1).all()) and np.array_equal(one_way, other_way)

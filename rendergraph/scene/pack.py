@@ -1,11 +1,12 @@
 """A scene as arrays for the GPU, packed once: geometry streams, instance records, materials, lights and views.
 
 Layouts are those of the GLSL structs in `shaders/include/` (std140: everything is a vec4 or a mat4 by columns). Bytes:
-`View` 432, `Light` 64, `MaterialData` 128, an instance record 56.
+`View` 448, `Light` 64, `MaterialData` 128, an instance record 56.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -13,7 +14,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.scene.model import Floats, Light, Material, Mesh, Scene
+from rendergraph.scene.edges import find_edges
+from rendergraph.scene.model import Environment, Floats, Light, Material, Matrix, Mesh, Scene
 from rendergraph.scene.pack_order import first_use, ordered
 from rendergraph.scene.phong import dielectric_f0, phong_of
 from rendergraph.steps import ViewMatrices
@@ -63,6 +65,7 @@ MATERIAL = np.dtype(
         )
     ]
 )
+ENVIRONMENT = np.dtype([("environment_turn", *_VEC4)])
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
 VIEW = np.dtype(
     [
@@ -76,8 +79,9 @@ VIEW = np.dtype(
             "inverse_view_projection",
         )
     ]
-    + [(name, *_VEC4) for name in ("eye", "viewport", "range")]
+    + [(name, *_VEC4) for name in ("eye", "viewport", "range", "jitter")]
 )
+_FARTHEST_EYE = 1e9  # metres; one that is farther off is a direction, whatever rounding says
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
 
@@ -97,6 +101,7 @@ class PackedScene:
         material_uvs: float32 (m, 16, 4): per material the eight `SLOTS`' two rows (a, b, c, 0) of the uv transform.
         material_moved: bool (m,), whether any slot's transform is not the identity (`HAS_UV_TRANSFORM`).
         lights: `LIGHT` records.
+        environment: one `ENVIRONMENT` record.
         object_mesh: int32 (n,).
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
         casts_shadow, hidden, double_sided: bool (n,).
@@ -118,6 +123,7 @@ class PackedScene:
     material_uvs: Floats
     material_moved: Bools
     lights: Records
+    environment: Records
     object_mesh: Ints
     mirrored: Bools
     casts_shadow: Bools
@@ -164,23 +170,84 @@ def pack(scene: Scene) -> PackedScene:
         streams["colors"],
         indices,
         records,
+        lights=pack_lights(scene.lights),
+        environment=pack_environment(scene.environment),
+        **_materials(scene),
         **_placed(scene, records),
     )
 
 
+def with_adjacency(packed: PackedScene) -> tuple[npt.NDArray[np.uint32], Records]:
+    """Indices of triangles with adjacency, six a triangle, and the `MESH` records that say where they lie.
+
+    Every second index is a corner, and the one behind it the vertex across the edge from there to the next corner.
+    Meshes that are not closed have none.
+    """
+    records = packed.meshes.copy()
+    parts = [np.zeros(0, np.uint32)]
+    first = 0
+    for record in records:
+        vertices = packed.positions[record["base_vertex"] :][: record["vertices"]]
+        triangles = packed.indices[record["first_index"] :][: record["count"]].reshape(-1, 3)
+        edges = find_edges(vertices, triangles)
+        parts.append(np.stack([edges.triangles, edges.beyond], axis=2).astype(np.uint32).reshape(-1))
+        record["first_index"], record["count"] = first, parts[-1].size
+        first += parts[-1].size
+    return np.concatenate(parts), records
+
+
 def blocks(packed: PackedScene) -> dict[str, Records | Floats]:
     """The tables that shaders read, by the names of their blocks."""
-    found: dict[str, Records | Floats] = {"light_block": packed.lights, "material_block": packed.materials}
+    found: dict[str, Records | Floats] = {
+        "light_block": packed.lights,
+        "material_block": packed.materials,
+        "environment_block": packed.environment,
+    }
     return found | ({"material_uv_block": packed.material_uvs} if packed.material_moved.any() else {})
 
 
-def update(packed: PackedScene, scene: Scene) -> PackedScene:
-    """The same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame."""
-    return replace(packed, **_placed(scene, packed.meshes))
+def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:
+    """The same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame.
+
+    Args:
+        packed: of the scene before.
+        before: a scene at another time.
+        scene: the same now; what is the very same in both is not packed again.
+    """
+    changed: dict[str, Any] = {}
+    if scene.lights is not before.lights:
+        changed["lights"] = pack_lights(scene.lights)
+    if scene.environment is not before.environment:
+        changed["environment"] = pack_environment(scene.environment)
+    if scene.materials is not before.materials:
+        changed |= _materials(scene)
+    if scene.objects is not before.objects:
+        changed |= _moved(packed, before, scene)
+    return replace(packed, **changed)
+
+
+def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
+    """What objects are packed to of which some have moved: their records are made anew, those of the others copied."""
+    was, now = before.objects, scene.objects
+    moved = [number for number, (one, other) in enumerate(zip(was, now, strict=True)) if one is not other]
+    if any(vars(was[number]) | {"transform": 0} != vars(now[number]) | {"transform": 0} for number in moved):
+        return _placed(scene, packed.meshes)
+    made = _placed(replace(scene, objects=tuple(now[number] for number in moved)), packed.meshes)
+    made["instances"]["ids"][:, 1] = moved
+    changed = {}
+    for name in ("instances", "mirrored", "centers"):
+        changed[name] = getattr(packed, name).copy()
+        changed[name][moved] = made[name]
+    return changed
+
+
+def _materials(scene: Scene) -> dict[str, Any]:
+    uvs, moved = pack_material_uvs(scene.materials)
+    return {"materials": pack_materials(scene.materials), "material_uvs": uvs, "material_moved": moved}
 
 
 def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
-    """Everything that may change from frame to frame."""
+    """What objects are packed to."""
     objects = scene.objects
     mesh = np.array([entry.mesh for entry in objects], np.int32)
     material = np.array([entry.material for entry in objects], np.int32)
@@ -190,13 +257,8 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
     instances["ids"] = np.stack([material, np.arange(len(objects), dtype=np.int32)], axis=1)
     low, high = meshes["low"][mesh].astype(np.float64), meshes["high"][mesh].astype(np.float64)
     center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
-    uvs, moved = pack_material_uvs(scene.materials)
     return {
         "instances": instances,
-        "materials": pack_materials(scene.materials),
-        "material_uvs": uvs,
-        "material_moved": moved,
-        "lights": pack_lights(scene.lights),
         "object_mesh": mesh,
         "mirrored": np.linalg.det(transforms[:, :3, :3]) < 0,
         "casts_shadow": np.array([entry.casts_shadow for entry in objects], bool),
@@ -269,26 +331,48 @@ def pack_lights(lights: Sequence[Light]) -> Records:
     return table
 
 
+def reversed_projection(view: ViewMatrices) -> Matrix:
+    """A view's projection as the GPU has it: z in 0…w, 0 at the far plane or at infinity and w at the near one.
+
+    Float32 has as many steps between 0 and a thousandth as between a thousandth and 1. Perspective crowds what is far
+    together just where they are (Lapidous and Jiao, "Optimal Depth Buffer for Low-Cost Graphics Hardware", 1999).
+    """
+    matrix = view.projection.copy()
+    matrix[2] = (matrix[3] - matrix[2]) / 2
+    if math.isinf(view.far):  # the classical one stays a little inside, or rounding would cut at infinity
+        matrix[2] -= matrix[3] * (matrix[2, 2] / matrix[3, 2])
+    return matrix
+
+
+def pack_environment(environment: Environment | None) -> Records:
+    """The `environment_block` (shaders/include/environment.glsl): cosine and sine of its turn, and a factor."""
+    turn, intensity = (environment.rotate, environment.intensity) if environment is not None else (0.0, 1.0)
+    record = np.zeros(1, ENVIRONMENT)
+    record["environment_turn"] = (np.cos(turn), np.sin(turn), intensity, 0.0)
+    return record
+
+
 def pack_view(view: ViewMatrices) -> bytes:
-    """A `View` block (shaders/include/view.glsl), 432 bytes; inverses are computed in float64."""
+    """A `View` block (shaders/include/view.glsl), 448 bytes; all of it is computed in float64."""
     record = np.zeros((), VIEW)
-    inverse_view, inverse_projection = np.linalg.inv(view.view), np.linalg.inv(view.projection)
-    both = view.projection @ view.view
+    projection = reversed_projection(view)
+    inverse_view, inverse_projection = np.linalg.inv(view.view), np.linalg.inv(projection)
     for name, matrix in (
         ("view", view.view),
-        ("projection", view.projection),
-        ("view_projection", both),
+        ("projection", projection),
+        ("view_projection", projection @ view.view),
         ("inverse_view", inverse_view),
         ("inverse_projection", inverse_projection),
         ("inverse_view_projection", inverse_view @ inverse_projection),
     ):
         record[name] = matrix.T  # columns behind each other
-    if view.projection[3, 2] != 0:
-        record["eye"] = (*inverse_view[:3, 3], 1.0)
-    else:
-        back = inverse_view[:3, 2]
-        record["eye"] = (*(back / np.linalg.norm(back)), 0.0)
+    # Lines of sight meet where x, y and w are 0: in a point, or in a direction where they are parallel.
+    center = inverse_view @ inverse_projection[:, 2]
+    length = float(np.linalg.norm(center[:3]))
+    parallel = abs(center[3]) * _FARTHEST_EYE < length
+    record["eye"] = (*(center[:3] / (length if parallel else center[3])), 0.0 if parallel else 1.0)
     width, height = view.size
     record["viewport"] = (width, height, 1 / width, 1 / height)
-    record["range"] = (view.near, view.far, 0.0, 0.0)
+    record["range"] = (view.near, view.far, *view.span)
+    record["jitter"] = (*view.jitter, 0.0, 0.0)
     return record.tobytes()

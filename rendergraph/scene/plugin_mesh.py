@@ -14,7 +14,7 @@ from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import face_normals, filled_normals
-from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
+from rendergraph.scene.model import FARTHEST, Floats, Material, Mesh, Object, Scene
 
 _WIDTHS = {"positions": (3,), "normals": (3,), "uv0": (2,), "uv1": (2,), "colors": (3, 4)}
 
@@ -91,12 +91,13 @@ def _mesh(name: str, part: MeshData) -> Mesh:
 def _floats(key: str, given: npt.ArrayLike | None) -> Floats | None:
     if given is None:
         return None
-    array = np.ascontiguousarray(given, np.float32)
+    with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+        array = np.ascontiguousarray(given, np.float32)
     if array.ndim != 2 or array.shape[1] not in _WIDTHS[key]:
         wanted = " or ".join(f"(n, {width})" for width in _WIDTHS[key])
         raise ValueError(f"{key} have the shape {array.shape}, not {wanted}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{key} are not all finite")
+    if not (np.abs(array) <= FARTHEST).all():
+        raise ValueError(f"{key} are not all finite, or beyond {FARTHEST:g}")
     return array
 
 

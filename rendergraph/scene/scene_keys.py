@@ -114,9 +114,15 @@ CAMERA = Table(
 ENVIRONMENT = Table(
     "environment",
     (
-        Key("file", FILE, "Equirectangular image (.hdr, .exr).", required=True),
+        Key("file", FILE, "Equirectangular image (.hdr, .exr), or a shipped one: `studio`, `sky`.", required=True),
         Key("intensity", number(0), "Factor on its radiance.", 1.0),
         Key("rotate_degrees", number(), "Turns it about +Y.", 0.0, "°"),
+        Key(
+            "sun",
+            vector(),
+            f"With `sky`: where sunlight goes, by default as the first directional light; {_DIRECTION}.",
+        ),
+        Key("turbidity", number(2, 10), "With `sky`: haze, from a very clear day.", 3.0),
     ),
 )
 
@@ -160,10 +166,11 @@ SCENE = Table(
         Key(
             "lights",
             Names(LIGHT),
-            "Lights, by name; without any a directional key of 3 lux comes over the viewer's left shoulder.",
+            "Lights, by name; without any, and without an environment, a directional key of 3 lux comes over the "
+            "viewer's left shoulder, and `studio` is around.",
         ),
         Key("cameras", Names(CAMERA), "Cameras, by name, the first is the default; without any the scene is framed."),
-        Key("environment", ENVIRONMENT, "An equirectangular image around the scene."),
+        Key("environment", ENVIRONMENT, "What is around the scene and lights it."),
         Key(
             "keyframes",
             _KEYFRAMES,

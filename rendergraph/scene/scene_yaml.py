@@ -15,6 +15,7 @@ from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import Key, Walk, plain
 from rendergraph.scene import scene_build, scene_keys
+from rendergraph.scene.environments import named
 from rendergraph.scene.files import Reading
 from rendergraph.scene.geometry import rigid
 from rendergraph.scene.meshes import MESHES, read_mesh
@@ -184,11 +185,24 @@ class _Reader:
         values = plain(entry, scene_keys.ENVIRONMENT) if entry is not None else {}
         if entry is None or "file" not in values:
             return None
-        image = self._image(entry, "file", values["file"])
         self.recipe["environment", ""] = values
-        if image is None:
+        place = entry.get("file")
+        assert place is not None  # its value was just read
+        if values["file"] != "sky":
+            for key in ("sun", "turbidity"):
+                if (stated := entry.get(key)) is not None and stated.data is not None:
+                    self.walk.say(stated, "RG321", f"'{key}' goes with `file: sky`", key=True)
+        try:
+            found = named(values["file"], self.made.lights, values)
+            if found is None:
+                path = self.reading.beside(values["file"], line=place.line)
+                image, header = self.reading.image_with_header(path, "image", line=place.line)
+                found = Environment(image, header.size)
+        except InputError as problem:
+            self._take(problem, place)
             return None
-        return Environment(image, values.get("intensity", 1.0), math.radians(values.get("rotate_degrees", 0.0)))
+        turn = math.radians(values.get("rotate_degrees", 0.0))
+        return replace(found, intensity=values.get("intensity", 1.0), rotate=turn)
 
     # Objects ----------------------------------------------------------------------------------------------------------
 

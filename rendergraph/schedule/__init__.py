@@ -7,25 +7,33 @@ as what a heap of bytes could reach. So an order above that peak is taken only w
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
-from rendergraph.schedule.dependencies import StepKey, Versions, Waits, contributing, dependencies, touched_ids
+from rendergraph.schedule.dependencies import (
+    StepKey,
+    Versions,
+    Waits,
+    contributing,
+    dependencies,
+    history_copies,
+    readers_first,
+    touched_ids,
+)
 from rendergraph.schedule.improve import improve
-from rendergraph.schedule.model import Model, alive_all_frame
+from rendergraph.schedule.model import Cost, Model, alive_all_frame
 from rendergraph.schedule.reasons import culled_reasons, order_reasons, step_names
 from rendergraph.schedule.search import search
 from rendergraph.schedule.seeds import program_order, random_order, seeds
-from rendergraph.steps import Resource, Step
+from rendergraph.steps import MOST_STEPS, Resource, Step
 
 if TYPE_CHECKING:
     import networkx as nx
 
-MOST_STEPS = 10_000
 # What a second of budget buys. Counts, so that a slow machine comes to the same schedule as a fast one, only later.
 MOVES_PER_SECOND = 150_000
 TOUCHES_PER_SECOND = 100_000
@@ -44,11 +52,11 @@ class Schedule:
         culled: node id to the reason why none of its steps runs.
         peak_bytes: the most bytes of live resources at any step, in this order.
         peak_node: the node whose step is the peak.
-        lower_bound_bytes: the least peak over all legal orders that was found.
-        proven: no legal order has a lower peak.
+        least_peak_bytes: the least peak of an order that was found; this one may have a higher, as it allocates less.
+        lower_bound_bytes: no legal order has a lower peak than this.
         reasons: step key to why it stands where it stands.
-        whole_frame: ids of the resources that keep their memory for the whole frame: outputs, history, kept values,
-            and buffers that the CPU fills before the first step.
+        whole_frame: ids of the resources that keep their memory for the whole frame: history, kept values, and buffers
+            that the CPU fills before the first step.
         waits: step key to the steps it waits for, with the resource that is the reason and `reads`, `continues` or
             `overwrites`; empty where the schedule was made by hand.
     """
@@ -59,11 +67,26 @@ class Schedule:
     culled: Mapping[str, str]
     peak_bytes: int
     peak_node: str | None
+    least_peak_bytes: int
     lower_bound_bytes: int
-    proven: bool
     reasons: Mapping[tuple[str, int], str] = field(default_factory=dict)
     whole_frame: frozenset[str] = frozenset()
     waits: Waits = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def proven(self) -> bool:
+        """Whether the least peak that was found is the least of all legal orders."""
+        return self.least_peak_bytes == self.lower_bound_bytes
+
+    @property
+    def shown(self) -> frozenset[str]:
+        """Ids of the resources that keep their memory from their first write to the frame's end."""
+        return frozenset(self.wanted.values()) - self.whole_frame
+
+    @cached_property
+    def history_copies(self) -> Mapping[str, int]:
+        """How many textures each history takes: one where it is read for the last time before it is written."""
+        return history_copies(self.steps, self.resources)
 
     @cached_property
     def dependencies(self) -> nx.DiGraph[StepKey]:
@@ -103,27 +126,37 @@ def schedule(
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}
     kept_versions = Versions.of(kept)
     waits = dependencies(kept, kept_versions)
-    whole_frame = alive_all_frame(resources, expansion.wanted, kept_versions)
-    model = Model.of(waits, kept, resources, whole_frame, _sinks(expansion, kept, versions))
+    sinks = _sinks(expansion, kept, versions)
+    whole_frame = {id: resources[id].bytes for id in alive_all_frame(resources, kept_versions)}
 
-    best, least_peak, proven = _optimise(model, budget_s)
-    chosen = None
-    if keep_order:
-        rank = {step.key: number for number, step in enumerate(expansion.steps)}
-        best, chosen = program_order(model, [rank[step.key] for step in model.steps]), "in the program's order"
-    elif shuffle is not None:
-        best, chosen = random_order(model, shuffle), f"drawn by seed {shuffle}"
-    peak, peak_step = model.peak(best)
+    def model_of(waits: Waits, copies: Mapping[str, int]) -> Model:
+        alive = whole_frame | {id: resources[id].desc.bytes * number for id, number in copies.items()}
+        return Model.of(waits, kept, resources, alive, shown, sinks)
+
+    found = _least(model_of, waits, readers_first(waits, kept, kept_versions), resources, budget_s)
+    order, chosen = found.order, None
+    if keep_order or shuffle is not None:
+        model = model_of(waits, {})
+        if shuffle is None or keep_order:
+            rank = {step.key: number for number, step in enumerate(expansion.steps)}
+            numbers, chosen = program_order(model, [rank[step.key] for step in model.steps]), "in the program's order"
+        else:
+            numbers, chosen = random_order(model, shuffle), f"drawn by seed {shuffle}"
+        order = tuple(model.steps[number] for number in numbers)
+    model = model_of(found.waits if chosen is None else waits, history_copies(order, resources))
+    number_of = {step.key: number for number, step in enumerate(model.steps)}
+    numbers = [number_of[step.key] for step in order]
+    peak, peak_step = model.peak(numbers)
     return Schedule(
-        steps=tuple(model.steps[step] for step in best),
+        steps=order,
         resources=resources,
         wanted=dict(expansion.wanted),
         culled={**culled_reasons(expansion.steps, kept, versions), **expansion.idle},
         peak_bytes=peak,
         peak_node=None if peak_step is None else model.steps[peak_step].node,
-        lower_bound_bytes=least_peak,
-        proven=proven,
-        reasons=order_reasons(model, best, chosen),
+        least_peak_bytes=found.least,
+        lower_bound_bytes=found.bound,
+        reasons=order_reasons(model, numbers, chosen),
         whole_frame=frozenset(whole_frame),
         waits=waits,
     )
@@ -137,32 +170,73 @@ def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> li
     return [step for step in finals if step is not None]
 
 
-def _optimise(model: Model, budget_s: float) -> tuple[list[int], int, bool]:
-    """An order that allocates little, the least peak found, and whether that is proven."""
+@dataclass(frozen=True)
+class _Found:
+    """An order that allocates little, what it waited for, the least peak found, and one that no order is below."""
+
+    cost: Cost
+    order: tuple[Step, ...]
+    waits: Waits
+    least: int
+    bound: int
+
+
+def _least(
+    model_of: Callable[[Waits, Mapping[str, int]], Model],
+    waits: Waits,
+    early: tuple[Waits, Sequence[str]],
+    resources: Mapping[str, Resource],
+    budget_s: float,
+) -> _Found:
+    """The best order: one in which histories are read before they are written, or one that takes another texture.
+
+    Args:
+        model_of: the steps with these waits, and so many textures of each history.
+        waits: what the steps wait for.
+        early: the same with readers of histories first wherever that can be, and the histories that it concerns.
+        resources: what the steps touch.
+        budget_s: see `schedule`.
+    """
+    early_waits, ids = early
+    one = history_copies(model_of(early_waits, {}).steps, resources)
+    first = _optimise(model_of(early_waits, one), early_waits, budget_s)
+    if not ids:
+        return first
+    # Every other order takes a second texture of one of them at least, of which only the smallest is sure.
+    more = [resources[id].desc.bytes for id in ids]
+    if first.least <= model_of(waits, one).bounds()[1] + min(more):
+        return first
+    other = _optimise(model_of(waits, one | dict.fromkeys(ids, 2)), waits, budget_s)
+    best = min(first, other, key=lambda found: (found.cost.pool, found.cost.peak))
+    bound = min(first.bound, other.bound - sum(more) + min(more))
+    return replace(best, least=min(first.least, other.least), bound=bound)
+
+
+def _optimise(model: Model, waits: Waits, budget_s: float) -> _Found:
+    """An order that allocates little, the least peak found, and a peak that no order is below."""
     if not len(model):
-        return [], model.constant, True
-    pool_bound, peak_bound = model.bounds()
+        return _Found(Cost(model.constant, model.constant, 0), (), waits, model.constant, model.constant)
+    pool_bound, bound = model.bounds()
     orders = []
     for order in seeds(model):
         orders.append((model.cost(order), order))
-        if (orders[-1][0].pool, orders[-1][0].peak) == (pool_bound, peak_bound):
-            return order, peak_bound, True
-    least_peak = min(cost.peak for cost, _ in orders)
-    proven = least_peak == peak_bound
-    if not proven and len(model) <= MOST_SEARCHED:
-        found = search(model, below=least_peak, bound=peak_bound, budget=int(budget_s * MOVES_PER_SECOND))
-        proven = found.proven
+        if (orders[-1][0].pool, orders[-1][0].peak) == (pool_bound, bound):
+            break
+    least = min(cost.peak for cost, _ in orders)
+    if least > bound and len(model) <= MOST_SEARCHED:
+        found = search(model, below=least, bound=bound, budget=int(budget_s * MOVES_PER_SECOND))
+        bound = found.bound
         if found.order is not None:
             orders.append((model.cost(found.order), found.order))
-            least_peak = orders[-1][0].peak
+            least = orders[-1][0].peak
     # Equal costs go to the order found first: the reading order wherever nothing is better.
     cost, best = min(orders, key=lambda pair: (pair[0].pool, pair[0].peak))
     if cost.pool > pool_bound and len(model) <= MOST_SEARCHED:
         better, improved = improve(model, best, pool_bound=pool_bound, budget=int(budget_s * TOUCHES_PER_SECOND))
-        least_peak = min(least_peak, improved.peak)
+        least = min(least, improved.peak)
         if (improved.pool, improved.peak) < (cost.pool, cost.peak):
-            best = better
-    return best, least_peak, proven
+            cost, best = improved, better
+    return _Found(cost, tuple(model.steps[step] for step in best), waits, least, bound)
 
 
 __all__ = ["Schedule", "schedule", "step_names"]

@@ -128,7 +128,7 @@ def contributing(
             else:
                 writer = versions.writers.get(read.resource, {}).get(read.version)
                 made = resources.get(read.resource)
-                texture = made is None or isinstance(made.desc, TextureDesc)
+                texture = made is None or (isinstance(made.desc, TextureDesc) and made.role != "scene")
                 if writer is None and texture and read.use != "attach":  # the write beside it says it better
                     problems.append(_unwritten(step, read.resource, versions, idle))
             if writer is not None:
@@ -191,6 +191,57 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
     except CycleError as error:
         raise InputError(_cycle(waits, list(pairwise(error.args[1])))) from None
     return waits
+
+
+def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> dict[str, int]:
+    """How many textures the history among the resources takes in an order of steps, by id.
+
+    Two take turns; one does where last frame's value is read for the last time before this frame's is written.
+    """
+    copies = {id: 1 for id, resource in resources.items() if resource.role == "history"}
+    written: set[str] = set()
+    for step in steps:
+        written |= {write.resource for write in step.writes}
+        copies |= {read.resource: 2 for read in step.all_reads if read.previous and read.resource in written}
+    return copies
+
+
+def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> tuple[Waits, list[str]]:
+    """The same with all who read a history's last value ahead of who writes the next, wherever that can be.
+
+    Returns:
+        What the steps wait for then, and the histories of which not every order is so by itself.
+    """
+    readers: dict[str, list[StepKey]] = defaultdict(list)
+    for step in kept:
+        for read in step.all_reads:
+            if read.previous:
+                readers[read.resource].append(step.key)
+    more: dict[StepKey, dict[StepKey, tuple[str, str]]] = {key: dict(found) for key, found in waits.items()}
+    ordered: list[str] = []
+    for id in sorted(readers):
+        writers = versions.writers.get(id)
+        if not writers:
+            continue
+        writer = writers[next(iter(writers))].key
+        loose = sorted(reader for reader in set(readers[id]) if not _follows(more, writer, reader))
+        if loose and not any(_follows(more, reader, writer) for reader in loose):
+            more[writer] |= dict.fromkeys(loose, (id, "overwrites"))
+            ordered.append(id)
+    return more, ordered
+
+
+def _follows(waits: Waits, step: StepKey, other: StepKey) -> bool:
+    """Whether a step is another, or must run after it."""
+    seen, stack = {step}, [step]
+    while stack:
+        key = stack.pop()
+        if key == other:
+            return True
+        fresh = [earlier for earlier in waits[key] if earlier not in seen]
+        seen.update(fresh)
+        stack += fresh
+    return False
 
 
 def _two_writers(resource: str, one: Step, other: Step) -> Problem:

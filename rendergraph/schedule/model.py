@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from rendergraph.schedule.dependencies import StepKey, Versions, Waits, is_filled_by_update, touched_ids
@@ -43,14 +44,14 @@ class Model:
     Attributes:
         steps: by number.
         before, after: numbers a step waits for, and that wait for it.
-        touched: resources a step touches, as numbers; only those that may die within the frame.
+        touched: resources a step touches, as numbers; only those that are not alive during the whole frame.
         born: bytes that come alive with a step.
         sizes: bytes of each resource.
         classes: number of the storage class of each resource; equal ones can share a texture.
-        toucher_count: how many steps touch each resource.
+        toucher_count: how many touch each resource: steps, and the frame's end what is shown.
+        shown: numbers of the resources that the frame's end touches.
         names: id of each resource.
-        constant: bytes alive during the whole frame: outputs, history, kept values, buffers that `update`
-            fills.
+        constant: bytes alive during the whole frame: history, kept values, buffers that `update` fills.
     """
 
     steps: tuple[Step, ...]
@@ -61,6 +62,7 @@ class Model:
     sizes: tuple[int, ...]
     classes: tuple[int, ...]
     toucher_count: tuple[int, ...]
+    shown: frozenset[int]
     names: tuple[str, ...]
     constant: int
 
@@ -70,7 +72,8 @@ class Model:
         waits: Waits,
         kept: Sequence[Step],
         resources: Mapping[str, Resource],
-        whole_frame: set[str],
+        whole_frame: Mapping[str, int],
+        shown: Collection[str],
         sinks: Sequence[Step],
     ) -> Model:
         """Number the steps of a dependency graph.
@@ -79,7 +82,8 @@ class Model:
             waits: step to the steps it waits for.
             kept: the steps.
             resources: what the steps touch.
-            whole_frame: ids of the resources that are alive during the whole frame.
+            whole_frame: ids and bytes of the resources that are alive during the whole frame.
+            shown: ids of the resources that are alive at its end.
             sinks: the steps the frame is rendered for, in a fixed order.
         """
         by_key = {step.key: step for step in kept}
@@ -107,6 +111,9 @@ class Model:
                 mine.append(names[id])
                 toucher_count[names[id]] += 1
             touched.append(tuple(mine))
+        ending = frozenset(number for id, number in names.items() if id in shown)
+        for resource in ending:
+            toucher_count[resource] += 1
         kinds: dict[object, int] = {}
         classes = tuple(kinds.setdefault(storage_class(resources[id]), len(kinds)) for id in names)
         return cls(
@@ -118,8 +125,9 @@ class Model:
             tuple(resources[id].bytes for id in names),
             classes,
             tuple(toucher_count),
+            ending,
             tuple(names),
-            sum(resources[id].bytes for id in whole_frame),
+            sum(whole_frame.values()),
         )
 
     def __len__(self) -> int:
@@ -175,7 +183,7 @@ class Model:
         """Bytes that no order's pool and no order's peak can go below.
 
         A resource is alive at a step that touches it, and at every step that must lie between its first writer and
-        another step that touches it.
+        another step that touches it; what is shown at every step that must follow its first writer.
         """
         count = len(self)
         ancestors = [0] * count
@@ -196,7 +204,8 @@ class Model:
                 mask |= 1 << step
                 within |= ancestors[step]
             if visits > 0:
-                mask |= within & descendants[touchers[resource][0]]
+                following = descendants[touchers[resource][0]]
+                mask |= following if resource in self.shown else within & following
             number_alive = alive.setdefault(self.classes[resource], [0] * count)
             while mask:
                 low = mask & -mask
@@ -206,8 +215,10 @@ class Model:
                 number_alive[step] += 1
                 visits -= 1
         size_of = dict(zip(self.classes, self.sizes, strict=True))
-        pool = sum(size_of[kind] * max(numbers) for kind, numbers in alive.items())
-        return self.constant + pool, max(live, default=self.constant)
+        at_end = Counter(self.classes[resource] for resource in self.shown)
+        pool = sum(size_of[kind] * max(*numbers, at_end[kind]) for kind, numbers in alive.items())
+        least = self.constant + sum(self.sizes[resource] for resource in self.shown)
+        return self.constant + pool, max(least, *live)
 
     def _descendants(self) -> list[int]:
         found = [0] * len(self)
@@ -222,13 +233,12 @@ def storage_class(resource: Resource) -> object:
     return resource.desc.storage_class if isinstance(resource.desc, TextureDesc) else resource.desc
 
 
-def alive_all_frame(resources: Mapping[str, Resource], wanted: Mapping[str, str], versions: Versions) -> set[str]:
-    """Ids of the resources that keep their memory for the whole frame: outputs, history, kept, what `update` fills."""
-    shown = set(wanted.values())
+def alive_all_frame(resources: Mapping[str, Resource], versions: Versions) -> set[str]:
+    """Ids of what is there for the whole frame: history, kept values, the scene's, what `update` fills."""
     return {
         id
         for id, resource in resources.items()
-        if id in shown or resource.role in ("output", "history", "kept") or is_filled_by_update(id, resource, versions)
+        if resource.role in ("history", "kept", "scene") or is_filled_by_update(id, resource, versions)
     }
 
 

@@ -1,13 +1,17 @@
-"""The exact least peak: best-first search over the sets of steps that have run."""
+"""The least peak: a beam and a best-first search over the sets of steps that can have run."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
+from heapq import heappop, heappush, nsmallest
+from typing import NamedTuple
 
 from rendergraph.schedule.model import Model
+
+BEAM, LAST_BEAM = 64, 256
+"""States that a beam keeps after each step, before the search and when its budget has ended."""
 
 
 @dataclass(frozen=True)
@@ -15,22 +19,32 @@ class Found:
     """What a search came to.
 
     Attributes:
-        order: a legal order with a lower peak than asked, None where there is none or none was found.
-        proven: nothing is lower than `order`, or than what was asked where that is None.
-        moves: steps tried.
+        order: a legal order with a lower peak than asked, None where none was found.
+        bound: no legal order has a lower peak than this, or than what was asked where that is less.
     """
 
     order: list[int] | None
-    proven: bool
-    moves: int
+    bound: int
+
+
+class _State(NamedTuple):
+    """A set of steps that can have run, and the best known way there."""
+
+    peak: int
+    live: int
+    place: int
+    done: int
+    ready: tuple[int, ...]
 
 
 def search(model: Model, *, below: int, bound: int, budget: int) -> Found:
-    """A legal order of least peak, if one is below a given peak.
+    """A legal order of least peak, if one is below a given peak; the best that the budget finds.
 
-    States are sets of steps closed under what they wait for; the cheapest peak so far is expanded first, and among
-    equals the one that got furthest, so that the first complete order is a least one. Three rules keep it small, none
-    of which loses the optimum:
+    States are sets of steps closed under what they wait for. A beam first follows the most promising ones to the end,
+    and what it finds is beaten from then on. Then the cheapest peak so far is expanded first, and among equals the one
+    that got furthest, so that the first complete order is a least one. When the budget ends before, the cheapest state
+    that is left is a bound, and wider beams complete it and begin anew. Three rules keep the search small, none of
+    which loses the optimum:
 
     - A step that raises neither the peak nor the live bytes is run at once. Whatever order the rest takes, bringing
       that step forward raises nothing: what it frees now is freed in every larger set as well.
@@ -46,72 +60,119 @@ def search(model: Model, *, below: int, bound: int, budget: int) -> Found:
         budget: steps to try before giving up, where a state costs more the more of it is symmetric. A count and not
             a time, so that the result does not depend on the machine.
     """
-    count = len(model)
-    full = (1 << count) - 1
-    needs = [sum(1 << other for other in earlier) for earlier in model.before]
-    touch_masks = [0] * len(model.sizes)
-    for step, resources in enumerate(model.touched):
-        for resource in resources:
-            touch_masks[resource] |= 1 << step
-    # Per step: masks and sizes of what it touches; the resource dies with the step that completes the mask.
-    ends = [[(touch_masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
-    born, after = model.born, model.after
-    twins = twin_branches(model)
-    price = sum(len(branch) for group in twins for branch in group) // 12
-    ready = tuple(step for step in range(count) if not needs[step])
-    parents: list[tuple[int, int]] = [(-1, -1)]
-    # peak, minus the number of steps run, live bytes, place in `parents`, set, its canonical form, ready steps
-    base_live = model.constant
-    heap: list[tuple[int, int, int, int, int, int, tuple[int, ...]]] = [(bound, 0, base_live, 0, 0, 0, ready)]
+    moves = _Moves(model)
+    start = _State(bound, model.constant, 0, 0, moves.first)
+    order, moves.below = None, below
+    if budget:
+        order = moves.beam(start, BEAM)
+    if moves.below <= bound:
+        return Found(order, bound)
+    # peak, minus the number of steps run, live bytes, place: no two places are equal, so no states are compared
+    heap: list[tuple[int, int, int, int, int, _State]] = [(bound, 0, model.constant, 0, 0, start)]
     reached = {0: bound}
-    moves = 0
+    base_live = model.constant
     while heap:
-        peak, depth, live, place, done, key, ready = heappop(heap)
-        if peak > reached[key]:
+        peak, depth, live, _, key, state = heappop(heap)
+        if peak > reached[key] or peak >= moves.below:
             continue
-        if done == full:
-            return Found(_path(parents, place), True, moves)
-        if live <= base_live and done:
+        if state.done == moves.full:
+            return Found(moves.path(state.place), peak)
+        if moves.made > budget:
+            for begun in (start, state) if budget else ():
+                order = moves.beam(begun, LAST_BEAM) or order
+            return Found(order, peak)
+        if live <= base_live and state.done:
             base_live = live
             heap.clear()
             reached.clear()
-        children = []
-        for step in ready:
-            moves += 1
-            top = live + born[step]
+        for child, key in moves.after(state):
+            if reached.get(key, moves.below) > child.peak:
+                reached[key] = child.peak
+                heappush(heap, (child.peak, depth - 1, child.live, child.place, key, child))
+    return Found(order, moves.below)
+
+
+class _Moves:
+    """From one set of steps to the next.
+
+    Attributes:
+        below: states whose peak reaches it are dropped.
+        made: steps tried so far.
+        full: the set of all steps.
+        first: the steps that wait for nothing.
+    """
+
+    def __init__(self, model: Model) -> None:
+        count = len(model)
+        self.below, self.made, self.full = 0, 0, (1 << count) - 1
+        self._needs = [sum(1 << other for other in earlier) for earlier in model.before]
+        self.first = tuple(step for step in range(count) if not self._needs[step])
+        masks = [1 << count if resource in model.shown else 0 for resource in range(len(model.sizes))]
+        for step, resources in enumerate(model.touched):
+            for resource in resources:
+                masks[resource] |= 1 << step
+        # Per step: masks and sizes of what it touches; a resource dies with the step that completes its mask.
+        self._ends = [[(masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
+        self._born, self._after = model.born, model.after
+        self._twins = twin_branches(model)
+        self._price = sum(len(branch) for group in self._twins for branch in group) // 12
+        self._parents: list[tuple[int, int]] = [(-1, -1)]
+
+    def after(self, state: _State) -> list[tuple[_State, int]]:
+        """The states one step on, each with the canonical form of its set."""
+        peak, live, done, below = state.peak, state.live, state.done, self.below
+        found: list[tuple[int, int, int, int]] = []
+        for step in state.ready:
+            self.made += 1
+            top = live + self._born[step]
             if top >= below:
                 continue
             now = done | 1 << step
             rest = top
-            for mask, size in ends[step]:
+            for mask, size in self._ends[step]:
                 if not mask & ~now:
                     rest -= size
-            children.append((top if top > peak else peak, rest, step, now))
+            found.append((top if top > peak else peak, rest, step, now))
             if top <= peak and rest <= live:
-                children = children[-1:]
+                found = found[-1:]
                 break
-        for top, rest, step, now in children:
-            moves += price
-            key = canonical(now, twins) if twins else now
-            if reached.get(key, below) <= top:
-                continue
-            reached[key] = top
-            parents.append((place, step))
-            following = tuple(other for other in ready if other != step) + tuple(
-                other for other in after[step] if not needs[other] & ~now
+        needs, result = self._needs, []
+        for top, rest, step, now in found:
+            self.made += self._price
+            following = tuple(other for other in state.ready if other != step) + tuple(
+                other for other in self._after[step] if not needs[other] & ~now
             )
-            heappush(heap, (top, depth - 1, rest, len(parents) - 1, now, key, following))
-        if moves > budget:
-            return Found(None, False, moves)
-    return Found(None, True, moves)
+            self._parents.append((state.place, step))
+            child = _State(top, rest, len(self._parents) - 1, now, following)
+            result.append((child, canonical(now, self._twins) if self._twins else now))
+        return result
 
+    def beam(self, start: _State, width: int) -> list[int] | None:
+        """An order below `below`, which falls to its peak: at each step only so many states are followed further.
 
-def _path(parents: Sequence[tuple[int, int]], place: int) -> list[int]:
-    order: list[int] = []
-    while place:
-        place, step = parents[place]
-        order.append(step)
-    return order[::-1]
+        They are those of least peak, and then of least alive. None where all of them come to nothing.
+        """
+        states = [start]
+        while states and states[0].done != self.full:
+            best: dict[int, _State] = {}
+            for state in states:
+                for child, key in self.after(state):
+                    known = best.get(key)
+                    if known is None or child.peak < known.peak:
+                        best[key] = child
+            states = nsmallest(width, best.values(), key=lambda state: (state.peak, state.live, state.place))
+        if not states:
+            return None
+        self.below = states[0].peak
+        return self.path(states[0].place)
+
+    def path(self, place: int) -> list[int]:
+        """The steps on the way to a state."""
+        order: list[int] = []
+        while place:
+            place, step = self._parents[place]
+            order.append(step)
+        return order[::-1]
 
 
 # --- symmetry --------------------------------------------------------------------------------------------------------
@@ -151,7 +212,7 @@ def twin_branches(model: Model) -> Twins:
     for step, resources in enumerate(model.touched):
         for resource in resources:
             touchers[resource].append(step)
-    colours = _colours(model, touchers)
+    colours = _colours(model)
     shared: dict[int, int] = defaultdict(int)
     for colour in colours:
         shared[colour] += 1
@@ -189,10 +250,10 @@ def twin_branches(model: Model) -> Twins:
     return found
 
 
-def _colours(model: Model, touchers: Sequence[Sequence[int]]) -> list[int]:
+def _colours(model: Model) -> list[int]:
     count = len(model)
     signature: list[object] = [
-        (model.born[step], tuple(sorted((model.sizes[r], len(touchers[r])) for r in model.touched[step])))
+        (model.born[step], tuple(sorted((model.sizes[r], model.toucher_count[r]) for r in model.touched[step])))
         for step in range(count)
     ]
     colours, classes = _numbered(signature), 0
@@ -226,6 +287,7 @@ def _exchangeable(model: Model, touchers: Sequence[Sequence[int]], one: Sequence
         if {swap.get(s, s) for s in model.before[step]} != set(model.before[image]):
             return False
     near = sorted({resource for step in swap for resource in model.touched[step]})
-    before = sorted((model.sizes[r], tuple(sorted(touchers[r]))) for r in near)
-    after = sorted((model.sizes[r], tuple(sorted(swap.get(step, step) for step in touchers[r]))) for r in near)
+    looks = {r: (model.sizes[r], model.toucher_count[r]) for r in near}
+    before = sorted((looks[r], tuple(sorted(touchers[r]))) for r in near)
+    after = sorted((looks[r], tuple(sorted(swap.get(step, step) for step in touchers[r]))) for r in near)
     return before == after

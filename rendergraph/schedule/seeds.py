@@ -75,6 +75,10 @@ def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
     before, after = (model.after, model.before) if backwards else (model.before, model.after)
     left = list(model.toucher_count)
     begun = bytearray(len(model.sizes))
+    if backwards:  # the frame's end comes first
+        for resource in model.shown:
+            begun[resource] = 1
+            left[resource] -= 1
     waiting: list[list[int]] = [[] for _ in model.sizes]  # ready steps that touch a resource
     missing = [len(steps) for steps in before]
     done = bytearray(count)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,7 +35,7 @@ class Gpu:
         Raises:
             DeviceError: there is no usable GL device.
         """
-        self._thread = threading.get_ident()
+        self._thread, self._process = threading.get_ident(), os.getpid()
         self.device: Device = open_device(device) if ctx is None else borrow_device(ctx)
         self.cache = GpuCache(self.device)
         self._closed = False
@@ -48,9 +49,20 @@ class Gpu:
         self.close()
 
     def close(self) -> None:
-        """Free everything; the context too, unless it was borrowed."""
+        """Free everything; the context too, unless it was borrowed.
+
+        Raises:
+            RenderError: it is another thread's.
+        """
         if self._closed:
             return
+        if os.getpid() != self._process or self.device.gone:  # all of it is the other process's, or gone
+            self._closed = True
+            return
+        if threading.get_ident() != self._thread:
+            raise RenderError(
+                Problem("RG615", "a session must be closed by the thread that made it; draw and close it there")
+            )
         self._closed = True
         with self.device.current():
             self.device.raw.glUseProgram(0)  # one in use would outlive its deletion
@@ -65,14 +77,20 @@ class Gpu:
         borrowed one, which its owner makes current, is given back as it was found.
 
         Raises:
-            RenderError: it is closed, or another thread's.
+            RenderError: it is closed, another thread's or process's, or its borrowed context has been released.
         """
         if self._closed:
             raise RenderError(
                 Problem("RG615", "the session is closed; draw before its `with` block ends, or make another")
             )
+        if os.getpid() != self._process:
+            text = "a session stays in its process; fork before OpenGL is used, or start processes anew ('spawn')"
+            raise RenderError(Problem("RG615", text))
         if threading.get_ident() != self._thread:
             raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
+        if self.device.gone:
+            text = "the session's context has been released; keep it until the session is closed, or make another"
+            raise RenderError(Problem("RG615", text))
         with self.device.current():
             yield
 

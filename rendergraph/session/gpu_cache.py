@@ -10,16 +10,15 @@ from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
 from rendergraph.errors import Problem
 from rendergraph.gl.device import Device
 from rendergraph.gl.memory import check_memory
-from rendergraph.images import ImageLimits, decode
+from rendergraph.images import decode, decode_light
 from rendergraph.scene import pack
-from rendergraph.scene.model import ImageSource, Scene
+from rendergraph.scene.model import ImageSource, MadeImage, Scene
 from rendergraph.session.executables import ExecutableCache, key_of
+from rendergraph.session.scenes import image_limits
 from rendergraph.session.values import Expanded, Linked, Planned
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-
-_IMAGE_LIMITS = {"image_side": "side", "image_bytes": "bytes", "image_ratio": "ratio"}
 
 
 class GpuCache:
@@ -52,18 +51,20 @@ class GpuCache:
         if self._scene is not None and self._scene[0] is linked.scene:
             return self._scene[1]
         self._forget()
-        allowed = linked.selection.allowed("scene")
-        limits = ImageLimits(**{own: allowed[name] for name, own in _IMAGE_LIMITS.items() if name in allowed})
+        limits = image_limits(linked.selection)
         warnings: list[Problem] = []
 
         def decoded(source: ImageSource, srgb: bool) -> npt.NDArray[Any]:
             return decode(source, srgb=srgb, warn=warnings.append, limits=limits)
 
+        def around(source: ImageSource | MadeImage) -> npt.NDArray[Any]:
+            return decode_light(source, warn=warnings.append, limits=limits)
+
         self.scenes_made += 1
         self.image_warnings = warnings
-        if linked.selection.environment is not None and linked.scene.environment is not None:
-            decoded(linked.scene.environment.image, False)  # named by the user: a broken one is said, used or not
-        scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded)
+        scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded, around)
+        if linked.selection.environment is not None:
+            scene.environment()  # named by the user: a broken one is said, used or not
         self._scene = linked.scene, scene
         return scene
 

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 from rendergraph.session import stages
-from rendergraph.session.selection import RenderKeywords, RenderOptions, Selection
+from rendergraph.session.progress import shown
+from rendergraph.session.selection import RenderKeywords, RenderOptions, Selection, each_of
 
 if TYPE_CHECKING:
     from rendergraph.allocate import ResourcePlan
     from rendergraph.catalog import Catalog
     from rendergraph.session.frame import Frame
     from rendergraph.session.gpu import Gpu
+    from rendergraph.session.progress import Progress
     from rendergraph.session.values import Expanded, Linked, Planned, Resolved
 
 T = TypeVar("T")
@@ -40,7 +42,7 @@ def load(
     The arguments are the fields of a `Selection`.
 
     Raises:
-        UsageError: a limit of an unknown name.
+        UsageError: a limit of an unknown name, or a size that is no pair of whole numbers.
     """
     return Pipeline(
         Selection(
@@ -49,7 +51,7 @@ def load(
             environment=None if environment is None else Path(environment),
             camera=camera,
             size=size,
-            sets=tuple(sets),
+            sets=each_of(sets),
             patches=tuple(Path(p) if isinstance(p, str) else p for p in patches),
             asset_roots=tuple(Path(root) for root in asset_roots),
             limits=tuple((limits or {}).items()),
@@ -83,6 +85,11 @@ class Pipeline:
     selection: Selection
     catalog: Catalog | None = field(default=None, repr=False)
     _done: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        said = ((each, getattr(self.selection, each.name)) for each in fields(self.selection)[1:])
+        given = "".join(f", {each.name}={value!r}" for each, value in said if value != each.default)
+        return f"load({self.selection.source!r}{given})"
 
     # Changing --------------------------------------------------------------------------------------------------------
 
@@ -142,7 +149,8 @@ class Pipeline:
         Raises:
             InputError: a mistake in the file, or an output or port that it does not have.
         """
-        return stages.expand(self.link(), RenderOptions.of(options))
+        linked = self.link()
+        return stages.expand(linked, RenderOptions.of({"frames": linked.frames, "fps": linked.fps, **options}))
 
     def plan(self, **options: Unpack[RenderKeywords]) -> ResourcePlan:
         """Order and memory, without GL; the keywords are the fields of `RenderOptions`.
@@ -160,6 +168,7 @@ class Pipeline:
         *,
         session: Gpu | None = None,
         device: int | None = None,
+        progress: Progress | bool | None = None,
         **options: Unpack[RenderKeywords],
     ) -> Frame:
         """Draw it and return the last frame.
@@ -168,6 +177,7 @@ class Pipeline:
             size: width and height in pixels, the file's by default.
             session: where to draw; a private one for this call by default.
             device: GL device number, where no session is given.
+            progress: told how many frames are drawn, and of how many; True shows a bar on stderr.
             options: the fields of `RenderOptions`.
 
         Raises:
@@ -178,8 +188,8 @@ class Pipeline:
         from rendergraph.session.gpu import opened
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
-        with opened(session, device) as gpu:
-            return stages.draw_last(expanded, gpu)
+        with opened(session, device) as gpu, shown(progress, "frames") as tell:
+            return stages.draw_last(expanded, gpu, tell)
 
     def frames(
         self,

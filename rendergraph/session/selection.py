@@ -5,8 +5,10 @@ Both are plain frozen values without GL, files or modules in them, so that a run
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -16,6 +18,9 @@ TEXTURE_PART = (
     r"(?:\[(?!\])(?:(?P<layer>\d{1,9})(?:,(?=mip)|(?=\])))?(?:mip=(?P<mip>\d{1,9}))?\])?(?P<stencil>:stencil)?"
 )
 """What may stand behind `node.port` in a tap: `[2]`, `[mip=3]`, `[2,mip=3]` and `:stencil`."""
+
+MOST_FRAMES = 100_000
+"""Of one run: an hour at 30 frames a second."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class Selection:
         plugins: Python files or folders with node types.
 
     Raises:
-        UsageError: a limit of an unknown name.
+        UsageError: a limit of an unknown name, or a size that is no pair of whole numbers.
     """
 
     source: str
@@ -50,6 +55,8 @@ class Selection:
     plugins: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.size is not None:
+            object.__setattr__(self, "size", _pair(self.size))
         if not self.limits:
             return
         known = {name for names in _limit_names().values() for name in names}
@@ -61,6 +68,16 @@ class Selection:
         """The limits set for `yaml` or `scene` files, or for the `plan`, by field."""
         names = _limit_names()[kind] if self.limits else {}
         return {names[name]: most for name, most in self.limits if name in names}
+
+
+def _pair(size: Any) -> tuple[int, int]:
+    """Width and height; whether pictures can be so large is asked when the file is read."""
+    if isinstance(size, tuple | list) and len(size) == 2 and all(isinstance(each, Integral) for each in size):
+        return int(size[0]), int(size[1])
+    numbers = re.findall(r"\d+", size) if isinstance(size, str) else ()
+    example = f"({', '.join(numbers)})" if len(numbers) == 2 else "(1280, 720)"
+    text = f"size is {size!r}; it is a pair, width and height in pixels, as in size={example}"
+    raise UsageError(Problem("RG500", text))
 
 
 def _limit_names() -> dict[str, dict[str, str]]:
@@ -86,6 +103,8 @@ class RenderKeywords(TypedDict, total=False):
     poison: bool
     shuffle: int | None
     warm_up: bool
+    timed: bool
+    reuse: bool | None
 
 
 @dataclass(frozen=True)
@@ -100,6 +119,9 @@ class RenderOptions:
         alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, the seed of a random legal
             order instead of the best one.
         warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it.
+        timed: measure each step, which takes longer than many small ones do.
+        reuse: leave out the steps whose values are still there from the frame before and would be the same; no bit of a
+            picture depends on it. By default that is done unless steps are timed, as those left out take no time.
 
     Raises:
         UsageError: frames or frames a second that there cannot be.
@@ -113,23 +135,33 @@ class RenderOptions:
     poison: bool = False
     shuffle: int | None = None
     warm_up: bool = True
+    timed: bool = False
+    reuse: bool | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.frames, range) or not self.frames or min(self.frames) < 1:
+        if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:
             text = f"frames is {self.frames!r}; it is a range of numbers from 1, as in range(1, 31) for the first 30"
+            raise UsageError(Problem("RG500", text))
+        if len(self.frames) > MOST_FRAMES:
+            text = f"{len(self.frames)} frames are more than {MOST_FRAMES} at a time; draw them in parts"
             raise UsageError(Problem("RG500", text))
         if not self.fps > 0:
             raise UsageError(Problem("RG500", f"fps is {self.fps}; it is a number above 0"))
+
+    @property
+    def reuses(self) -> bool:
+        """Whether steps are left out; what poison overwrites is never there."""
+        return not self.poison and (not self.timed if self.reuse is None else self.reuse)
 
     @classmethod
     def of(cls, keywords: RenderKeywords) -> RenderOptions:
         """The options that keywords spell; None is the default."""
         given: dict[str, Any] = {name: value for name, value in keywords.items() if value is not None}
         for name in {"outputs", "taps"} & given.keys():
-            given[name] = _each(given[name])
+            given[name] = each_of(given[name])
         return cls(**given)
 
 
-def _each(names: Iterable[str]) -> tuple[str, ...]:
+def each_of(names: Iterable[str]) -> tuple[str, ...]:
     """Several names, or a text that is one: its letters are never meant."""
     return (names,) if isinstance(names, str) else tuple(names)

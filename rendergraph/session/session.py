@@ -11,6 +11,7 @@ from rendergraph.session.drawing import Drawing
 from rendergraph.session.frame import Frame
 from rendergraph.session.gpu import Gpu
 from rendergraph.session.pipeline import Pipeline, load
+from rendergraph.session.progress import Progress
 from rendergraph.session.selection import RenderKeywords
 
 
@@ -27,10 +28,12 @@ class Session(Gpu):
         self,
         pipeline: Pipeline | str | Path,
         size: tuple[int, int] | None = None,
+        *,
+        progress: Progress | bool | None = None,
         **options: Unpack[RenderKeywords],
     ) -> Frame:
         """Draw a pipeline, or the one of a name or a file, and return the last frame; see `Pipeline.render`."""
-        return _loaded(pipeline).render(size, session=self, **options)
+        return _loaded(pipeline).render(size, session=self, progress=progress, **options)
 
     def frames(
         self,

@@ -9,6 +9,8 @@ scenes in use (`scenes`) and, from `draw` on, what a `Gpu` keeps. GL is imported
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rendergraph.allocate
@@ -17,25 +19,28 @@ import rendergraph.link
 import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
-from rendergraph.document import YamlLimits
-from rendergraph.errors import InputError, Problem
+from rendergraph.document import Document, YamlLimits
+from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene.animate import complete
-from rendergraph.scene.cameras import light_facts
+from rendergraph.scene.cameras import environment_facts, light_facts
 from rendergraph.scene.model import Scene
 from rendergraph.scene.objects import object_facts
+from rendergraph.session.made import Made, is_picture, made
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
 from rendergraph.session.wanted import wanted_ports
+from rendergraph.settings import Roots
 
 if TYPE_CHECKING:
     from rendergraph.session.drawing import Drawing
     from rendergraph.session.frame import Frame
     from rendergraph.session.gpu import Gpu
+    from rendergraph.session.progress import Progress
 
 
 def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
-    """Read the file and all it refers to, and apply what was said about it.
+    """Read the file and all it refers to, and apply what was said about it; of a picture, the file it was made with.
 
     Args:
         selection: what was asked for.
@@ -44,18 +49,46 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     Raises:
         InputError: a file is missing, is no YAML, or leads back to itself. What else is wrong `link` raises.
     """
+    for folder in selection.asset_roots:
+        if not folder.is_dir():
+            text = f"'{folder}' is a file, a folder is needed" if folder.exists() else f"there is no folder '{folder}'"
+            raise InputError(Problem("RG011", text, Place("--asset-root")))
     catalog = catalog or Catalog.discover(selection.plugins)
+    limits = YamlLimits(**selection.allowed("yaml"))
+    source: str | Document = selection.source
+    frames, fps = range(1, 2), 30.0
+    if is_picture(selection.source):
+        picture = made(Path(selection.source), limits)
+        source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
+        selection = replace(
+            selection,
+            camera=selection.camera or picture.camera,
+            environment=selection.environment or _environment(selection, picture),
+        )
     spec = rendergraph.resolve.resolve(
-        selection.source,
+        source,
         patches=selection.patches,
         sets=selection.sets,
         scene=selection.scene,
         size=selection.size,
         asset_roots=selection.asset_roots,
-        limits=YamlLimits(**selection.allowed("yaml")),
+        limits=limits,
         catalog=catalog,
     )
-    return Resolved(selection, catalog, spec)
+    if spec.tree.get("rendergraph") is None:
+        text = "the file does not say which version of the format it is written in; begin it with rendergraph: 1"
+        note = replace(spec.tree.problem("RG016", text), severity="warning")
+        spec = replace(spec, notes=(*spec.notes, note))
+    return Resolved(selection, catalog, spec, frames=frames, fps=fps)
+
+
+def _environment(selection: Selection, picture: Made) -> Path | None:
+    """The environment that a picture names: whoever draws it again has not typed that."""
+    path = picture.environment
+    if path is not None:
+        place = Place(f"{selection.source}: environment")
+        Roots.around(Path("x"), selection.asset_roots).check(path, place)
+    return path
 
 
 def link(resolved: Resolved) -> Linked:
@@ -69,8 +102,9 @@ def link(resolved: Resolved) -> Linked:
         scene = scene_of(resolved)
     except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
         raise InputError([*spec.problems, *error.problems]) from None
-    graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene))
-    return Linked(selection, catalog, spec, scene, graph)
+    around = environment_facts(scene)
+    graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene), around)
+    return Linked(selection, catalog, spec, scene, graph, frames=resolved.frames, fps=resolved.fps)
 
 
 def sketch(resolved: Resolved) -> Linked:
@@ -90,8 +124,10 @@ def sketch(resolved: Resolved) -> Linked:
             if not spec.missing or any(problem.code != "RG303" for problem in lacking.problems):
                 raise error from None
             scene, unread = complete(Scene("missing")), lacking.problems
-        graph, missing = rendergraph.link.sketch(spec, catalog, light_facts(scene))
-        return Linked(selection, catalog, spec, scene, graph, (*missing, *unread))
+        graph, missing = rendergraph.link.sketch(spec, catalog, light_facts(scene), environment_facts(scene))
+        return Linked(
+            selection, catalog, spec, scene, graph, (*missing, *unread), frames=resolved.frames, fps=resolved.fps
+        )
 
 
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
@@ -164,8 +200,7 @@ def draw(expanded: Expanded, gpu: Gpu) -> Iterator[Frame]:
         RenderError: it failed while drawing.
     """
     with gpu.current():
-        drawing = compile(expanded, gpu)
-        drawing.begin()
+        drawing = _begun(expanded, gpu)
     for number in expanded.options.frames:
         with gpu.current():
             drawing.draw(number)
@@ -173,16 +208,23 @@ def draw(expanded: Expanded, gpu: Gpu) -> Iterator[Frame]:
         yield frame
 
 
-def draw_last(expanded: Expanded, gpu: Gpu) -> Frame:
-    """Draw all frames, and look at the last one only.
+def draw_last(expanded: Expanded, gpu: Gpu, progress: Progress | None = None) -> Frame:
+    """Draw all frames, and look at the last one only; `progress` is told of each.
 
     Raises:
         InputError: a mistake in a shader.
         RenderError: it failed while drawing.
     """
     with gpu.current():
-        drawing = compile(expanded, gpu)
-        drawing.begin()
-        for number in expanded.options.frames:
+        drawing = _begun(expanded, gpu)
+        for done, number in enumerate(expanded.options.frames, start=1):
             drawing.draw(number)
+            if progress is not None:
+                progress(done, len(expanded.options.frames))
         return drawing.read()
+
+
+def _begun(expanded: Expanded, gpu: Gpu) -> Drawing:
+    drawing = compile(expanded, gpu)
+    drawing.begin()
+    return drawing

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 from rendergraph.textures import FORMATS, TextureDesc
@@ -55,14 +55,20 @@ class Resolved:
         selection: what was asked for.
         catalog: the node types that can be used.
         spec: the resolved file.
+        frames, fps: what is drawn where nobody says: the first frame, or the one that a picture shows.
     """
 
     selection: Selection
     catalog: Catalog
     spec: PipelineSpec
+    frames: range = field(default=range(1, 2), kw_only=True)
+    fps: float = field(default=30.0, kw_only=True)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.selection.source}>"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Linked(Resolved):
     """The checked graph with its scene.
 
@@ -98,12 +104,15 @@ class Expanded:
     wanted: Mapping[str, Wanted]
     expansion: Expansion
 
-    def for_frames(self, frames: range, *, warm_up: bool = True) -> Self:
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.linked.selection.source}>"
+
+    def for_frames(self, frames: range, *, warm_up: bool = True, timed: bool = False) -> Self:
         """The same to be drawn for other frames, which changes neither steps nor plan."""
-        return replace(self, options=replace(self.options, frames=frames, warm_up=warm_up))
+        return replace(self, options=replace(self.options, frames=frames, warm_up=warm_up, timed=timed))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Planned(Expanded):
     """Steps with their order and their memory."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.expand.model import ENVIRONMENT
 from rendergraph.link import Graph, endpoint
 from rendergraph.session.selection import TEXTURE_PART, RenderOptions
 from rendergraph.session.values import Planned, Wanted
@@ -42,12 +43,22 @@ def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
     return wanted
 
 
+def figures(graph: Graph) -> tuple[str, ...]:
+    """The outputs of the file that are one texel: what they hold is a figure of the run."""
+    infos = {name: graph.textures.get(end.now) for name, end in graph.outputs.items()}
+    return tuple(
+        name
+        for name, info in infos.items()
+        if info is not None and info.desc is not None and (*info.desc.size, info.desc.layers) == (1, 1, 1)
+    )
+
+
 def every_port(planned: Planned) -> tuple[str, ...]:
     """All ports whose textures the steps of a plan write, internals included, as taps, in the order they are done."""
     graph, expansion = planned.linked.graph, planned.expansion
     held: dict[tuple[str, str], list[str]] = {}
     for end, resource in expansion.ports.items():
-        if graph.textures[end].desc is not None:
+        if end != ENVIRONMENT and graph.textures[end].desc is not None:
             held.setdefault((end.node, resource), []).append(str(end))
     written = [
         tap

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Frame, FrameScene, ViewMatrices
-from rendergraph.steps.model import FunctionBinding, Read, Resource, Role, Step, UniformValue, Use, Write
+from rendergraph.steps.model import MOST_STEPS, FunctionBinding, Read, Resource, Role, Step, UniformValue, Use, Write
 from rendergraph.steps.recorder import Recorder, StepRequest, Steps, Target
 from rendergraph.steps.state import (
     ADD,
@@ -27,6 +27,7 @@ from rendergraph.steps.state import (
 __all__ = [
     "ADD",
     "ALPHA",
+    "MOST_STEPS",
     "MULTIPLY",
     "PREMULTIPLIED",
     "Blend",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import wraps
 from typing import Annotated, Any, ParamSpec, TypeAlias
 
@@ -12,7 +13,7 @@ from rendergraph.annotations import Length, Range, hints_of, may_be, mistakes_in
 from rendergraph.errors import Misuse, nearest, suggestion
 from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
-from rendergraph.textures import BufferDesc, TextureDesc
+from rendergraph.textures import FORMATS, BufferDesc, Normal, TextureDesc
 
 _MACRO = re.compile(r"[A-Za-z_]\w*\Z")
 _ATTRIBUTE = re.compile(r"[1-4]?[fiu][1248]?(?:/[vi])?\Z")
@@ -209,3 +210,23 @@ def buffer(port: Port, what: str) -> Port:
     if getattr(port, "kind", "") != "buffer":
         raise Misuse(f"{what} is {quoted(port)}, which is no buffer")
     return port
+
+
+def resolved(source: Port, out: Port, descs: Sequence[TextureDesc | BufferDesc | None]) -> None:
+    """Refuse what no device averages: one sample, depth, whole numbers, unit vectors, another format or size.
+
+    Raises:
+        Misuse: it is that.
+    """
+    given, made = descs
+    if given is None:
+        raise unconnected(source)
+    if not (isinstance(given, TextureDesc) and isinstance(made, TextureDesc)):
+        raise Misuse(f"'{source.name}' or '{out.name}' is a buffer; samples are those of textures")
+    if given.samples == 1:
+        raise Misuse(f"source is '{source.name}', which has one sample a texel; there is nothing to resolve")
+    texel = FORMATS[given.format]
+    if texel.is_depth or texel.family in ("uint", "int") or getattr(source, "semantic", None) == Normal:
+        raise Misuse(f"'{source.name}' holds what has no mean; choose a sample in a shader, by texelFetch")
+    if replace(given, samples=1) != made:
+        raise Misuse(f"'{out.name}' is not what '{source.name}' becomes; declare it like that input, with samples=1")

@@ -17,6 +17,9 @@ DrawOrder = Literal["front_to_back", "back_to_front", "scene"]
 Use: TypeAlias = Literal["sample", "depth_test", "image", "buffer", "attach"]
 UniformValue: TypeAlias = float | int | bool | Sequence[float] | Sequence[int]
 
+MOST_STEPS = 10_000
+"""Of one pipeline."""
+
 
 @dataclass(frozen=True)
 class Read:
@@ -115,9 +118,12 @@ class Step:
         objects: which objects a geometry step draws: `all`, `opaque`, `transparent`, `casters`, or names.
         materials: what of the material its shader looks at: `full`, `alpha` (only what an alpha mask needs) or `none`.
         order: `front_to_back` (free to regroup), `back_to_front` or `scene` (kept as given).
+        region: the number of the node's rectangle that it is drawn in, as `update` sets it; None for the whole target.
+        if_drawn: the number of the node's step without which, where that drew nothing, the device leaves this one out.
         per_light: a light's index where the step draws for one light alone.
         vertices: vertex count of a `draw` step, or the name of the buffer that holds the indirect command.
-        topology: primitives of a `draw` step.
+        command: which of the commands of that buffer.
+        topology: primitives of a `draw` step; `triangles` or `triangles_adjacency` of a geometry step.
         instances: instance count of a `draw` step.
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
         groups: work groups of a compute step.
@@ -130,7 +136,7 @@ class Step:
 
     node: str
     index: int
-    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "copy"]
+    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve", "copy"]
     shaders: tuple[tuple[str, str], ...] = ()
     reads: tuple[Read, ...] = ()
     writes: tuple[Write, ...] = ()
@@ -146,8 +152,11 @@ class Step:
     objects: str | tuple[str, ...] = "all"
     materials: MaterialLevel = "full"
     order: DrawOrder = "front_to_back"
+    region: int | None = None
+    if_drawn: int | None = None
     per_light: int | None = None
     vertices: int | str = 3
+    command: int = 0
     topology: Topology = "triangles"
     instances: int = 1
     attributes: tuple[tuple[str, str], ...] = ()
@@ -174,7 +183,7 @@ class Step:
         return self.reads + tuple(read for function in self.functions for read in function.reads)
 
 
-Role = Literal["transient", "internal", "output", "history", "kept"]
+Role = Literal["transient", "internal", "output", "history", "kept", "scene"]
 
 
 @dataclass(frozen=True)
@@ -185,7 +194,7 @@ class Resource:
         id: `node.port` of whoever made it first; an `InOut` continues the id.
         desc: what it is allocated from.
         role: `transient` and `internal` may be aliased; `output`, `history` and `kept` live the whole frame,
-            the last two from frame to frame.
+            the last two from frame to frame; what is the `scene`'s is there before, and takes no memory here.
         first: every channel's value before the first frame, for history.
         view: id of the view table it is drawn with.
         lights: the scene's light index of each layer.
@@ -200,5 +209,5 @@ class Resource:
 
     @property
     def bytes(self) -> int:
-        """Bytes by formula; a history texture has two copies."""
-        return self.desc.bytes * (2 if self.role == "history" else 1)
+        """Bytes by formula; a history texture has two copies, and the scene's is not the pipeline's."""
+        return self.desc.bytes * {"history": 2, "scene": 0}.get(self.role, 1)

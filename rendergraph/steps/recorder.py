@@ -48,7 +48,7 @@ class StepRequest:
     `caller` is the author's file and line of the call, None where the framework recorded the step by itself.
     """
 
-    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps"]
+    kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve"]
     shaders: tuple[tuple[str, str], ...] = ()
     out: tuple[tuple[str, Part], ...] = ()
     bindings: Mapping[str, Port | Part] = field(default_factory=dict)
@@ -71,7 +71,10 @@ class Steps:
     step reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a
     port, a part, or a mapping from the shader's output names; without it the step writes every output of the node
     that is used. A texture with a depth format is attached as depth. What is None, a port that a subclass drops, is
-    left out. A `label` is what plans and `bench --steps` call the step, beside its node and number.
+    left out. A step with the number of a `region` is drawn in the rectangle that `update` sets for that number
+    (`Frame.set_region`), until then everywhere. A `label` is what plans and `bench --steps` call the step, beside its
+    node and number. A step that draws nothing where an earlier one of the node drew nothing names that one's label
+    (`if_drawn`): the device then leaves it out, without the CPU waiting for the answer.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -142,12 +145,15 @@ class Steps:
         *,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
+        region: Count | None = None,
+        if_drawn: str = "",
         defines: Defines | None = None,
         label: str = "",
         **bindings: Target | UniformValue,
     ) -> None:
         """One fragment shader over the whole target."""
-        self._add("fullscreen", {"fragment": shader}, out, bindings, defines, label=label, state=state)
+        options = {"label": label, "state": state, "region": region, "if_drawn": if_drawn}
+        self._add("fullscreen", {"fragment": shader}, out, bindings, defines, **options)
 
     @checked
     def geometry(
@@ -158,6 +164,8 @@ class Steps:
         geometry: Shader | None = None,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
+        region: Count | None = None,
+        if_drawn: str = "",
         defines: Defines | None = None,
         label: str = "",
         view: Port | None = None,
@@ -166,6 +174,7 @@ class Steps:
         materials: MaterialLevel = "full",
         order: DrawOrder = "front_to_back",
         per_light: Count | None = None,
+        topology: Literal["triangles", "triangles_adjacency"] = "triangles",
         **bindings: Target | UniformValue,
     ) -> None:
         """The scene's objects, one indirect multi-draw a batch.
@@ -173,7 +182,7 @@ class Steps:
         Args:
             fragment: fragment shader, None for depth alone.
             vertex, geometry: other stages; the default vertex shader transforms by object and view.
-            out, state, defines, label, bindings: see the class.
+            out, state, region, if_drawn, defines, label, bindings: see the class.
             view: a `Views` port, a `view` input or a texture that carries one; the node's connected `view` input, else
                 the pipeline's camera.
             view_index: which view of it, None where a geometry shader sets `gl_Layer`.
@@ -181,6 +190,9 @@ class Steps:
             materials: what of the material the shader looks at.
             order: `front_to_back`, `back_to_front` or `scene`.
             per_light: one light's index, for a pass a light.
+            topology: `triangles_adjacency` gives a geometry shader six vertices a triangle: behind each corner the one
+                across the edge from there to the next, vertices with equal positions taken for one. The objects have to
+                be `closed`.
         """
         if per_light is not None and per_light >= len(self.lights):
             raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
@@ -193,12 +205,15 @@ class Steps:
             defines,
             label=label,
             state=state,
+            region=region,
+            if_drawn=if_drawn,
             view=view,
             view_index=view_index,
             objects=checks.objects(objects),
             materials=materials,
             order=order,
             per_light=per_light,
+            topology=topology,
         )
 
     @checked
@@ -208,12 +223,14 @@ class Steps:
         *,
         vertex: Shader,
         vertices: Count | Port,
+        command: Count = 0,
         attributes: Mapping[str, Port] | None = None,
         geometry: Shader | None = None,
         topology: Topology = "triangles",
         instances: Count = 1,
         out: Target | Mapping[str, Target] | None = None,
         state: State = State(),
+        region: Count | None = None,
         defines: Defines | None = None,
         label: str = "",
         view: Port | None = None,
@@ -224,11 +241,12 @@ class Steps:
 
         Args:
             fragment, vertex, geometry: shaders.
-            vertices: how many, or a buffer port whose first four 32-bit integers are the indirect draw command
-                (count, instances, first, base instance).
+            vertices: how many, or a buffer port with indirect draw commands: four 32-bit integers (count, instances,
+                first, base instance) and one that is passed over.
+            command: which of those commands, from 0.
             attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`.
             topology, instances: as in OpenGL.
-            out, state, defines, label, bindings: see the class.
+            out, state, region, defines, label, bindings: see the class.
             view, view_index: as for `geometry`.
         """
         if isinstance(vertices, Port):
@@ -248,7 +266,9 @@ class Steps:
             defines,
             label=label,
             state=state,
+            region=region,
             vertices=vertices,
+            command=command,
             topology=topology,
             view=view,
             view_index=view_index,
@@ -302,9 +322,18 @@ class Steps:
             raise Misuse(f"'{port.name}' has no mips to make; declare it with mips=0 for the whole chain")
         self._add("mipmaps", {}, out, {}, None)
 
+    def resolve(self, source: Port, out: Port) -> None:
+        """Write the mean of the samples of `source`, by the device: right for colours, and for nothing else.
+
+        A mean of depths, of unit vectors or of whole numbers means nothing: a shader chooses among them.
+        """
+        ports = checks.own_port(self.ports, source, "source"), checks.own_port(self.ports, out, "out")
+        checks.resolved(*ports, [self._desc(port) for port in ports])
+        self._add("resolve", {}, out, {"source": source}, None)
+
     def _add(
         self,
-        kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps"],
+        kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve"],
         shaders: Mapping[str, str | None],
         out: Target | Mapping[str, Target] | None,
         bindings: Mapping[str, Target | UniformValue],

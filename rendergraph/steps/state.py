@@ -27,6 +27,8 @@ Front = Literal["object", "counter_clockwise", "clockwise"]
 
 
 _Byte: TypeAlias = Annotated[int, Range(0, 255)]
+_Fraction: TypeAlias = Annotated[float, Range(0, 1)]
+DepthBounds: TypeAlias = Annotated[tuple[_Fraction, _Fraction], "the least and the greatest depth, 0 to 1"]
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class State:
     Attributes:
         depth_test: compare with the attached depth; None: yes where a depth texture is attached to a geometry or draw
             step. Without the test every fragment's depth is written.
-        depth_func: the comparison.
+        depth_func: the comparison of window depth, which is reversed: what is `greater` is nearer.
         depth_write: write depth; None: yes where depth is written by the step.
         blend: one `Blend` for all targets, one a target, or None.
         color_mask: which of RGBA are written.
@@ -104,13 +106,17 @@ class State:
             geometry shader that winds its triangles by itself, and does not pass on the order it is given, says one.
         stencil: stencil state, None for off.
         scissor: x, y, width, height in texels from the bottom left.
-        polygon_offset: factor and units of filled triangles' depth, negative for nearer; not of `wireframe`'s lines.
+        polygon_offset: factor and units of filled triangles' depth, positive for nearer; not of `wireframe`'s lines.
+        depth_bounds: least and greatest depth that what a depth texture already holds may have where fragments pass.
+            Not every driver has it: `rendergraph doctor` says, and elsewhere such a step is an error.
         depth_clamp: clamp instead of clipping at the near and far plane.
+        clip_distances: how many `gl_ClipDistance[…]` the vertex or geometry shader writes: where one is below 0
+            nothing is drawn.
         wireframe: draw lines instead of filled triangles.
     """
 
     depth_test: bool | None = None
-    depth_func: Compare = "lequal"
+    depth_func: Compare = "gequal"
     depth_write: bool | None = None
     blend: Annotated[Blend | tuple[Blend | None, ...] | None, "a Blend, a tuple of them, or None"] = None
     color_mask: Annotated[tuple[bool, bool, bool, bool], "four of True and False"] = (True, True, True, True)
@@ -119,7 +125,9 @@ class State:
     stencil: Stencil | None = None
     scissor: Annotated[tuple[int, int, int, int], "x, y, width and height in texels"] | None = None
     polygon_offset: Annotated[tuple[float, float], "a factor and units"] | None = None
+    depth_bounds: DepthBounds | None = None
     depth_clamp: bool = False
+    clip_distances: Annotated[int, Range(0, 8)] = 0
     wireframe: bool = False
 
     def __post_init__(self) -> None:

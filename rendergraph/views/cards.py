@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -125,14 +126,14 @@ def links(graph: Graph) -> list[Link]:
     ]
 
 
-def generations(graph: Graph) -> list[list[str]]:
+def generations(nodes: Sequence[str], found: Sequence[Link]) -> list[list[str]]:
     """Node ids in layers: everything a node waits for lies in layers before its own."""
     import networkx as nx  # takes longer than checking a pipeline
 
     dag: nx.DiGraph[str] = nx.DiGraph()
-    dag.add_nodes_from(node.id for node in graph.nodes)
-    dag.add_edges_from((link.source, link.target) for link in links(graph) if not link.previous)
-    place = {node.id: number for number, node in enumerate(graph.nodes)}
+    dag.add_nodes_from(nodes)
+    dag.add_edges_from((link.source, link.target) for link in found if not link.previous)
+    place = {node: number for number, node in enumerate(nodes)}
     return [sorted(layer, key=place.__getitem__) for layer in nx.topological_generations(dag)]
 
 

@@ -39,15 +39,13 @@ def lifetimes_svg(plan: ResourcePlan) -> str:
     label = CHARACTER * max((len(id) for id in ids), default=8) + 10
     left = MARGIN + max(label, CHARACTER * len("live bytes") + 10)
     right = left + CELL * len(steps)
-    facts = {
-        id: f"{_home(plan, id)} · {desc_text(plan.resources[id])} · {mebibytes(plan.resources[id].bytes)}" for id in ids
-    }
+    facts = {id: f"{_home(plan, id)} · {desc_text(plan.resources[id])} · {mebibytes(plan.bytes(id))}" for id in ids}
     top = MARGIN + 26 + CHARACTER * max((len(name) for name in names.values()), default=0) * 0.94 + 8
     memory = plan.memory
-    proof = "" if memory.proven else " (not proven)"
+    proof = "" if memory.proven else f" (bound {mebibytes(memory.lower_bound_bytes)})"
     caption = (
         f"allocated {mebibytes(memory.allocated_bytes)} of {mebibytes(memory.no_reuse_bytes)} without reuse · "
-        f"least peak {mebibytes(memory.lower_bound_bytes)}{proof} · shared by {memory.tier}"
+        f"least peak {mebibytes(memory.least_peak_bytes)}{proof} · shared by {memory.tier}"
     )
     parts = [f'<text class="ink" x="{MARGIN}" y="{MARGIN + 8}" font-weight="600">{escape(caption)}</text>']
     for number, step in enumerate(steps):
@@ -119,7 +117,7 @@ def _row(plan: ResourcePlan, id: str, left: float, right: float, y: float, fact:
 
 def _chart(parts: list[str], plan: ResourcePlan, left: float, right: float, y: float) -> float:
     live = live_bytes(plan)
-    most = max([*live, plan.memory.lower_bound_bytes, 1])
+    most = max([*live, plan.memory.least_peak_bytes, 1])
     base = y + BARS
     for position, count in enumerate(live):
         height = BARS * count / most
@@ -132,7 +130,7 @@ def _chart(parts: list[str], plan: ResourcePlan, left: float, right: float, y: f
     parts.append(f'<text class="fact" x="{left - 8:.1f}" y="{base:.1f}" text-anchor="end">live bytes</text>')
     parts.append(f'<path class="bound" d="M{left:.1f} {bound:.1f}H{right:.1f}"/>')
     parts.append(
-        f'<text class="fact" x="{right + 10:.1f}" y="{bound + 4:.1f}">least peak '
+        f'<text class="fact" x="{right + 10:.1f}" y="{bound + 4:.1f}">lower bound '
         f"{mebibytes(plan.memory.lower_bound_bytes)}</text>"
     )
     return base

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
-from rendergraph.link import Graph
+from rendergraph.link import Endpoint, Graph
 from rendergraph.views.cards import Card, Link, Socket, cards, generations, links
 from rendergraph.views.layout import LANE, Box, layers_of, place, tie
 
@@ -51,32 +51,50 @@ class Mark:
     Attributes:
         hue: colour of its frame and notes.
         notes: lines beneath its ports.
-        inputs: inputs whose links are drawn in the colour too.
     """
 
     hue: str
     notes: tuple[str, ...] = ()
-    inputs: frozenset[str] = frozenset()
 
 
-def svg(graph: Graph, marks: Mapping[str, Mark] | None = None) -> str:
-    """The graph as a stand-alone SVG document, left to right, for light and dark pages.
+@dataclass(frozen=True)
+class Sheet:
+    """What is drawn: cards, the links between them, and the ports that are the pipeline's outputs, by their names."""
+
+    title: str
+    cards: Sequence[Card]
+    links: Sequence[Link]
+    outputs: Mapping[str, Endpoint]
+
+
+def sheet(graph: Graph) -> Sheet:
+    """All of a graph."""
+    return Sheet(graph.name, cards(graph), links(graph), graph.outputs)
+
+
+def svg(graph: Graph) -> str:
+    """The graph as a stand-alone SVG document, left to right, for light and dark pages."""
+    return draw(sheet(graph))
+
+
+def draw(shown: Sheet, marks: Mapping[str, Mark] = {}, pointed: Mapping[Link, str] = {}) -> str:
+    """A sheet as a stand-alone SVG document, left to right, for light and dark pages.
 
     Args:
-        graph: what is drawn.
+        shown: what is drawn.
         marks: nodes to point out.
+        pointed: links to point out, in a colour; what begins with `-` is dashed.
     """
-    marks = marks or {}
-    table = {card.id: replace(card, notes=marks[card.id].notes) if card.id in marks else card for card in cards(graph)}
-    for name, end in graph.outputs.items():
-        shown = next((socket for socket in table[end.node].outputs if socket.name == end.port), None)
-        socket = Socket(name, shown.kind if shown else "texture2d", shown.semantic if shown else "any")
+    table = {card.id: replace(card, notes=marks[card.id].notes) if card.id in marks else card for card in shown.cards}
+    for name, end in shown.outputs.items():
+        made = next((socket for socket in table[end.node].outputs if socket.name == end.port), None)
+        socket = Socket(name, made.kind if made else "texture2d", made.semantic if made else "any")
         table[f"output {name}"] = Card(f"output {name}", "", (socket,), ())
-    found = links(graph)
-    layer_of = layers_of(generations(graph), found)
-    found += [Link(end.node, end.port, f"output {name}", name) for name, end in graph.outputs.items()]
+    found = list(shown.links)
+    layer_of = layers_of(generations([card.id for card in shown.cards], found), found)
+    found += [Link(end.node, end.port, f"output {name}", name) for name, end in shown.outputs.items()]
     last = max(layer_of.values(), default=-1) + 1
-    layer_of |= {f"output {name}": last for name in graph.outputs}
+    layer_of |= {f"output {name}": last for name in shown.outputs}
 
     boxes = {id: Box(id, layer_of[id], _height(card)) for id, card in table.items()}
     columns: list[list[Box]] = [[] for _ in range(last + 1)]
@@ -97,13 +115,13 @@ def svg(graph: Graph, marks: Mapping[str, Mark] | None = None) -> str:
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
         f'height="{height:.0f}" font-family="{FONT}" font-size="11">',
-        f"<title>{escape(graph.name)}</title>",
+        f"<title>{escape(shown.title)}</title>",
         f"<style>{STYLE}</style>",
     ]
     for trunk in trunks:
-        parts += _strokes(trunk, boxes, table, lefts, widths, marks)
+        parts += _strokes(trunk, boxes, table, lefts, widths, pointed)
     for number, link in enumerate(returns):
-        parts.append(_return(link, boxes, table, lefts, widths, MARGIN + bottom + 14 * (number + 1)))
+        parts.append(_return(link, boxes, table, lefts, widths, MARGIN + bottom + 14 * (number + 1), pointed))
     for id, card in table.items():
         box = boxes[id]
         parts.append(_card(card, lefts[box.layer], box.y + MARGIN, widths[box.layer], marks.get(id)))
@@ -191,7 +209,7 @@ def _strokes(
     table: dict[str, Card],
     lefts: list[float],
     widths: list[float],
-    marks: Mapping[str, Mark],
+    pointed: Mapping[Link, str],
 ) -> list[str]:
     first = trunk.links[0]
     start, card = boxes[first.source], table[first.source]
@@ -208,9 +226,7 @@ def _strokes(
     for link in trunk.links:
         end = boxes[link.target]
         y = end.y + MARGIN + _in_height(table[link.target], link.target_port)
-        mark = marks.get(link.target)
-        pointed = mark is not None and link.target_port in mark.inputs
-        own, extra = (mark.hue, ' class="pointed"') if mark is not None and pointed else (hue, "")
+        own, extra = _pointed(link, hue, pointed)
         strokes.append(_stroke(_title(link), _bend(*ends[end.layer - 1], lefts[end.layer], y, begin=True), own, extra))
     return strokes
 
@@ -221,8 +237,22 @@ def _bend(x: float, y: float, end_x: float, end_y: float, *, begin: bool) -> str
     return f"{start}C{middle:.1f} {y:.1f} {middle:.1f} {end_y:.1f} {end_x:.1f} {end_y:.1f}"
 
 
+def _pointed(link: Link, hue: str, pointed: Mapping[Link, str]) -> tuple[str, str]:
+    """Colour and style of a link."""
+    if link not in pointed:
+        return hue, ' stroke-dasharray="5 4"' if link.previous else ""
+    own = pointed[link].removeprefix("-")
+    return own, ' class="pointed"' + (' stroke-dasharray="3 5"' if pointed[link] != own else "")
+
+
 def _return(
-    link: Link, boxes: dict[str, Box], table: dict[str, Card], lefts: list[float], widths: list[float], lane: float
+    link: Link,
+    boxes: dict[str, Box],
+    table: dict[str, Card],
+    lefts: list[float],
+    widths: list[float],
+    lane: float,
+    pointed: Mapping[Link, str],
 ) -> str:
     """Last frame's value: out to the right, back beneath everything, in from the left."""
     source, target = boxes[link.source], boxes[link.target]
@@ -236,7 +266,7 @@ def _return(
         f"H{back + 8:.1f}Q{back:.1f} {lane:.1f} {back:.1f} {lane - 8:.1f}V{end_y + 8:.1f}"
         f"Q{back:.1f} {end_y:.1f} {back + 8:.1f} {end_y:.1f}H{end_x:.1f}"
     )
-    return _stroke(_title(link), path, _hue(_source_socket(link, table)), ' stroke-dasharray="5 4"')
+    return _stroke(_title(link), path, *_pointed(link, _hue(_source_socket(link, table)), pointed))
 
 
 def _title(link: Link) -> str:

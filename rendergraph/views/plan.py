@@ -23,12 +23,12 @@ def desc_text(resource: Resource) -> str:
 
 
 def live_bytes(plan: ResourcePlan) -> list[int]:
-    """Bytes alive at each step, outputs and history at all of them."""
+    """Bytes alive at each step: history at all of them, outputs from their first write on."""
     change = [0] * (len(plan.schedule.steps) + 1)
     for id, life in plan.lifetimes.items():
         if plan.schedule.steps:
-            change[life.first] += plan.resources[id].bytes
-            change[life.last + 1] -= plan.resources[id].bytes
+            change[life.first] += plan.bytes(id)
+            change[life.last + 1] -= plan.bytes(id)
     live = []
     total = 0
     for difference in change[:-1]:
@@ -104,7 +104,7 @@ def plan_json(plan: ResourcePlan) -> dict[str, Any]:
 
 def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     resource, life = plan.resources[id], plan.lifetimes[id]
-    found: dict[str, Any] = {"id": id, "role": resource.role, "bytes": resource.bytes}
+    found: dict[str, Any] = {"id": id, "role": resource.role, "bytes": plan.bytes(id)}
     if isinstance(resource.desc, TextureDesc):
         desc = resource.desc
         found |= {
@@ -173,9 +173,7 @@ def _lifetimes_text(plan: ResourcePlan) -> str:
             span = "".join(cells)
         else:
             span = f"{life.first + 1}–{life.last + 1}"
-        rows.append(
-            (f"  {id}", span, _home(plan, id), mebibytes(plan.resources[id].bytes), desc_text(plan.resources[id]))
-        )
+        rows.append((f"  {id}", span, _home(plan, id), mebibytes(plan.bytes(id)), desc_text(plan.resources[id])))
     legend = "W writes, R reads, B both, P reads last frame's, ─ kept" if wide else "first and last step"
     return f"lifetimes ({legend})\n" + _table(rows, right=(3,))
 
@@ -193,11 +191,12 @@ def _sharing_text(plan: ResourcePlan) -> str:
 
 def _memory_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:
     memory = plan.memory
-    proof = "no order needs less" if memory.proven else "the least found; not proven"
+    gap = memory.least_peak_bytes - memory.lower_bound_bytes
+    proof = "no order needs less" if memory.proven else f"the least found is {mebibytes(gap)} above it"
     rows: list[tuple[str, ...]] = [
         ("  no reuse", mebibytes(memory.no_reuse_bytes), "every resource its own"),
         ("  allocated", mebibytes(memory.allocated_bytes), f"shared by {memory.tier}"),
-        ("  lower bound", mebibytes(memory.lower_bound_bytes), f"least peak of live bytes: {proof}"),
+        ("  lower bound", mebibytes(memory.lower_bound_bytes), f"of the peak of live bytes: {proof}"),
     ]
     if memory.peak_node is not None:
         rows.insert(

@@ -116,6 +116,10 @@
       viewer.scrollIntoView({ block: "start" });
     });
   }
+  // Paper has nothing to open.
+  const folded = [...document.querySelectorAll("details")];
+  window.addEventListener("beforeprint", () => folded.forEach((one) => { one.dataset.was = one.open; one.open = true; }));
+  window.addEventListener("afterprint", () => folded.forEach((one) => { one.open = one.dataset.was === "true"; }));
   stage.hidden = false;
   Promise.all([picture("a").decode(), picture("b").decode()]).then(show);
 })();

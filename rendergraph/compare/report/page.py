@@ -11,20 +11,16 @@ from rendergraph.compare.report.parts import (
     Section,
     card,
     drawing,
-    eight_bit,
-    heat,
-    img,
     milliseconds,
     number,
-    png,
     section,
     software_note,
     table,
 )
+from rendergraph.compare.report.pictures import first, sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.values import Comparison, Result, machine
 from rendergraph.diff import diff, diff_svg, diff_text
-from rendergraph.images import viewable
 from rendergraph.metrics import description
 from rendergraph.resources import folder
 from rendergraph.schedule.reasons import mebibytes
@@ -35,30 +31,34 @@ MOST_COLUMNS = 8
 _QUALITY = "Error against time"
 
 
-def comparison_page(comparison: Comparison, command: str) -> str:
+def comparison_page(comparison: Comparison, command: str, *, title: str = "", note: str = "") -> str:
     """The report of `compare`.
 
     Args:
         comparison: what it shows.
         command: how to get it again.
+        title: what stands above it; the variants' names by default.
+        note: what its author says about it, as text; empty lines part paragraphs.
     """
     names = [result.name for result in comparison.results]
-    title = f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0]
+    title = title or (f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0])
     shown_results = comparison.results[:MOST_COLUMNS]
+    if not all(result.memory for result in comparison.results):
+        sections = [
+            section("summary", "Summary", _summary(comparison, front=())),
+            section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
+            section("structure", "What they were made with", _structure(comparison)),
+        ]
+        return _page(title, note, comparison, sections, command)
     return _page(
         title,
+        note,
         comparison,
         [
             section("summary", "Summary", _summary(comparison, front=()), software_note(comparison.software)),
-            section("pictures", "Pictures", _viewer(comparison), _sheet(comparison)),
-            section("first", "Where they part", _first(comparison)),
-            section("passes", "Time of each pass", _passes(shown_results), software_note(comparison.software)),
-            section(
-                "quality",
-                "Quality against time",
-                drawing(quality_svg(comparison), _QUALITY),
-                software_note(comparison.software),
-            ),
+            section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
+            section("first", "Where they part", first(comparison)),
+            section("times", "Times", *_times(comparison, shown_results, ())),
             section("structure", "Structure", _structure(comparison)),
             section("memory", "Memory", _memory(comparison.results)),
         ],
@@ -66,44 +66,47 @@ def comparison_page(comparison: Comparison, command: str) -> str:
     )
 
 
-def sweep_page(found: Sweep, command: str) -> str:
+def sweep_page(found: Sweep, command: str, *, title: str = "", note: str = "") -> str:
     """The report of `sweep`.
 
     Args:
         found: what it shows.
         command: how to get it again.
+        title: what stands above it; the pipeline's name by default.
+        note: what its author says about it, as text; empty lines part paragraphs.
     """
     comparison = found.comparison
     front = pareto(comparison.results)
     best = front[:MOST_COLUMNS]
     axes = card((axis.path, ", ".join(axis.values)) for axis in found.axes)
+    failed = card((f"{failure.name} failed", failure.text) for failure in found.failures)
     saved = (
         f"<p>{found.executed} passes were drawn for {len(comparison.results) - found.resumed} runs that one by one "
         f"would have taken {found.alone}: what is the same in several runs is drawn once. "
         f"A run's time is the sum of its passes'.</p>"
     )
     return _page(
-        f"Sweep of {comparison.results[0].source}",
+        title or f"Sweep of {comparison.results[0].source}",
+        note,
         comparison,
         [
             section("axes", "Axes", axes, saved),
-            section(
-                "quality",
-                "Quality against time",
-                drawing(quality_svg(comparison, front), _QUALITY),
-                _front_words(front),
-                software_note(comparison.software),
-            ),
-            section("summary", "Runs", _summary(comparison, front=front), software_note(comparison.software)),
-            section("pictures", "Pictures", _viewer(comparison), _sheet(comparison)),
-            section("passes", "Time of each pass", _passes(best), software_note(comparison.software)),
+            section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
+            section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
+            section("times", "Times", *_times(comparison, best, front), _front_words(front)),
             section("memory", "Memory", _memory(best)),
         ],
         command,
     )
 
 
-def _page(title: str, comparison: Comparison, sections: Sequence[Section], command: str) -> str:
+def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Result]) -> tuple[str, str]:
+    """Quality against time beside the time of each pass."""
+    chart = drawing(quality_svg(comparison, front), _QUALITY)
+    return f'<div class="beside"><div>{_passes(results)}</div>{chart}</div>', software_note(comparison.software)
+
+
+def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Section], command: str) -> str:
     home = folder("rendergraph") / "compare" / "report"
     style, script = ((home / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
     width, height = comparison.size
@@ -111,8 +114,13 @@ def _page(title: str, comparison: Comparison, sections: Sequence[Section], comma
     facts = [comparison.scene, f"{width}×{height}", str(device.get("renderer", ""))]
     facts[1:1] = [f"camera {comparison.camera}"] if comparison.camera else []
     closing = [
-        section("machine", "Machine", _machine(comparison)),
-        section("again", "The same again", f"<pre><code>{escape(command)}</code></pre>", _notes(comparison)),
+        section(
+            "again",
+            "The same again",
+            f"<pre><code>{escape(command)}</code></pre>",
+            _notes(comparison),
+            _folded("The machine", _machine(comparison)),
+        ),
     ]
     filled = [part for part in [*sections, *closing] if part.body]
     links = "".join(part.link for part in filled)
@@ -126,7 +134,8 @@ def _page(title: str, comparison: Comparison, sections: Sequence[Section], comma
         f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n<header>\n"
         f"<h1>{escape(title)}</h1>\n"
         f'<p class="lead">{escape(" · ".join(fact for fact in facts if fact))}</p>\n'
-        f'<nav aria-label="Sections">{links}</nav>\n</header>\n'
+        + "".join(f'<p class="note">{escape(part.strip())}</p>\n' for part in note.split("\n\n") if part.strip())
+        + f'<nav aria-label="Sections">{links}</nav>\n</header>\n'
         + "\n".join(part.html for part in filled)
         + f"\n</main>\n<script>\n{script}</script>\n</body>\n</html>\n"
     )
@@ -136,24 +145,14 @@ def _page(title: str, comparison: Comparison, sections: Sequence[Section], comma
 
 
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
-    plugins = list(dict.fromkeys(name for result in comparison.results for name in result.metrics.plugins))
-    heads = [
-        "",
-        "#FLIP",
-        "#RMSE",
-        "#PSNR dB",
-        "#SSIM",
-        *(f"#{name}" for name in plugins),
-        "#light RMSE",
-        "#GPU ms",
-        "#CPU ms",
-        "#frame ms",
-        "#passes",
-        "#textures",
-        "",
-    ]
+    more = list(dict.fromkeys(name for result in comparison.results for name in result.columns))
+    measured = all(result.memory for result in comparison.results)
     whole = any(result.times.frame_ms for result in comparison.results)
-    heads = heads if whole else [head for head in heads if head != "#frame ms"]
+    light = any(result.radiance_rmse is not None for result in comparison.results)
+    heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", *(f"#{escape(name)}" for name in more)]
+    heads += ["#light RMSE"] if light else []
+    heads += ["#GPU ms", "#CPU ms", *(["#frame ms"] if whole else []), "#passes", "#textures"] if measured else []
+    heads.append("")
     most = max(result.times.headline.median for result in comparison.results)
     names = {result.name for result in front}
     rows = []
@@ -168,27 +167,36 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
         last += f' <button type="button" data-compare="pic-{place}">view</button>'
         cells = [
             f'<th scope="row">{escape(result.name.replace(",", ", "))}</th>',
-            *(f'<td class="num">{number(value)}</td>' for value in (m.flip, m.rmse)),
-            f'<td class="num">{"∞" if m.psnr is None else number(m.psnr, 2)}</td>',
-            f'<td class="num">{number(m.ssim)}</td>',
-            *(f'<td class="num">{number(m.plugins.get(name))}</td>' for name in plugins),
-            f'<td class="num">{number(result.radiance_rmse)}</td>',
-            milliseconds(times.gpu_ms, most if times.gpu_ms else 0),
-            milliseconds(times.cpu_ms),
-            milliseconds(times.frame_ms) if whole else "",
-            f'<td class="num">{result.pass_count}</td>',
-            f'<td class="num">{mebibytes(int(str(result.memory["allocated_bytes"])))}</td>',
-            f"<td>{last}</td>",
+            *(_cell(number(value)) for value in (m.flip, m.rmse)),
+            _cell("∞" if m.psnr is None else number(m.psnr, 2)),
+            _cell(number(m.ssim)),
+            *(_cell(number(result.columns.get(name))) for name in more),
         ]
-        rows.append(f'<tr class="{" ".join(kinds)}">{"".join(cells)}</tr>')
+        cells += [_cell(number(result.radiance_rmse))] if light else []
+        if measured:
+            cells += [milliseconds(times.gpu_ms, most if times.gpu_ms else 0), milliseconds(times.cpu_ms)]
+            cells += [milliseconds(times.frame_ms)] if whole else []
+            cells += [_cell(str(result.pass_count)), _cell(mebibytes(int(str(result.memory["allocated_bytes"]))))]
+        rows.append(f'<tr class="{" ".join(kinds)}">{"".join(cells)}<td>{last}</td></tr>')
     reference = comparison.reference
-    of = "display-referred" if reference.encoding == "display" else "scene-linear"
-    words = (
-        f"<p class=quiet>Errors of the {of} output <code>{reference.output}</code> of frame {comparison.frame} against "
-        f"<code>{escape(reference.name)}</code>. Times are medians of {comparison.results[0].times.frames} frames, "
-        f"with the tenth to ninetieth percentile beneath.</p>"
+    of = {"display": "display-referred ", "linear": "scene-linear "}.get(reference.encoding, "")
+    named = (
+        f"port <code>{escape(comparison.metric)}</code>"
+        if comparison.metric
+        else f"output <code>{reference.output}</code>"
     )
-    return table(heads, rows, "Errors, times and memory") + words
+    what = f"the {of}{named} of frame {comparison.frame}" if measured else f"{of}pictures"
+    words = f"Errors of {what} against <code>{escape(reference.name)}</code>."
+    if measured:
+        words += (
+            f" Times are medians of {comparison.results[0].times.frames} frames, with the tenth to ninetieth "
+            "percentile beneath."
+        )
+    return table(heads, rows, "Errors, times and memory") + f"<p class=quiet>{words}</p>"
+
+
+def _cell(text: str) -> str:
+    return f'<td class="num">{text}</td>'
 
 
 def _passes(results: Sequence[Result]) -> str:
@@ -213,114 +221,6 @@ def _passes(results: Sequence[Result]) -> str:
     kind = "GPU" if timed else "CPU"
     heads = [f"pass, {kind} ms", *("#" + result.name.replace(",", ", ") for result in results)]
     return table(heads, rows, f"{kind} milliseconds of each pass")
-
-
-# --- pictures --------------------------------------------------------------------------------------------------------
-
-
-def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
-    """Identity and label of every picture in the sheet, the reference's first where it is no variant."""
-    own = [(f"pic-{place}", result.name) for place, result in enumerate(comparison.results)]
-    return own if comparison.reference.kind == "variant" else [("pic-ref", comparison.reference.name), *own]
-
-
-def _viewer(comparison: Comparison) -> str:
-    pictures = _pictures(comparison)
-
-    def options(chosen: int) -> str:
-        return "".join(
-            f'<option value="{identity}"{" selected" if place == chosen else ""}>{escape(label)}</option>'
-            for place, (identity, label) in enumerate(pictures)
-        )
-
-    modes = [("slide", "Slide", "s"), ("a", "A", "a"), ("b", "B", "b"), ("difference", "Difference", "d")]
-    buttons = "".join(
-        f'<button type="button" data-mode="{mode}" aria-pressed="{"true" if mode == "slide" else "false"}" '
-        f'aria-keyshortcuts="{key}" title="key {key}">{label}</button>'
-        for mode, label, key in modes
-    )
-    gains = "".join(f"<option{' selected' if gain == 8 else ''}>{gain}</option>" for gain in (1, 2, 4, 8, 16, 32, 64))
-    zooms = "".join(
-        f'<option value="{value}">{label}</option>'
-        for value, label in (("fit", "fit"), ("1", "1:1"), ("2", "2:1"), ("4", "4:1"), ("8", "8:1"))
-    )
-    return f"""<div class="viewer" role="group" aria-label="Two pictures against each other">
-<div class="controls">
-<label>A <select data-a aria-label="Picture A">{options(0)}</select></label>
-<label>B <select data-b aria-label="Picture B">{options(min(1, len(pictures) - 1))}</select></label>
-<span class="group" role="group" aria-label="What is shown">{buttons}</span>
-<label>times <select data-gain>{gains}</select></label>
-<label>zoom <select data-zoom>{zooms}</select></label>
-</div>
-<div class="stage" data-stage tabindex="0" hidden><div class="frame"><div class="pile" data-frame>
-<img data-under alt=""><img class="over" data-over alt=""><canvas data-canvas class="over" hidden></canvas>
-<span class="cut" data-cut></span><span class="tag left" data-left></span><span class="tag right" data-right></span>
-</div>
-<input class="slider" data-slider type="range" min="0" max="100" step="0.5" value="50"
- aria-label="Where A ends and B begins">
-</div></div>
-<div class="readout num" data-readout aria-hidden="true"></div>
-</div>
-<p class="quiet">Drag over the picture, or focus the slider and use the arrow keys. Keys: <kbd>s</kbd> slide,
-<kbd>a</kbd> and <kbd>b</kbd> one of them, <kbd>x</kbd> the other one, <kbd>d</kbd> the difference.</p>"""
-
-
-def _sheet(comparison: Comparison) -> str:
-    figures = []
-    reference = comparison.reference
-    if reference.kind != "variant":
-        source = png(eight_bit(reference.pixels, reference.encoding))
-        figures.append(_figure("pic-ref", source, f"{reference.name}, the reference"))
-    for place, result in enumerate(comparison.results):
-        figures.append(_figure(f"pic-{place}", png(eight_bit(result.pixels, result.encoding)), result.name))
-    maps = [
-        _figure("", png(heat(result.flip_map)), f"FLIP of {result.name}: {number(result.metrics.flip)}")
-        for result in comparison.results
-        if result.flip_map is not None and len(comparison.results) <= MOST_COLUMNS
-    ]
-    sheet = f'<h3>As drawn</h3><div class="sheet">{"".join(figures)}</div>'
-    if maps:
-        sheet += (
-            f'<h3>FLIP, dark where equal, against {escape(reference.name)}</h3><div class="sheet">{"".join(maps)}</div>'
-        )
-    return sheet
-
-
-def _figure(identity: str, source: str, caption: str) -> str:
-    return f"<figure>{img(identity, source, caption)}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-def _first(comparison: Comparison) -> str:
-    parts = []
-    base = comparison.base[0] if comparison.base else ""
-    for result in comparison.results:
-        if result.difference is None or result.name == base:
-            continue
-        first = result.first
-        head = f"<h3>{escape(result.name)}</h3>"
-        if first is None:
-            parts.append(f"{head}<p>Every pass draws what it draws in <code>{escape(base)}</code>, bit by bit.</p>")
-            continue
-        name = f"<code>{escape(first.node)}.{escape(first.port)}</code>"
-        was = f" (there <code>{escape(first.base_node)}</code>)" if first.base_node != first.node else ""
-        was += escape(first.after)
-        amount = (
-            "in size"
-            if first.most is None
-            else f"in {100 * first.share:.3g} % of its texels, by up to {first.most:.4g}"
-        )
-        causes = ", ".join(f"<code>{escape(cause)}</code>" for cause in first.causes)
-        why = f" What differs in structure up to there: {causes}." if causes else ""
-        pair = "".join(
-            _figure("", png(viewable(pixels, first.semantic)), f"{first.node}.{first.port} of {whose}")
-            for pixels, whose in zip(first.pixels, (base, result.name), strict=True)
-        )
-        parts.append(
-            f"{head}<p>The first pass that differs from <code>{escape(base)}</code> is {name}{was}: "
-            f"{amount}.{why}</p>"
-            f'<div class="pair">{pair}</div>'
-        )
-    return "\n".join(parts)
 
 
 # --- drawings --------------------------------------------------------------------------------------------------------
@@ -365,22 +265,22 @@ def _structure(comparison: Comparison) -> str:
         difference = diff(graph, result.graph)
         title = f"{name} → {result.name}"
         if not difference:
-            parts.append(f"<h3>{escape(title)}</h3><p>No difference.</p>")
+            parts.append(f"<p>{escape(title)}: no difference.</p>")
         else:
             said = "\n".join(line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:])
             picture = drawing(diff_svg(graph, result.graph, difference), title)
-            parts.append(f"<h3>{escape(title)}</h3><pre>{escape(said)}</pre>{picture}")
+            parts.append(_folded(f"{title}: {_amount(said)}", f"<pre>{escape(said)}</pre>{picture}"))
     return "\n".join(parts)
 
 
 def _memory(results: Sequence[Result]) -> str:
     parts = []
-    for place, result in enumerate(result for result in results if result.plan is not None):
-        assert result.plan is not None
+    for result in results:
+        if result.plan is None:
+            continue
         allocated = mebibytes(int(str(result.memory["allocated_bytes"])))
         svg = drawing(lifetimes_svg(result.plan), f"Lifetimes of the textures of {result.name}")
-        state = " open" if place == 0 else ""
-        parts.append(f"<details{state}><summary>{escape(result.name)}, {allocated}</summary>{svg}</details>")
+        parts.append(_folded(f"{result.name}, {allocated}", svg))
     return "\n".join(parts)
 
 
@@ -392,8 +292,19 @@ def _machine(comparison: Comparison) -> str:
     entries.append(("FLIP", f"{told['flip']['library']}, {told['flip']['pixels_per_degree']} pixels per degree"))
     entries.append(("SSIM", f"{told['ssim']['window']}×{told['ssim']['window']} Gaussian, σ {told['ssim']['sigma']}"))
     entries.append(("made", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")))
-    return software_note(comparison.software) + card(entries)
+    return card(entries)
 
 
 def _notes(comparison: Comparison) -> str:
     return "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes)
+
+
+def _amount(said: str) -> str:
+    """How much a difference is, by its lines."""
+    count = len(said.splitlines())
+    return f"{count} change{'s' if count > 1 else ''}"
+
+
+def _folded(title: str, body: str) -> str:
+    """What is looked at when it is asked for; on paper it is open."""
+    return f"<details><summary>{escape(title)}</summary>{body}</details>"

@@ -15,9 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.compare.timing import Spread
-from rendergraph.compare.values import Pixels
 from rendergraph.images import viewable, write
-from rendergraph.metrics import Encoding
+from rendergraph.metrics import Encoding, Pixels
 
 SOFTWARE = "software rasteriser: no measure of a GPU"
 # Black through purple and orange to pale yellow: brightness alone tells the order.
@@ -39,7 +38,7 @@ def png(pixels: npt.NDArray[np.uint8]) -> str:
 
 def eight_bit(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:
     """A compared output as 8 bits."""
-    return viewable(pixels, "display_color" if encoding == "display" else "radiance")
+    return viewable(pixels, {"display": "display_color", "linear": "radiance"}.get(encoding, "any"))
 
 
 def heat(values: Pixels) -> npt.NDArray[np.uint8]:
@@ -65,6 +64,7 @@ def drawing(svg: str, label: str) -> str:
     width = re.search(r'<svg [^>]*?\bwidth="([\d.]+)"', svg)
     least = f"min-width:{0.6 * float(width[1]):.0f}px;" if width else ""
     style = f"max-width:100%;{least}height:auto"
+    svg = svg.replace("<style>", "<style>@media print{svg{min-width:0!important;width:100%}}", 1)
     svg = re.sub(r"<svg ", f'<svg role="img" style="{style}" aria-label="{escape(label)}" ', svg, count=1)
     return f'<div class="drawing"><template shadowrootmode="open">{svg}</template></div>'
 

@@ -1,7 +1,0 @@
-"""`python -m rendergraph.cli`."""
-
-import sys
-
-from rendergraph.cli.app import main
-
-sys.exit(main())

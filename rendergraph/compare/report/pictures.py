@@ -1,0 +1,110 @@
+"""The page's pictures: two under a slider, all on a sheet, and where variants part."""
+
+from __future__ import annotations
+
+from html import escape
+
+from rendergraph.compare.report.parts import eight_bit, heat, img, number, png
+from rendergraph.compare.values import Comparison
+from rendergraph.images import viewable
+
+
+def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
+    """Identity and label of every picture in the sheet, the reference's first where it is no variant."""
+    own = [(f"pic-{place}", result.name) for place, result in enumerate(comparison.results)]
+    return own if comparison.reference.kind == "variant" else [("pic-ref", comparison.reference.name), *own]
+
+
+def viewer(comparison: Comparison) -> str:
+    """Two of the page's pictures under a slider."""
+    pictures = _pictures(comparison)
+
+    def options(chosen: int) -> str:
+        return "".join(
+            f'<option value="{identity}"{" selected" if place == chosen else ""}>{escape(label)}</option>'
+            for place, (identity, label) in enumerate(pictures)
+        )
+
+    modes = [("slide", "Slide", "s"), ("a", "A", "a"), ("b", "B", "b"), ("difference", "Difference", "d")]
+    buttons = "".join(
+        f'<button type="button" data-mode="{mode}" aria-pressed="{"true" if mode == "slide" else "false"}" '
+        f'aria-keyshortcuts="{key}" title="key {key}">{label}</button>'
+        for mode, label, key in modes
+    )
+    gains = "".join(f"<option{' selected' if gain == 8 else ''}>{gain}</option>" for gain in (1, 2, 4, 8, 16, 32, 64))
+    zooms = "".join(
+        f'<option value="{value}">{label}</option>'
+        for value, label in (("fit", "fit"), ("1", "1:1"), ("2", "2:1"), ("4", "4:1"), ("8", "8:1"))
+    )
+    return f"""<div class="viewer" role="group" aria-label="Two pictures against each other">
+<div class="controls">
+<label>A <select data-a aria-label="Picture A">{options(0)}</select></label>
+<label>B <select data-b aria-label="Picture B">{options(min(1, len(pictures) - 1))}</select></label>
+<span class="group" role="group" aria-label="What is shown">{buttons}</span>
+<label>times <select data-gain>{gains}</select></label>
+<label>zoom <select data-zoom>{zooms}</select></label>
+</div>
+<div class="stage" data-stage tabindex="0" hidden><div class="frame"><div class="pile" data-frame>
+<img data-under alt=""><img class="over" data-over alt=""><canvas data-canvas class="over" hidden></canvas>
+<span class="cut" data-cut></span><span class="tag left" data-left></span><span class="tag right" data-right></span>
+</div>
+<input class="slider" data-slider type="range" min="0" max="100" step="0.5" value="50"
+ aria-label="Where A ends and B begins">
+</div></div>
+<div class="readout num" data-readout aria-hidden="true"></div>
+</div>
+<p class="quiet">Drag over the picture, or focus the slider and use the arrow keys. Keys: <kbd>s</kbd> slide,
+<kbd>a</kbd> and <kbd>b</kbd> one of them, <kbd>x</kbd> the other one, <kbd>d</kbd> the difference.</p>"""
+
+
+def sheet(comparison: Comparison, most: int) -> str:
+    """Every picture, and beneath it the map of where an eye sees that it differs; maps of `most` variants."""
+    figures = []
+    reference = comparison.reference
+    if reference.kind != "variant":
+        source = png(eight_bit(reference.pixels, reference.encoding))
+        figures.append(_figure("pic-ref", source, f"{reference.name}, the reference"))
+    maps = len(comparison.results) <= most
+    for place, result in enumerate(comparison.results):
+        figure = _figure(f"pic-{place}", png(eight_bit(result.pixels, result.encoding)), result.name)
+        if maps and result.flip_map is not None:
+            figure += _figure("", png(heat(result.flip_map)), f"FLIP {number(result.metrics.flip)}")
+        figures.append(f"<div>{figure}</div>")
+    told = f"Beneath each is FLIP against {escape(reference.name)}, dark where equal." if maps else ""
+    return f'<div class="sheet">{"".join(figures)}</div><p class="quiet">{told}</p>'
+
+
+def _figure(identity: str, source: str, caption: str) -> str:
+    return f"<figure>{img(identity, source, caption)}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def first(comparison: Comparison) -> str:
+    """Of each variant the first pass that draws something else, both textures beside each other."""
+    parts = []
+    base = comparison.base[0] if comparison.base else ""
+    for result in comparison.results:
+        if result.difference is None or result.name == base:
+            continue
+        part = result.first
+        if part is None:
+            same = f"every pass draws what it draws in <code>{escape(base)}</code>, bit by bit"
+            parts.append(f"<p>{escape(result.name)}: {same}.</p>")
+            continue
+        name = f"<code>{escape(part.node)}.{escape(part.port)}</code>"
+        was = f" (there <code>{escape(part.base_node)}</code>)" if part.base_node != part.node else ""
+        was += escape(part.after)
+        amount = (
+            "in size" if part.most is None else f"in {100 * part.share:.3g} % of its texels, by up to {part.most:.4g}"
+        )
+        causes = ", ".join(f"<code>{escape(cause)}</code>" for cause in part.causes)
+        why = f" What differs in structure up to there: {causes}." if causes else ""
+        pair = "".join(
+            _figure("", png(viewable(pixels, part.semantic)), f"{part.node}.{part.port} of {whose}")
+            for pixels, whose in zip(part.pixels, (base, result.name), strict=True)
+        )
+        head = f"{escape(result.name)}: {name}{was}, {amount}"
+        parts.append(
+            f"<details><summary>{head}</summary><p>Differs first from <code>{escape(base)}</code>.{why}</p>"
+            f'<div class="pair">{pair}</div></details>'
+        )
+    return "\n".join(parts)

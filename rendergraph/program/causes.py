@@ -1,0 +1,134 @@
+"""Of what a driver says of one stage, the causes: one misspelt name is one mistake, whatever follows from it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+
+from rendergraph.glsl.source import SourceText
+
+_FORMS = (
+    re.compile(
+        r"\s*\d+:(?P<line>\d+)\((?P<column>\d+)\):\s*(?P<kind>(?:preprocessor )?error|warning)\s*:(?P<text>\s*.*)"
+    ),
+    re.compile(r"\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<kind>(?:fatal )?error|warning)\s+(?:[A-Z]\d+\s*)?:\s*(?P<text>.*)"),
+    re.compile(r"\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?:(?:error|warning)\(#\d+\)\s*)?(?P<text>.*)"),
+)
+_UNKNOWN = re.compile(
+    r"undeclared|undefined variable|no function with name|no matching overloaded function", re.IGNORECASE
+)
+"""How drivers say that they do not know a name."""
+_QUOTED = re.compile(r"[`'\"]([A-Za-z_]\w*)['\"`]")
+_CALL = re.compile(r"(?P<before>.*`\w+\((?P<types>[^()]*)\)'); candidates are:")
+_CANDIDATE = re.compile(r"\s{3,}\w+ \w+\((?P<types>[^()]*)\)\s*\Z")
+_MOST_CANDIDATES = 3
+_CLOSE = 0.75
+_ENDS = re.compile(r"[;{}]\s*\Z|^\s*#")
+"""Of a line behind which a new statement begins."""
+_BUILT_IN = """
+abs acos acosh all any asin asinh atan atanh barrier bitCount bitfieldExtract ceil clamp cos cosh cross dFdx
+dFdxCoarse dFdxFine dFdy dFdyCoarse dFdyFine degrees determinant distance dot equal exp exp2 faceforward findLSB
+findMSB floatBitsToInt floatBitsToUint floor fma fract fwidth greaterThan greaterThanEqual imageAtomicAdd
+imageAtomicMax imageAtomicMin imageLoad imageSize imageStore intBitsToFloat interpolateAtCentroid
+interpolateAtSample inverse inversesqrt isinf isnan length lessThan lessThanEqual log log2 matrixCompMult max
+memoryBarrier memoryBarrierBuffer memoryBarrierImage memoryBarrierShared min mix mod modf normalize not notEqual
+outerProduct packHalf2x16 packUnorm4x8 pow radians reflect refract round roundEven sign sin sinh smoothstep sqrt
+step tan tanh texelFetch texelFetchOffset texture textureGather textureGatherOffset textureGrad textureLod
+textureLodOffset textureOffset textureProj textureQueryLevels textureQueryLod textureSamples textureSize transpose
+trunc uintBitsToFloat unpackHalf2x16 unpackUnorm4x8 gl_FragCoord gl_FragDepth gl_FrontFacing gl_GlobalInvocationID
+gl_InstanceID gl_Layer gl_LocalInvocationID gl_LocalInvocationIndex gl_NumWorkGroups gl_Position gl_PrimitiveID
+gl_SampleID gl_VertexID gl_WorkGroupID EmitVertex EndPrimitive
+"""
+"""Names of GLSL 4.50 that are misspelt most."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """One message of a driver: where in the stage's text, a column of 0 where it names none, and what."""
+
+    text: str
+    line: int
+    column: int
+    is_warning: bool = False
+
+
+def causes(rows: Sequence[str], source: SourceText) -> list[Said]:
+    """The messages that name a line, without those that follow from others; warnings only where there is no error.
+
+    Of a statement all that counts is what is wrong first, and names that nobody knows. Such a name is told once, with a
+    near one; of the candidates for a call only the nearest are listed.
+    """
+    found = list(_with_candidates([said for row in rows if (said := _read(row)) is not None]))
+    errors = [said for said in found if not said.is_warning]
+    if not errors:
+        return list(dict.fromkeys(found))
+    unknown = {name: None for said in errors if _UNKNOWN.search(said.text) for name in _QUOTED.findall(said.text)}
+    words: list[str] = re.findall(r"[A-Za-z_]\w*", source.text)
+    known = {*words, *_BUILT_IN.split()} - unknown.keys()
+    kept: list[Said] = []
+    told: dict[str, int] = {}
+    begun: set[int] = set()
+    for said in errors:
+        statement = _statement(source, said.line)
+        if _UNKNOWN.search(said.text):
+            if said.text not in told:
+                told[said.text] = said.line
+                kept.append(replace(said, text=said.text + _near(said.text, known)))
+        elif statement not in begun and not re.search(r"\berror\b", said.text):
+            kept.append(said)
+        begun.add(statement)
+    return kept or errors[:1]
+
+
+def _read(row: str) -> Said | None:
+    match = next((match for form in _FORMS if (match := form.match(row))), None)
+    if match is None:
+        return None
+    column = int(match.groupdict().get("column") or 0)
+    return Said(match["text"].rstrip(), int(match["line"]), column, "warning" in match["kind"].lower())
+
+
+def _with_candidates(found: Sequence[Said]) -> Iterator[Said]:
+    """The messages; the overloads that Mesa lists beneath a call, a message each, become part of that one."""
+    at = 0
+    while at < len(found):
+        said = found[at]
+        at += 1
+        call = _CALL.match(said.text)
+        listed: list[str] = []
+        while call and at < len(found) and found[at].line == said.line and _CANDIDATE.match(found[at].text):
+            listed.append(found[at].text.strip())
+            at += 1
+        text = said.text.strip()
+        if call and listed:
+            types = call["types"]
+            near = sorted(listed, key=lambda one: _distance(types, one))[:_MOST_CANDIDATES]
+            which = "there is" if len(near) == len(listed) else f"the nearest of {len(listed)} are"
+            text = f"{call['before'].strip()}; {which} {'; '.join(near)}"
+        yield replace(said, text=text)
+
+
+def _distance(types: str, candidate: str) -> tuple[int, int, list[bool]]:
+    """How far a candidate is from what was called: by its number of arguments, then by those that differ."""
+    match = _CANDIDATE.match(f"   {candidate}")
+    assert match  # it was listed for that
+    given, taken = types.split(", "), match["types"].split(", ")
+    differ = [one != other for one, other in zip(given, taken, strict=False)]
+    return abs(len(given) - len(taken)), sum(differ), differ
+
+
+def _statement(source: SourceText, line: int) -> int:
+    """The line that the statement of a line begins in."""
+    line = min(line, len(source.lines))
+    while line > 1 and source.lines[line - 2].strip() and not _ENDS.search(source.lines[line - 2]):
+        line -= 1
+    return line
+
+
+def _near(text: str, known: set[str]) -> str:
+    for name in _QUOTED.findall(text):
+        if close := get_close_matches(name, sorted(known), n=1, cutoff=_CLOSE):
+            return f"; did you mean '{close[0]}'?"
+    return ""

@@ -1,0 +1,92 @@
+"""How the triangles of a mesh meet at its edges, found once a mesh: for silhouettes and shadow volumes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Floats: TypeAlias = npt.NDArray[np.float32]
+Indices: TypeAlias = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges of a closed mesh, whose vertices count as one where their positions are equal. t triangles, e edges.
+
+    Attributes:
+        triangles: int64 (t, 3), vertices of the triangles; those with two corners in one place are left out.
+        beyond: int64 (t, 3), at each corner the vertex across the edge from there to the next corner.
+        ends: int64 (e, 2), vertices of each edge, in the order in which its first triangle runs it.
+        sides: int64 (e, 2), the two triangles that meet there.
+        gap: where the mesh is not closed, in words; empty for a closed one. The arrays are empty where it is not.
+    """
+
+    triangles: Indices
+    beyond: Indices
+    ends: Indices
+    sides: Indices
+    gap: str = ""
+
+
+def find_edges(positions: Floats, triangles: npt.NDArray[np.integer]) -> Edges:
+    """The edges of a mesh: each is run by one triangle one way, and by one the other way, or the mesh is not closed.
+
+    Args:
+        positions: float32 (n, 3).
+        triangles: (m, 3), each below n.
+    """
+    place, count = _places(positions)
+    corners = triangles.astype(np.int64)
+    at = place[corners]
+    corners = corners[(at[:, 0] != at[:, 1]) & (at[:, 1] != at[:, 2]) & (at[:, 2] != at[:, 0])]
+    if not len(corners):
+        return _open("no triangle has an area")
+    start, stop = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)  # half-edge 3 t + k of triangle t
+    forth, back = place[start] * count + place[stop], place[stop] * count + place[start]
+    order = np.argsort(forth, kind="stable")
+    ranked = forth[order]
+    found = np.minimum(np.searchsorted(ranked, back), len(ranked) - 1)
+    twice = np.zeros(len(order), bool)
+    twice[order[1:]] = ranked[1:] == ranked[:-1]
+    torn = np.flatnonzero(twice | (ranked[found] != back))
+    if len(torn):
+        first = int(torn[0])
+        a, b = (_shown(positions[vertex]) for vertex in (start[first], stop[first]))
+        forth_and_back = int((forth == forth[first]).sum()), int((forth == back[first]).sum())
+        meet = {(1, 0): "only one triangle has", (2, 0): "two triangles turn the same way round at"}.get(
+            forth_and_back, f"{sum(forth_and_back)} triangles share"
+        )
+        return _open(f"{meet} the edge from {a} to {b}")
+    twin = order[found]
+    opposite = twin // 3 * 3 + (twin % 3 + 2) % 3  # the corner that is not on the edge
+    once = np.flatnonzero(np.arange(len(twin)) < twin)
+    return Edges(
+        corners,
+        start[opposite].reshape(-1, 3),
+        np.stack([start[once], stop[once]], axis=1),
+        np.stack([once // 3, twin[once] // 3], axis=1),
+    )
+
+
+def _open(gap: str) -> Edges:
+    none = np.zeros((0, 3), np.int64)
+    return Edges(none, none, none[:, :2], none[:, :2], gap)
+
+
+def _places(positions: Floats) -> tuple[Indices, int]:
+    """A number for each vertex, the same where positions are; and how many there are."""
+    x, y, z = np.ascontiguousarray(positions + np.float32(0.0)).view(np.uint32).T  # + 0: minus zero is zero
+    order = np.lexsort((x, y, z))
+    x, y, z = x[order], y[order], z[order]
+    new = np.ones(len(order), np.int64)
+    new[1:] = (x[1:] != x[:-1]) | (y[1:] != y[:-1]) | (z[1:] != z[:-1])
+    place = np.empty(len(order), np.int64)
+    place[order] = np.cumsum(new) - 1
+    return place, int(new.sum())
+
+
+def _shown(position: Floats) -> str:
+    return "({:g}, {:g}, {:g})".format(*(float(value) for value in position))

@@ -1,0 +1,94 @@
+"""Moving a camera by hand: orbit, pan, zoom, fly, and back to where everything is seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.api.viewing import look_at, unit
+from rendergraph.scene.geometry import vec3
+from rendergraph.scene.model import Camera, Vec3
+
+_STEEPEST = math.radians(89.0)  # at the pole left and right would change places
+
+Sphere = tuple[Vec3, float]
+"""Centre and radius around everything drawn."""
+
+
+def orbited(camera: Camera, sphere: Sphere, across: float, up: float) -> Camera:
+    """Around what it is aimed at, by angles in radians: to the right, and upwards up to the pole."""
+    target = _target(camera, sphere)
+    arm = _eye(camera) - target
+    distance = float(np.linalg.norm(arm))
+    yaw = math.atan2(arm[0], arm[2]) - across
+    pitch = math.asin(np.clip(arm[1] / distance, -1.0, 1.0))
+    pitch = min(max(pitch + up, -_STEEPEST), _STEEPEST)
+    turned = np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
+    return _aimed(camera, target + turned * distance, target, sphere)
+
+
+def panned(camera: Camera, sphere: Sphere, right: float, up: float) -> Camera:
+    """Sideways with what it is aimed at, by parts of the picture's height."""
+    target = _target(camera, sphere)
+    distance = float(np.linalg.norm(_eye(camera) - target))
+    height = camera.height if camera.type == "orthographic" else 2.0 * distance * math.tan(_half_angle(camera))
+    move = camera.transform[:3, 0] * (right * height) + camera.transform[:3, 1] * (up * height)
+    return _aimed(camera, _eye(camera) + move, target + move, sphere)
+
+
+def zoomed(camera: Camera, sphere: Sphere, factor: float) -> Camera:
+    """Nearer (`factor` below 1) to what it is aimed at, or farther; an orthographic one sees less, or more."""
+    if camera.type == "orthographic":
+        return replace(camera, height=camera.height * factor)
+    target = _target(camera, sphere)
+    arm = (_eye(camera) - target) * factor
+    least = max(2.0 * camera.near, 1e-4 * sphere[1])
+    if np.linalg.norm(arm) < least:
+        arm = unit(arm) * least
+    return _aimed(camera, target + arm, target, sphere)
+
+
+def flown(camera: Camera, sphere: Sphere, right: float, up: float, forward: float) -> Camera:
+    """Through the scene along its own axes, by parts of the scene's radius."""
+    target = _target(camera, sphere)
+    move = camera.transform[:3, :3] @ np.array([right, up, -forward]) * sphere[1]
+    return _aimed(camera, _eye(camera) + move, target + move, sphere)
+
+
+def framed(camera: Camera, sphere: Sphere) -> Camera:
+    """From the same side, so far away that everything is in the picture."""
+    center, radius = np.array(sphere[0]), sphere[1]
+    distance = radius / math.sin(_half_angle(camera)) if camera.type != "orthographic" else 2.0 * radius
+    found = replace(camera, near=min(camera.near, 0.1 * radius), height=2.0 * radius)
+    return _aimed(found, center + camera.transform[:3, 2] * distance, center, sphere)
+
+
+def _eye(camera: Camera) -> npt.NDArray[np.float64]:
+    found: npt.NDArray[np.float64] = camera.transform[:3, 3]
+    return found
+
+
+def _half_angle(camera: Camera) -> float:
+    if camera.type == "frustum" and camera.frustum is not None:
+        return math.atan((camera.frustum[3] - camera.frustum[2]) / 2.0 / camera.near)
+    return camera.fov_y / 2.0
+
+
+def _target(camera: Camera, sphere: Sphere) -> npt.NDArray[np.float64]:
+    """What it is aimed at; of one that does not say, the point of its line of sight that is nearest to the middle."""
+    eye, forward = _eye(camera), -camera.transform[:3, 2]
+    if camera.target is not None:
+        target = np.array(camera.target)
+        if np.linalg.norm(target - eye) > 1e-9:
+            return target
+    along = float((np.array(sphere[0]) - eye) @ forward)
+    found: npt.NDArray[np.float64] = eye + forward * max(along, 0.1 * sphere[1])
+    return found
+
+
+def _aimed(camera: Camera, eye: npt.ArrayLike, target: npt.ArrayLike, sphere: Sphere) -> Camera:
+    away = float(np.linalg.norm(np.asarray(eye) - np.array(sphere[0]))) + sphere[1]
+    return replace(camera, transform=look_at(eye, target), target=vec3(target), far=max(camera.far, 1.01 * away))

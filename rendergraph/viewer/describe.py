@@ -1,0 +1,94 @@
+"""A pipeline as the page shows it: its graph, every parameter with what it may be, the plan, the scene's cameras."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rendergraph.declare import Input, Parameter
+from rendergraph.link import Graph
+from rendergraph.scene.animate import moves
+from rendergraph.session.values import Linked, Planned
+from rendergraph.views import graph_json, plan_json
+
+
+def described(planned: Planned) -> dict[str, Any]:
+    """Everything but pictures and times, as plain JSON values."""
+    linked = planned.linked
+    graph, spec = linked.graph, linked.spec
+    families = {name: family for family, names in linked.catalog.families().items() for name in names}
+    nodes = {
+        node.id: {
+            "type": node.type.name,
+            "doc": (node.type.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
+            "types": sorted(name for name, family in families.items() if family == node.type.family),
+            "parameters": {
+                name: _parameter(parameter, getattr(node.node, name), _added(linked, parameter))
+                for name, parameter in node.node.parameters().items()
+            },
+            "inputs": {
+                name: _input(graph, node.id, name, port)
+                for name, port in node.node.inputs().items()
+                if isinstance(port, Input)
+            },
+        }
+        for node in graph.nodes
+    }
+    parameters = {
+        name: {"value": found.value, "doc": found.doc, "min": found.min, "max": found.max, "kind": _kind(found.value)}
+        for name, found in spec.parameters.items()
+    }
+    return {
+        "name": graph.name,
+        "description": spec.description,
+        "size": list(graph.size),
+        "nodes": nodes,
+        "graph": graph_json(graph),
+        "parameters": parameters,
+        "disabled": list(graph.disabled),
+        "plan": plan_json(planned.plan),
+        "cameras": list(linked.scene.cameras),
+        "outputs": list(graph.outputs),
+        "moves": moves(linked.scene),
+        "warnings": [problem.as_json() for problem in linked.warnings],
+    }
+
+
+def _added(linked: Linked, parameter: Parameter) -> tuple[str, ...]:
+    """The choices that plugins add."""
+    if not parameter.open_name:
+        return ()
+    return tuple(added.name for added in linked.catalog.extensions.choices(parameter.open_name))
+
+
+def _parameter(parameter: Parameter, value: Any, added: tuple[str, ...]) -> dict[str, Any]:
+    choices = [*parameter.choices, *added]
+    return {
+        "value": value,
+        "default": parameter.default,
+        "role": parameter.role,
+        "doc": parameter.doc,
+        "unit": parameter.unit,
+        "min": parameter.limits.low,
+        "max": parameter.limits.high,
+        "choices": choices,
+        "kind": "choice" if choices else "color" if parameter.glsl == "vec3" else _kind(value),
+        "takes": parameter.takes(added),
+    }
+
+
+def _kind(value: Any) -> str:
+    """How a value is put in: as a switch, a whole number, a number, a text, or as JSON."""
+    kinds: tuple[tuple[type, str], ...] = ((bool, "boolean"), (int, "integer"), (float, "number"), (str, "text"))
+    return next((name for kind, name in kinds if isinstance(value, kind)), "json")
+
+
+def _input(graph: Graph, node: str, name: str, port: Input) -> dict[str, Any]:
+    ends = graph[node].inputs.get(name, ())
+    return {
+        "doc": port.doc,
+        "kind": port.kind,
+        "semantic": port.semantic.name,
+        "optional": port.optional,
+        "many": port.many,
+        "links": [str(end) for end in ends],
+    }

@@ -1,0 +1,156 @@
+// The graph: nodes as cards, laid out by ELK (loaded when there is something to lay out), drawn as SVG.
+import { h, s, short } from "./dom.js";
+
+const WIDE = 190, HEAD = 40, ROW = 18, PICTURE = 88;
+let elk = null;
+let laid = null;     // what was laid out last, and for which pipeline
+let turn = 0;
+let drawn = null;    // what the drawing shows
+let pictures = 0;    // how often small pictures came
+
+const previews = new Map();  // port to the address of its small picture
+
+function loaded() {
+  elk ??= new Promise((resolve, reject) => {
+    if (globalThis.ELK) return resolve(new globalThis.ELK());
+    const script = h("script", { src: new URL("vendor/elk.bundled.js", document.baseURI) });
+    script.onload = () => resolve(new globalThis.ELK());
+    script.onerror = () => reject(new Error("the layout cannot be loaded"));
+    document.head.append(script);
+  });
+  return elk;
+}
+
+const mainPort = (node) => Object.keys(node.outputs).find((name) => previews.has(`${node.id}.${name}`));
+
+function shapeOf(node) {
+  const rows = Object.keys(node.inputs).length + Object.keys(node.outputs).length;
+  return { width: WIDE, height: HEAD + rows * ROW + PICTURE + 8 };
+}
+
+// ELK's own words: ports stay in their order, inputs to the west (listed from the bottom), outputs to the east.
+function asElk(graph) {
+  const children = graph.nodes.map((node) => {
+    const inputs = Object.keys(node.inputs), outputs = Object.keys(node.outputs);
+    const port = (side, name, index, y) => ({
+      id: `${node.id}|${side}|${name}`, width: 1, height: 1, x: side === "in" ? 0 : WIDE, y,
+      layoutOptions: { "elk.port.side": side === "in" ? "WEST" : "EAST", "elk.port.index": index },
+    });
+    const ports = [
+      ...inputs.map((name, i) => port("in", name, inputs.length - i, HEAD + (i + 0.5) * ROW)),
+      ...outputs.map((name, i) => port("out", name, i, HEAD + (inputs.length + i + 0.5) * ROW)),
+    ];
+    return { id: node.id, ...shapeOf(node), ports, layoutOptions: { "elk.portConstraints": "FIXED_POS" } };
+  });
+  const edges = graph.links.map((link, i) => ({
+    id: `e${i}`, sources: [`${link.source}|out|${link.source_port}`], targets: [`${link.target}|in|${link.target_port}`],
+  }));
+  return {
+    id: "root", children, edges,
+    layoutOptions: {
+      "elk.algorithm": "layered", "elk.direction": "RIGHT", "elk.layered.spacing.nodeNodeBetweenLayers": "60",
+      "elk.spacing.nodeNode": "24", "elk.edgeRouting": "SPLINES", "elk.layered.feedbackEdges": "true",
+    },
+  };
+}
+
+function edgePath(section) {
+  const points = [section.startPoint, ...(section.bendPoints ?? []), section.endPoint];
+  let d = `M${points[0].x},${points[0].y}`;
+  let i = 1;
+  for (; i + 2 < points.length; i += 3) {
+    d += `C${points[i].x},${points[i].y} ${points[i + 1].x},${points[i + 1].y} ${points[i + 2].x},${points[i + 2].y}`;
+  }
+  for (; i < points.length; i++) d += `L${points[i].x},${points[i].y}`;
+  return d;
+}
+
+function carries(made) {
+  if (made.format) {
+    const more = [made.layers > 1 && `${made.layers} layers`, made.mips > 1 && `${made.mips} mips`, made.samples > 1 && `${made.samples} samples`];
+    return [`${made.format} ${made.size.join("×")}`, ...more.filter(Boolean)].join(", ");
+  }
+  return made.bytes ? `${made.bytes} B` : made.kind;
+}
+
+function card(node, box, facts, act) {
+  const { times, culled, chosen, wrong } = facts;
+  const inputs = Object.keys(node.inputs), outputs = Object.entries(node.outputs);
+  const ms = times[node.id];
+  const idle = culled[node.id] !== undefined;
+  const all = Math.max(1e-9, Object.values(times).reduce((sum, one) => sum + one, 0));
+  const title = idle ? `${node.id} does not run: ${culled[node.id]}` : `${node.id}: ${node.type}`;
+  const group = s("g", {
+    class: ["card", idle && "idle", chosen === node.id && "chosen", wrong.has(node.id) && "wrong"].filter(Boolean).join(" "),
+    transform: `translate(${box.x},${box.y})`, tabindex: 0, role: "button", "aria-label": title,
+    onclick: () => act.node(node.id),
+    onkeydown: (event) => { if (event.key === "Enter") act.node(node.id); },
+  }, s("title", {}, title), s("rect", { class: "box", width: box.width, height: box.height, rx: 6 }));
+  if (ms !== undefined) {
+    group.append(s("rect", { class: "time", x: 1, y: HEAD - 5, height: 3, width: Math.max(1, (ms / all) * (box.width - 2)) }));
+    group.append(s("text", { x: box.width - 8, y: 16, "text-anchor": "end", class: "quiet" }, `${short(Number(ms.toFixed(2)))} ms`));
+  }
+  const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
+  group.append(s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26)));
+  inputs.forEach((name, i) => group.append(s("text", { x: 8, y: HEAD + (i + 0.5) * ROW + 4, class: "quiet" }, clip(name, 26))));
+  outputs.forEach(([name, made], i) => {
+    const y = HEAD + (inputs.length + i + 0.5) * ROW + 4;
+    const show = (event) => { event.stopPropagation(); act.port(`${node.id}.${name}`); };
+    group.append(s("g", {
+      class: "port", tabindex: 0, role: "button", "aria-label": `Show ${node.id}.${name}`, onclick: show,
+      onkeydown: (event) => { if (event.key === "Enter") show(event); },
+    }, s("title", {}, `${carries(made)}${made.used ? "" : ", unused"}`),
+    s("text", { x: box.width - 8, y, "text-anchor": "end", class: made.used ? "" : "quiet" }, clip(name, 26))));
+  });
+  const port = mainPort(node);
+  if (port) {
+    group.append(s("image", {
+      href: previews.get(`${node.id}.${port}`), x: 8, y: box.height - PICTURE - 4, width: box.width - 16, height: PICTURE,
+      class: "port", onclick: (event) => { event.stopPropagation(); act.port(`${node.id}.${port}`); },
+    }, s("title", {}, `${node.id}.${port}`)));
+  }
+  return group;
+}
+
+export const preview = (port) => previews.get(port);
+
+export function showPreviews(files, address) {
+  pictures += 1;
+  for (const [port, blob] of Object.entries(files)) previews.set(port, address(`thumbnail ${port}`, blob));
+}
+
+// Draws what is known; lays out anew only where the graph is another one.
+export async function showGraph(place, pipeline, facts, act) {
+  if (!pipeline || place.hidden) return;
+  const shows = JSON.stringify([pipeline.revision, pictures, facts.times, facts.chosen, [...facts.wrong]]);
+  if (shows === drawn) return;
+  drawn = shows;
+  const mine = ++turn;
+  const graph = pipeline.graph;
+  const key = JSON.stringify([graph.links, graph.nodes.map((node) => [node.id, Object.keys(node.inputs), Object.keys(node.outputs)])]);
+  if (laid?.key !== key) {
+    const layout = await (await loaded()).layout(asElk(graph));
+    laid = { key, layout };
+  }
+  if (mine !== turn) return;  // a newer one is on its way
+  const { layout } = laid;
+  const box = new Map(layout.children.map((child) => [child.id, child]));
+  const svg = s("svg", { width: layout.width + 4, height: layout.height + 4, role: "group", "aria-label": "The graph" },
+    s("defs", {}, s("pattern", { id: "hatched", width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" },
+      s("rect", { width: 8, height: 8, fill: "#7d8590", opacity: 0.12 }), s("line", { x1: 0, y1: 0, x2: 0, y2: 8, stroke: "#7d8590", "stroke-width": 3, opacity: 0.5 }))));
+  layout.edges.forEach((edge, i) => {
+    const link = graph.links[i];
+    const made = graph.nodes.find((node) => node.id === link.source)?.outputs[link.source_port];
+    const kind = made?.kind ?? "";
+    for (const section of edge.sections ?? []) {
+      svg.append(s("path", { class: `edge ${kind === "function" || kind === "buffer" ? kind : ""} ${link.previous ? "previous" : ""}`, d: edgePath(section) },
+        s("title", {}, `${link.source}.${link.source_port} → ${link.target}.${link.target_port}${made ? `: ${made.semantic}` : ""}`)));
+    }
+  });
+  for (const node of graph.nodes) svg.append(card(node, box.get(node.id), facts, act));
+  const focused = document.activeElement?.getAttribute?.("aria-label");
+  const { scrollLeft, scrollTop } = place;
+  place.replaceChildren(svg);
+  place.scrollTo(scrollLeft, scrollTop);
+  if (focused) place.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus();
+}

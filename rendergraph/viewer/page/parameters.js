@@ -1,0 +1,177 @@
+// Inputs for a node: made from what its type declares.
+import { h } from "./dom.js";
+import { send } from "./socket.js";
+
+let held = null;  // the setting a slider is moving, so that its way is one step of undo
+
+const set = (path, value) => {
+  send({ do: "set", path, value, again: held === path });
+  if (held !== null) held = path;
+};
+
+const asHex = (color) => "#" + color.map((x) => {
+  const curve = x <= 0.0031308 ? x * 12.92 : 1.055 * x ** (1 / 2.4) - 0.055;
+  return Math.round(Math.min(1, Math.max(0, curve)) * 255).toString(16).padStart(2, "0");
+}).join("");
+
+const asColor = (hex) => [1, 3, 5].map((at) => {
+  const x = parseInt(hex.slice(at, at + 2), 16) / 255;
+  return Number((x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4).toFixed(4));
+});
+
+function numberField(path, id, about) {
+  const step = about.kind === "integer" ? 1 : "any";
+  const limits = { min: about.min, max: about.max, step };
+  const number = h("input", { type: "number", id, value: about.value, ...limits });
+  number.addEventListener("change", () => {
+    if (number.value !== "" && number.checkValidity()) set(path, Number(number.value));
+    else number.reportValidity();
+  });
+  const fields = [number];
+  if (about.min !== null || about.kind === "number") {
+    // A range that nobody bounds is shown around its default.
+    const low = about.min ?? Math.min(0, about.value, about.default ?? 0);
+    const wide = Math.max(Math.abs(about.default ?? about.value), Math.abs(about.value), about.kind === "integer" ? 8 : 0.5) * 4;
+    const high = about.max !== null && about.max - low <= 128 ? about.max : Math.min(about.max ?? Infinity, low + wide);
+    const grain = about.kind === "integer" ? 1 : Number(((high - low) / 200).toPrecision(1));
+    const range = h("input", {
+      type: "range", min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
+    });
+    range.addEventListener("pointerdown", () => { held = ""; send({ do: "hold", on: true }); });
+    range.addEventListener("input", () => { number.value = range.value; set(path, Number(range.value)); });
+    const released = () => { if (held !== null) { held = null; send({ do: "hold", on: false }); } };
+    range.addEventListener("pointerup", released);
+    range.addEventListener("pointercancel", released);
+    range.addEventListener("change", released);
+    fields.unshift(range);
+  }
+  return fields;
+}
+
+function colorField(path, id, about) {
+  const color = Array.isArray(about.value) ? about.value : [about.value, about.value, about.value];
+  const wheel = h("input", { type: "color", id, value: asHex(color) });
+  wheel.addEventListener("input", () => set(path, asColor(wheel.value)));
+  const parts = color.map((part, i) => {
+    const field = h("input", { type: "number", step: "any", min: about.min, max: about.max, value: part, "aria-label": `${path}, ${"RGB"[i]}` });
+    field.addEventListener("change", () => set(path, parts.map((one) => Number(one.value))));
+    return field;
+  });
+  return [wheel, ...parts];
+}
+
+function field(path, id, about) {
+  if (about.kind === "choice") {
+    const select = h("select", { id, onchange: () => set(path, about.choices.find((c) => String(c) === select.value)) },
+      ...about.choices.map((choice) => h("option", { value: String(choice) }, String(choice))));
+    select.value = String(about.value);
+    return [select];
+  }
+  if (about.kind === "boolean") {
+    const box = h("input", { type: "checkbox", id, onchange: () => set(path, box.checked) });
+    box.checked = about.value;
+    return [box];
+  }
+  if (about.kind === "number" || about.kind === "integer") return numberField(path, id, about);
+  if (about.kind === "color") return colorField(path, id, about);
+  const text = h("input", {
+    type: "text", id, value: about.kind === "text" ? about.value : JSON.stringify(about.value),
+    onchange: () => {
+      if (about.kind === "text") return set(path, text.value);
+      try {
+        set(path, JSON.parse(text.value));
+        text.setCustomValidity("");
+      } catch {
+        text.setCustomValidity("JSON, as in [1, 2, 3]");
+        text.reportValidity();
+      }
+    },
+  });
+  return [text];
+}
+
+function row(path, label, about, changed, fields) {
+  const id = `p-${path}`;
+  const back = changed
+    ? h("button", { class: "back", title: "Take the change back", "aria-label": `Take back ${path}`, onclick: () => send({ do: "drop", path }) }, "↺")
+    : h("span");
+  const tip = [about.doc, about.takes && `Takes ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
+  return h("div", { class: changed ? "parameter set" : "parameter", title: tip },
+    h("span", {}, h("label", { for: id }, label)),
+    h("span", { class: "field" }, ...fields, about.unit ? h("span", { class: "quiet" }, about.unit) : null), back);
+}
+
+// Outputs that an input takes, of nodes that do not wait for its own: first those that mean just that.
+function fitting(graph, node, about) {
+  const readers = new Map();
+  for (const { source, target, previous } of graph.links) {
+    if (!previous) readers.set(source, [...(readers.get(source) ?? []), target]);
+  }
+  const after = new Set([node]);
+  for (const one of after) for (const reader of readers.get(one) ?? []) after.add(reader);
+  const exact = [], any = [];
+  for (const one of graph.nodes) {
+    if (after.has(one.id)) continue;
+    for (const [name, made] of Object.entries(one.outputs)) {
+      if (made.kind !== about.kind) continue;
+      if (made.semantic === about.semantic) exact.push(`${one.id}.${name}`);
+      else if (made.semantic === "any" || about.semantic === "any") any.push(`${one.id}.${name}`);
+    }
+  }
+  return [...exact, ...any];
+}
+
+function linkRow(graph, node, name, about, edits) {
+  const path = `${node}.${name}`;
+  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...about.links, ...fitting(graph, node, about)])];
+  // An input that takes many has a list for each, and one more to add to them.
+  const now = about.many ? [...about.links, ""] : [about.links[0] ?? ""];
+  const lists = now.map((link, at) => {
+    const list = h("select", { id: at ? `p-${path}-${at}` : `p-${path}`, "aria-label": at ? `${path}, ${at + 1}` : null, onchange: () => {
+      const next = now.with(at, list.value).filter(Boolean);
+      set(path, about.many && next.length ? next : next[0] ?? null);
+    } }, ...words.map((word) => h("option", { value: word }, word || (about.links.length && at === about.links.length ? "add another" : "nothing"))));
+    list.value = link;
+    return list;
+  });
+  return row(path, name, about, path in edits, lists);
+}
+
+// The pipeline's own parameters, where no node is chosen; else everything that the node can be told.
+export function showParameters(place, pipeline, node, edits) {
+  if (!pipeline) return;
+  // What somebody is holding or writing in is not taken from under the hand.
+  if (place.contains(document.activeElement) && (held !== null || document.activeElement.matches("input[type=text], input[type=number]"))) return;
+  const focused = document.activeElement?.id;
+  const parts = [];
+  const about = pipeline.nodes[node];
+  if (!about) {
+    const own = Object.entries(pipeline.parameters);
+    parts.push(h("p", { class: "doc" }, own.length ? "Parameters of the pipeline." : "Choose a node, here or in the graph."));
+    for (const [name, found] of own) parts.push(row(name, name, found, name in edits, field(name, `p-${name}`, found)));
+  } else {
+    const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
+      ...[...new Set([about.type, ...about.types])].map((word) => h("option", { value: word }, word)));
+    types.value = about.type;
+    const enabled = h("input", { type: "checkbox", id: `p-${node}.enabled`, onchange: () => set(`${node}.enabled`, enabled.checked) });
+    enabled.checked = true;
+    parts.push(h("p", { class: "doc" }, about.doc));
+    parts.push(row(`${node}.type`, "type", {}, `${node}.type` in edits, [types]));
+    parts.push(row(`${node}.enabled`, "enabled", {}, `${node}.enabled` in edits, [enabled]));
+    const parameters = Object.entries(about.parameters);
+    if (parameters.length) parts.push(h("h2", {}, "Parameters"));
+    for (const [name, found] of parameters) {
+      const path = `${node}.${name}`;
+      parts.push(row(path, name, found, path in edits, field(path, `p-${path}`, found)));
+    }
+    const inputs = Object.entries(about.inputs);
+    if (inputs.length) parts.push(h("h2", {}, "Inputs"));
+    for (const [name, found] of inputs) parts.push(linkRow(pipeline.graph, node, name, found, edits));
+  }
+  for (const name of pipeline.disabled) {
+    const button = h("button", { onclick: () => set(`${name}.enabled`, true) }, "enable");
+    parts.push(h("p", {}, `${name} is disabled `, button));
+  }
+  place.replaceChildren(...parts);
+  if (focused && focused.startsWith("p-")) document.getElementById(focused)?.focus();
+}

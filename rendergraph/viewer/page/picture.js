@@ -1,0 +1,148 @@
+// The picture: what comes is shown, what a hand does to it moves the camera.
+import { $, h, short } from "./dom.js";
+import { send } from "./socket.js";
+
+const urls = new Map();
+let size = [1, 1];
+let compared = null;
+
+// A file as an address; the one before it under the same name is given back.
+export function address(name, blob) {
+  const before = urls.get(name);
+  const url = typeof blob === "string" ? blob : URL.createObjectURL(blob);
+  urls.set(name, url);
+  if (before?.startsWith("blob:")) setTimeout(() => URL.revokeObjectURL(before), 1000);
+  return url;
+}
+
+export function showPicture(facts, files) {
+  const picture = $("picture");
+  picture.src = address("picture", files.picture);
+  picture.dataset.number = facts.frame;
+  picture.dataset.count = Number(picture.dataset.count ?? 0) + 1;
+  picture.dataset.still = facts.still;
+  if (facts.still) size = facts.size;
+  fit();
+  if (compared) showAgainst(compared.facts, compared.files);
+}
+
+// As large as there is room for; texels that become large keep their edges.
+function fit() {
+  const [width, height] = size;
+  const room = Math.min($("stage").clientWidth, (0.68 * innerHeight * width) / height);
+  const slider = $("slider");
+  for (const image of [$("picture"), slider.under, slider.over]) {
+    image.style.width = `${room}px`;
+    image.style.height = `${(room * height) / width}px`;
+    image.classList.toggle("pixels", room > 3 * width);
+  }
+}
+
+export function showAgainst(facts, files) {
+  const slider = $("slider");
+  const on = Boolean(files.other);
+  slider.hidden = !on;
+  $("picture").hidden = on;
+  $("map-label").hidden = !on;
+  compared = on ? { facts, files } : null;
+  if (!on) return;
+  const map = $("map").value in files ? $("map").value : "other";
+  slider.show(urls.get("picture"), address("other", files[map]), ["this", map === "other" ? facts.name : $("map").selectedOptions[0].text]);
+}
+
+export function showPixel({ pixel }) {
+  if (!pixel?.at) return;
+  const layer = pixel.layer === null ? "" : `, layer ${pixel.layer}`;
+  $("pixel").textContent = `(${pixel.at.join(", ")}${layer})  ${pixel.values.map(short).join("  ")}`;
+}
+
+export function startPicture() {
+  const stage = $("stage");
+  const picture = $("picture");
+  let last = null;
+  let asked = 0;
+  let rest = null;
+
+  // What comes in many small moves, as from a wheel or a key, is a move until it rests.
+  const moved = (move) => {
+    if (rest === null) send({ do: "hold", on: true });
+    clearTimeout(rest);
+    rest = setTimeout(() => { rest = null; send({ do: "hold", on: false }); }, 250);
+    send({ do: "camera", ...move });
+  };
+
+  picture.draggable = false;
+  addEventListener("resize", fit);
+  stage.addEventListener("pointerdown", (event) => {
+    if (event.target.closest("input")) return;
+    stage.setPointerCapture(event.pointerId);
+    last = [event.clientX, event.clientY];
+    send({ do: "hold", on: true });
+  });
+  stage.addEventListener("pointermove", (event) => {
+    const box = picture.hidden ? $("slider").under.getBoundingClientRect() : picture.getBoundingClientRect();
+    if (!last) {
+      const x = (event.clientX - box.left) / box.width;
+      const y = (event.clientY - box.top) / box.height;
+      if (x >= 0 && x < 1 && y >= 0 && y < 1 && event.timeStamp - asked > 60) {
+        asked = event.timeStamp;
+        send({ do: "pixel", x, y });
+      }
+      return;
+    }
+    const across = (event.clientX - last[0]) / box.height;
+    const down = (event.clientY - last[1]) / box.height;
+    last = [event.clientX, event.clientY];
+    if (event.shiftKey || event.buttons & 6) send({ do: "camera", pan: [-across, down] });
+    else send({ do: "camera", orbit: [across * 3, down * 3] });
+  });
+  const released = () => {
+    if (last) send({ do: "hold", on: false });
+    last = null;
+  };
+  stage.addEventListener("pointerup", released);
+  stage.addEventListener("pointercancel", released);
+  stage.addEventListener("contextmenu", (event) => event.preventDefault());
+  stage.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    moved({ zoom: [Math.exp(Math.max(-1, Math.min(1, event.deltaY * 0.002)))] });
+  }, { passive: false });
+
+  const step = 0.1;
+  const keys = {
+    ArrowLeft: { orbit: [-step, 0] }, ArrowRight: { orbit: [step, 0] },
+    ArrowUp: { orbit: [0, step] }, ArrowDown: { orbit: [0, -step] },
+    "+": { zoom: [0.9] }, "=": { zoom: [0.9] }, "-": { zoom: [1 / 0.9] }, f: { frame: [] },
+    w: { fly: [0, 0, 0.05] }, s: { fly: [0, 0, -0.05] }, a: { fly: [-0.05, 0, 0] }, d: { fly: [0.05, 0, 0] },
+    q: { fly: [0, -0.05, 0] }, e: { fly: [0, 0.05, 0] },
+  };
+  stage.addEventListener("keydown", (event) => {
+    const move = keys[event.key];
+    if (!move || event.ctrlKey || event.metaKey || event.target.closest("input")) return;
+    event.preventDefault();
+    moved(move);
+  });
+  $("map").addEventListener("change", () => { if (compared) showAgainst(compared.facts, compared.files); });
+}
+
+// What is in the texture that is looked at.
+export function showTexture(texture) {
+  const place = $("texture");
+  if (!texture) return;
+  const names = ["R", "G", "B", "A"];
+  const rows = texture.channels.map((channel, i) => {
+    const most = Math.max(1, ...channel.histogram);
+    const bars = h("div", { class: "histogram", role: "img", "aria-label": `Histogram of channel ${names[i]}` });
+    for (const count of channel.histogram) {
+      const bar = h("i");
+      bar.style.height = `${(Math.sqrt(count / most) * 100).toFixed(1)}%`;
+      bars.append(bar);
+    }
+    const text = `${names[i] ?? i}: ${short(channel.min)} … ${short(channel.max)}, mean ${short(channel.mean)}`;
+    return h("div", {}, h("p", { class: "mono" }, text), bars);
+  });
+  const broken = texture.nan || texture.infinite
+    ? h("p", { class: "mono broken" }, `${texture.nan} texels hold NaN, ${texture.infinite} infinity`) : null;
+  const about = `${texture.semantic}, ${texture.format}, ${texture.shape.join(" × ")}`;
+  place.replaceChildren(h("h2", {}, "Texture"), h("p", { class: "mono quiet" }, about), ...[broken, ...rows].filter(Boolean));
+}

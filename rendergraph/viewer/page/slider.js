@@ -1,0 +1,29 @@
+// Two pictures, one over the other up to a line; a range input moves it, so a keyboard does, too.
+import { h } from "./dom.js";
+
+class PictureSlider extends HTMLElement {
+  connectedCallback() {
+    if (this.firstChild) return;
+    this.under = h("img", { alt: "The picture", draggable: "false" });
+    this.over = h("img", { alt: "What it is compared with", class: "over", draggable: "false" });
+    this.left = h("span", { class: "tag a" });
+    this.right = h("span", { class: "tag b" });
+    this.range = h("input", { type: "range", min: 0, max: 1000, value: 500, "aria-label": "Where the pictures meet" });
+    this.range.addEventListener("input", () => this.cut());
+    this.append(h("div", { class: "pile" }, this.under, this.over, this.left, this.right), this.range);
+    this.range.addEventListener("pointerdown", (event) => event.stopPropagation());
+    this.cut();
+  }
+
+  cut() {
+    this.over.style.clipPath = `inset(0 0 0 ${this.range.value / 10}%)`;
+  }
+
+  show(mine, other, names) {
+    this.under.src = mine;
+    if (other) this.over.src = other;
+    [this.left.textContent, this.right.textContent] = names;
+  }
+}
+
+customElements.define("picture-slider", PictureSlider);
