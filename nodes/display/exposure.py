@@ -7,6 +7,7 @@ from typing import Literal
 from rendergraph.api import ExposureGain, Input, Internal, Luminance, Node, Output, Radiance, Steps, define, param
 
 from ._exposure import half_of_radiance
+from ._means import halve_down
 
 
 class Exposure(Node):
@@ -49,8 +50,6 @@ class Exposure(Node):
 
     def record(self, steps: Steps) -> None:
         """Logarithms at half size, their means level by level, then one texel that adapts."""
-        last = steps.desc(self.logarithms).mips - 1
         steps.fullscreen("log_luminance.frag", radiance=self.radiance, out=self.logarithms.mip(0))
-        for level in range(last):
-            steps.fullscreen("halve.frag", source=self.logarithms.mip(level), out=self.logarithms.mip(level + 1))
+        last = halve_down(steps, self.logarithms)
         steps.fullscreen("exposure.frag", mean=self.logarithms.mip(last), before=self.before)

@@ -10,8 +10,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rendergraph.api import Albedo, Emissive, Facts, Input, Material, Normal, Output, Semantic
 from rendergraph.api import Any as AnyTexel
+from rendergraph.api import Emissive, Facts, Input, Material, Normal, Output, Semantic
+
+from ._samples import own_samples
+
+AlbedoRoot = Semantic("albedo_root", "Root of the linear base colour, 0 to 1: even steps of it are even to the eye.")
 
 
 @dataclass(frozen=True)
@@ -36,12 +40,12 @@ class SurfaceTexture:
 
     def drawn(self) -> Output:
         """The port of a node that fills it."""
-        return Output(self.semantic, format=self._format, clear=0.0, doc=self.doc)
+        return Output(self.semantic, format=self._format, clear=0.0, samples=own_samples, doc=self.doc)
 
     def read(self) -> Input:
         """The port of a node that lights what it holds."""
         doc = f"{self.doc} Unconnected: {self.otherwise}." if self.otherwise else self.doc
-        return Input(self.semantic, group="gbuffer", optional=bool(self.otherwise), doc=doc)
+        return Input(self.semantic, group="gbuffer", optional=bool(self.otherwise), samples="any", doc=doc)
 
     def is_looked_at(self, needs: Collection[str]) -> bool:
         """Whether a shading model with these needs looks at it."""
@@ -52,7 +56,9 @@ class SurfaceTexture:
 
 
 SURFACE_TEXTURES: Mapping[str, SurfaceTexture] = {
-    "albedo": SurfaceTexture(Albedo, "srgb8_a8", "Base colour; alpha is 1 where a surface is.", unless=()),
+    "albedo": SurfaceTexture(
+        AlbedoRoot, "rgb10_a2", "Root of the base colour; alpha is 1 where a surface is.", unless=()
+    ),
     "normal": SurfaceTexture(Normal, "rgba16_snorm", "Unit normal for shading, world space; 0 where nothing is."),
     "material": SurfaceTexture(
         Material, "rgba16", "Metallic, roughness, occlusion, and 1 for surfaces that lights reach, 0 for unlit ones."
@@ -68,7 +74,7 @@ SURFACE_TEXTURES: Mapping[str, SurfaceTexture] = {
     "grain": SurfaceTexture(
         AnyTexel,
         "rgba16_snorm",
-        "For the anisotropic model: unit direction of the grain, world space, and its strength in alpha.",
+        "Of materials with a grain: its unit direction, world space, and its strength in alpha.",
         otherwise="none",
         needs="grain",
     ),

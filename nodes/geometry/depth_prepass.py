@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Depth, Input, Node, Output, Steps, View
+from rendergraph.api import Depth, Input, Node, Output, Port, Steps, View, structural
+
+from ._samples import Samples, own_samples
+from ._velocity import drawn_velocity
 
 
 class DepthPrepass(Node):
@@ -12,8 +15,15 @@ class DepthPrepass(Node):
     """
 
     view = Input(View, kind="view", optional=True, doc="What it is seen from; the pipeline's camera by default.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Window depth, 1 where nothing is.")
+    depth = Output(Depth, format="depth32f", clear=0.0, samples=own_samples, doc="Window depth, 0 where nothing is.")
+
+    velocity = drawn_velocity()
+
+    samples: Samples = structural(default=1, doc="Samples a pixel, as many as the pass has that takes the depth.")
 
     def record(self, steps: Steps) -> None:
         """Positions alone; fragments only where a mask cuts them."""
-        steps.geometry("<depth.frag>", vertex="<depth.vert>", out=self.depth, objects="opaque", materials="alpha")
+        out: dict[str, Port] = {"depth": self.depth}
+        if steps.used(self.velocity):
+            out["velocity"] = self.velocity
+        steps.geometry("<depth.frag>", vertex="<depth.vert>", out=out, objects="opaque", materials="alpha")

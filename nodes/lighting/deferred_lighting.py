@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rendergraph.api import Output, Radiance, Steps
 
-from ._image_lighting import ImageLighting
+from ._image_lighting import ImageLighting, samples_stored
+from ._lighting import DIFFUSE
 
 
 class DeferredLighting(ImageLighting):
@@ -16,11 +17,17 @@ class DeferredLighting(ImageLighting):
     """
 
     radiance = Output(
-        Radiance, format="rgba16f", doc="Scene-linear radiance; alpha is 1 where a surface is and 0 where nothing is."
+        Radiance,
+        format="rgba16f",
+        samples=samples_stored,
+        doc="Scene-linear radiance; alpha is 1 where a surface is and 0 where nothing is.",
     )
+    diffuse = Output(Radiance, format="rgba16f", samples=samples_stored, doc=DIFFUSE)
 
     def record(self, steps: Steps) -> None:
-        """A step that reads what the shading model and the wanted terms need, and one over what is blended."""
+        """A step that reads what shading model and terms need, the environment behind, and what is blended."""
+        super().record(steps)
         reads = {**self.surface(steps), **self.shadows(steps), **self.ambient_light(steps)}
-        steps.fullscreen("deferred_lighting.frag", out=self.radiance, **reads)
-        self.blend_over(steps, self.radiance)
+        defines = {**self.per_sample(steps), **self.backdrop_defines(steps)}
+        steps.fullscreen("deferred_lighting.frag", out=self.pictures(steps), defines=defines, **reads)
+        self.blend_over(steps)

@@ -6,7 +6,8 @@ from typing import Any
 
 from rendergraph.api import ADD, Depth, Internal, Output, Radiance, State, Stencil, StencilFace, Steps
 
-from ._image_lighting import ImageLighting
+from ._image_lighting import ImageLighting, samples_stored
+from ._lighting import DIFFUSE
 
 _SEGMENTS, _RINGS = 12, 8
 _VERTICES = _SEGMENTS * _RINGS * 6
@@ -25,23 +26,27 @@ class DeferredStencilLights(ImageLighting):
     radiance = Output(
         Radiance,
         format="rgba32f",
+        samples=samples_stored,
         doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
     )
-    marks = Internal(Depth, format="depth32f_stencil8", clear=1.0)
+    diffuse = Output(Radiance, format="rgba32f", samples=samples_stored, doc=DIFFUSE)
+    marks = Internal(Depth, format="depth32f_stencil8", samples=samples_stored, clear=0.0)
 
     def record(self, steps: Steps) -> None:
         """A pass for all that has no volume, two draws a local light, and what is blended."""
+        super().record(steps)
         surface, shadows = self.surface(steps), self.shadows(steps)
         reads = {**surface, **shadows, **self.ambient_light(steps)}
-        steps.fullscreen("deferred_lighting.frag", out=self.radiance, defines={"DIRECTIONALS_ONLY": 1}, **reads)
+        defines = {"DIRECTIONALS_ONLY": 1, **self.per_sample(steps), **self.backdrop_defines(steps)}
+        steps.fullscreen("deferred_lighting.frag", out=self.pictures(steps), defines=defines, **reads)
         local = [number for number, light in enumerate(steps.lights) if light.type != "directional"]
         if local and self.wants_lights(steps):
             self._add_lights(steps, local, surface, shadows)
-        self.blend_over(steps, self.radiance)
+        self.blend_over(steps)
 
     def _add_lights(self, steps: Steps, local: list[int], surface: dict[str, Any], shadows: dict[str, Any]) -> None:
         # The stencil needs a depth of its own: a texture must not be attached and sampled at once.
-        steps.fullscreen("copy_depth.frag", out=self.marks, depth=self.depth)
+        steps.fullscreen("<copy_depth.frag>", out=self.marks, depth=self.depth)
         marking = State(
             cull="none",
             depth_write=False,
@@ -68,9 +73,9 @@ class DeferredStencilLights(ImageLighting):
                 "deferred_stencil_lights.frag",
                 vertex="light_volume.vert",
                 vertices=_VERTICES,
-                out={"radiance": self.radiance, "marks": self.marks},
+                out={**self.pictures(steps), "marks": self.marks},
                 state=lighting,
-                defines=shape,
+                defines={**shape, **self.per_sample(steps)},
                 light=light,
                 **surface,
                 **shadows,

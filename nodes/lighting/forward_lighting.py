@@ -25,6 +25,7 @@ class ForwardLighting(GeometryLighting):
 
     def record(self, steps: Steps) -> None:
         """One pass over what is opaque, one over what is blended."""
+        super().record(steps)
         shaders = {
             "fragment": {"fragment": "forward_lighting.frag"},
             "vertex": {"fragment": "forward_interpolated.frag", "vertex": "forward_lighting.vert"},
@@ -35,6 +36,6 @@ class ForwardLighting(GeometryLighting):
             },
         }[self.evaluate]
         # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
-        nearer = (0.0, -8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
-        self.light_opaque(steps, **shaders, state=State(polygon_offset=nearer))
+        nearer = (0.0, 8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
+        self.light_opaque(steps, **shaders, **self.around(steps), state=State(polygon_offset=nearer))
         self.blend_after(steps, **shaders)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rendergraph.api import ADD, Output, Radiance, State, Steps
 
-from ._lighting import GeometryLighting, background_texel
+from ._lighting import DIFFUSE, GeometryLighting, background_texel, samples_drawn
 
 
 class ForwardMultipass(GeometryLighting):
@@ -19,12 +19,15 @@ class ForwardMultipass(GeometryLighting):
         Radiance,
         format="rgba32f",
         clear=background_texel,
+        samples=samples_drawn,
         doc="Scene-linear radiance, float32: half floats would lose a step with every light. Alpha is coverage.",
     )
+    diffuse = Output(Radiance, format="rgba32f", clear=background_texel, samples=samples_drawn, doc=DIFFUSE)
 
     def record(self, steps: Steps) -> None:
         """Ambient and emitted light first, then each light, then what is blended."""
-        self.light_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1})
+        super().record(steps)
+        self.light_opaque(steps, "forward_multipass.frag", defines={"FIRST_PASS": 1}, **self.around(steps))
         added = State(blend=ADD, depth_func="equal", depth_write=False)
         for light in range(len(steps.lights) if self.wants_lights(steps) else 0):
             self.light_opaque(steps, "forward_multipass.frag", state=added, per_light=light, light=light)

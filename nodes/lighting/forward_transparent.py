@@ -20,4 +20,6 @@ class ForwardTransparent(Lighting):
 
     def record(self, steps: Steps) -> None:
         """One step."""
+        if steps.draws("transparent"):
+            super().record(steps)
         self.blend(steps, {"radiance": self.radiance}, self.lookup, self.depth, view=self.depth)

@@ -25,7 +25,7 @@ def spread_points(count: int) -> npt.NDArray[np.float64]:
     for _ in range(ROUNDS):
         apart = points[:, None] - points[None]
         distance = np.linalg.norm(apart, axis=-1) + np.eye(count)
-        points = points + 2 / count**1.5 * (apart / distance[..., None] ** 3).sum(axis=1)
+        points = points + 6 / count**1.5 * (apart / distance[..., None] ** 3).sum(axis=1)
         points /= np.linalg.norm(points, axis=1, keepdims=True)
     points.setflags(write=False)
     return points

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from rendergraph.api import (
@@ -31,7 +32,8 @@ def reduced_size(node: Any, facts: Facts) -> tuple[int, int]:
 class ScreenSpaceOcclusion(Node):
     """Base of the techniques that see no more of the scene than depth and normals of the picture.
 
-    `record` calls `gather_surfaces` first, then makes an occlusion at the reduced size, and gives it to `upsample`.
+    `record` calls `gather_surfaces` first, then makes an occlusion at the reduced size, and gives it to `upsample`
+    where that is not the picture's.
     """
 
     depth = Input(Depth, doc="Window depth; positions come from it and its view.")
@@ -71,15 +73,21 @@ class ScreenSpaceOcclusion(Node):
         """Where the last pass at reduced size goes: `occlusion` itself where nothing is reduced, else `small`."""
         return small if self.sizes(steps) else self.occlusion
 
-    def upsample(self, steps: Steps, source: Port) -> None:
-        """Bring a reduced occlusion to full size."""
-        if source is not self.occlusion:
-            steps.fullscreen(
-                "upsample.frag",
-                out=self.occlusion,
-                source=source,
-                surfaces=self.surfaces,
-                depth=self.depth,
-                normal=self.normal,
-                defines=self.sizes(steps),
-            )
+    def upsample(self, steps: Steps, source: Port, out: Mapping[str, Port], defines: Mapping[str, int]) -> None:
+        """Bring what is reduced to full size.
+
+        Args:
+            steps: what records it.
+            source: a reduced texture.
+            out: what is made of it, by the names in `finish.glsl`.
+            defines: what of it there is to make: `FOUR` and the like.
+        """
+        steps.fullscreen(
+            "upsample.frag",
+            out=dict(out),
+            source=source,
+            surfaces=self.surfaces,
+            depth=self.depth,
+            normal=self.normal,
+            defines={**defines, **self.sizes(steps), "FINAL": 1},
+        )

@@ -26,6 +26,7 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
     blurred = Internal(format="r16", size=reduced_size)
 
     samples: int = define(default=32, min=8, max=128, doc="Points looked at, four a direction; rounded down to fours.")
+    animated: bool = define(default=False, doc="Other directions in each frame, for `accumulate` to put together.")
     blur: int = param(default=4, unit="texels", min=0, max=16, doc="How far the blur reaches to each side, at `scale`.")
     nearest: float = param(
         default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."
@@ -56,7 +57,8 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
                 screen=screen,
                 defines=sizes,
             )
-        self.upsample(steps, target)
+        if sizes:
+            self.upsample(steps, target, {"occlusion": self.occlusion}, {})
 
     def update(self, frame: Frame) -> None:
         """The kernel's directions."""

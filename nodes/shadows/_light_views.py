@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from itertools import groupby
+from collections.abc import Callable, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -17,55 +15,43 @@ from rendergraph.api import ViewMatrices, casting_lights, viewing
 Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
 
-CUBE_FACES = 6
-_WIDEST = math.radians(80)  # half angle of a cone that one perspective view still covers with care
+_WIDEST = math.radians(86)  # half angle of a cone that one perspective view still covers with care
 _MARGIN = 8.0  # texels around what is seen, so that filter kernels at its edge read drawn texels
 
 
-def layer_lights(wanted: str | Sequence[str], lights: Sequence[Any]) -> tuple[int, ...]:
+def layer_lights(wanted: str | Sequence[str], lights: Sequence[Any], layers: Callable[[str], int]) -> tuple[int, ...]:
     """The light of each layer, as an index into the scene's lights.
 
     Args:
         wanted: `auto`, `all`, a light's name, or several; see `casting_lights`.
         lights: the scene's lights, with `name`, `type` and `casts_shadow`, which `auto` asks for.
+        layers: how many a light of a kind has.
 
     Raises:
         SceneError: no light has that name.
     """
-    return tuple(
-        index
-        for index in casting_lights(wanted, lights)
-        for _ in range(CUBE_FACES if lights[index].type == "point" else 1)
-    )
+    return tuple(index for index in casting_lights(wanted, lights) for _ in range(layers(lights[index].type)))
 
 
-def light_views(table: Sequence[int], scene: Any, camera: ViewMatrices, resolution: int) -> list[ViewMatrices]:
-    """A view for each layer of a table of lights.
+# --- one kind each ---------------------------------------------------------------------------------------------------
+
+
+def light_views(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -> Sequence[ViewMatrices]:
+    """The views of one light: one, or six around a point light.
 
     Args:
-        table: the light of each layer; a point light stands six times.
+        light: a light of the scene.
         scene: its `lights`, `bounds`, `objects` and `meshes` in this frame.
         camera: what the picture is seen with.
         resolution: texels along a side.
     """
-    lights = scene.lights
     box = np.asarray(scene.bounds, np.float64)
-    views: list[ViewMatrices] = []
-    for index, group in groupby(table):
-        light = lights[index]
-        if light.type == "directional":
-            made: Iterable[ViewMatrices] = [
-                directional_view(light.direction, camera, box, casting_points(scene, light.direction), resolution)
-            ]
-        elif light.type == "spot":
-            made = [spot_view(light, box, resolution)]
-        else:
-            made = point_views(light, box, resolution)
-        views += [replace(view, light=index) for view, _ in zip(made, group, strict=True)]
-    return views
-
-
-# --- one kind each ---------------------------------------------------------------------------------------------------
+    if light.type == "directional":
+        casting = casting_points(scene, light.direction)
+        return (directional_view(light.direction, camera, box, casting, resolution),)
+    if light.type == "spot":
+        return (spot_view(light, scene, camera, resolution),)
+    return point_views(light, box, resolution)
 
 
 def directional_view(
@@ -93,15 +79,62 @@ def directional_view(
     )
 
 
-def spot_view(light: Any, box: Points, resolution: int) -> ViewMatrices:
-    """A perspective view that holds a spot light's cone."""
-    half_angle = min(light.outer, _WIDEST)
-    return viewing.cone_view(light.position, light.direction, half_angle, *reach(light, box), resolution, _MARGIN)
+def spot_view(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -> ViewMatrices:
+    """A perspective view around what may have shadow on it in the picture, within a spot light's cone.
+
+    Across the light's axis it is as narrow as what the camera sees within the cone, and as what casts there; along it,
+    it begins at what casts and ends at what is seen.
+    """
+    box = np.asarray(scene.bounds, np.float64)
+    cone = viewing.cone_view(light.position, light.direction, min(light.outer, _WIDEST), *reach(light, box), resolution)
+    planes = viewing.frustum_planes(cone)
+    seen = viewing.region_corners(np.concatenate([planes, viewing.frustum_planes(camera), viewing.box_planes(box)]))
+    boxes = casting_points(scene, light.direction, light.position).reshape(-1, 8, 3)
+    casting, begin = _within_cone(cone, boxes)
+    widest = np.full(2, 1 / cone.projection[0, 0])
+    low, high, near, far = -widest, widest, cone.near, cone.far
+    if len(seen) and len(casting):
+        there, distances = _slopes(cone, seen)
+        lower = np.maximum(np.maximum(there.min(axis=0), casting.min(axis=0)), low)
+        higher = np.minimum(np.minimum(there.max(axis=0), casting.max(axis=0)), high)
+        if np.all(lower < higher):  # else nothing that casts is near what is seen
+            low, high, far = lower, higher, float(distances.max()) * 1.001
+            near = max(min(begin * 0.999, far * 0.5), cone.near)
+    return viewing.narrowed_view(cone, low, high, near, far, _MARGIN)
+
+
+def _slopes(view: ViewMatrices, points: Points) -> tuple[Points, Points]:
+    """Points as a view from their origin has them: x and y over the distance along its axis, and that distance."""
+    there = points @ view.view[:3, :3].T + view.view[:3, 3]
+    return there[..., :2] / -there[..., 2:], -there[..., 2]
+
+
+def _within_cone(cone: ViewMatrices, boxes: Points) -> tuple[Points, float]:
+    """Slopes whose hull holds what a perspective view sees of boxes, shape (n, 3), and how near that begins.
+
+    Args:
+        cone: the view.
+        boxes: corners, shape (n, 8, 3).
+    """
+    distances = -(boxes @ cone.view[2, :3] + cone.view[2, 3])
+    before = np.all(distances > cone.near, axis=1)
+    slopes = _slopes(cone, boxes[before])[0]
+    widest = 1 / cone.projection[0, 0]
+    seen = np.all((slopes.max(axis=1) > -widest) & (slopes.min(axis=1) < widest), axis=1)
+    near = float(distances[before][seen].min(initial=cone.far))
+    found = [slopes[seen].reshape(-1, 2)]
+    sides = viewing.frustum_planes(cone)[:5]
+    for box in boxes[~before & np.any(distances > cone.near, axis=1)]:  # of those beside the light, what is before it
+        faces = [viewing.clip_polygon(box[list(face)], sides) for face in viewing.BOX_FACES]
+        if sum(map(len, faces)):
+            found.append(_slopes(cone, np.concatenate([face.reshape(-1, 3) for face in faces]))[0])
+            near = cone.near
+    return np.concatenate(found), near
 
 
 def point_views(light: Any, box: Points, resolution: int) -> Sequence[ViewMatrices]:
     """Six perspective views around a point light, in the order of a cube map's faces; each a little wider than 90°."""
-    return viewing.cube_views(light.position, *reach(light, box), resolution, margin=1.0)
+    return viewing.cube_views(light.position, *reach(light, box), resolution, _MARGIN)
 
 
 def reach(light: Any, box: Points) -> tuple[float, float]:
@@ -125,43 +158,50 @@ def _grain(direction: Sequence[float] | Matrix, camera: ViewMatrices) -> Matrix:
 
 # --- what casts -------------------------------------------------------------------------------------------------------
 
-_corners_of: WeakKeyDictionary[Any, tuple[Points, npt.NDArray[np.int64]]] = WeakKeyDictionary()
+_corners_of: WeakKeyDictionary[Any, tuple[Points, npt.NDArray[np.bool_], npt.NDArray[np.int64]]] = WeakKeyDictionary()
 _MOST_FLAT = 16  # flat objects that are looked at: floors and walls are few, and large
 
 
-def casting_points(scene: Any, direction: Sequence[float]) -> Points:
-    """Corners of the boxes of everything that may cast on something, shape (n, 3).
+def casting_points(scene: Any, direction: Sequence[float], place: Sequence[float] | None = None) -> Points:
+    """Corners of the boxes of everything that may cast on something, shape (n, 3), eight a box.
 
     A flat object with nothing on the far side of its plane casts on nothing: without the floor everything stands on, a
     map need not cover all of it.
+
+    Args:
+        scene: its `objects` and `meshes` in this frame.
+        direction: that light comes along,
+        place: or from where.
     """
     if scene not in _corners_of:
-        _corners_of[scene] = _caster_corners(scene)
-    corners, flat = _corners_of[scene]
-    casts = np.ones(len(corners), bool)
+        _corners_of[scene] = _object_corners(scene)
+    corners, casts, flat = _corners_of[scene]
+    casts = casts.copy()
     everything = corners.reshape(-1, 3)
     for index in flat:
         a, b, c = corners[index][_spanning(corners[index])]
         normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal) * (-1.0 if normal @ direction < 0 else 1.0)  # along the light
+        along = direction if place is None else a - place
+        normal /= np.linalg.norm(normal) * (-1.0 if normal @ along < 0 else 1.0)
         beyond = (everything - a) @ normal
         casts[index] = beyond.max() > 1e-6 * np.abs(everything).max()
     return corners[casts].reshape(-1, 3)
 
 
-def _caster_corners(scene: Any) -> tuple[Points, npt.NDArray[np.int64]]:
-    """World-space corners of each caster's box, shape (n, 8, 3), and the largest flat ones' indices."""
-    placed = [entry for entry in scene.objects if entry.casts_shadow and not entry.hidden]
+def _object_corners(scene: Any) -> tuple[Points, npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
+    """World-space corners of each object's box, shape (n, 8, 3), which cast, and the largest flat ones' indices."""
+    placed = [entry for entry in scene.objects if not entry.hidden]
+    casts = np.array([entry.casts_shadow for entry in placed], bool)
     if not placed:
-        return np.empty((0, 8, 3)), np.empty(0, np.int64)
+        return np.empty((0, 8, 3)), casts, np.empty(0, np.int64)
     boxes = np.array([viewing.box_corners(mesh.box) for mesh in scene.meshes])
     local = boxes[[entry.mesh for entry in placed]]
     transforms = np.array([entry.transform for entry in placed])
     corners = np.einsum("nij,nkj->nki", transforms[:, :3, :3], local) + transforms[:, None, :3, 3]
     extent = np.sort(np.ptp(local, axis=1), axis=1)
-    flat = np.nonzero((extent[:, 0] < 1e-5 * extent[:, 2]) & (extent[:, 1] > 1e-5 * extent[:, 2]))[0]
+    flat = np.nonzero(casts & (extent[:, 0] < 1e-5 * extent[:, 2]) & (extent[:, 1] > 1e-5 * extent[:, 2]))[0]
     size = np.linalg.norm(np.ptp(corners[flat], axis=1), axis=1)
-    return corners, flat[np.argsort(-size, kind="stable")][:_MOST_FLAT]
+    return corners, casts, flat[np.argsort(-size, kind="stable")][:_MOST_FLAT]
 
 
 def _spanning(corners: Points) -> list[int]:

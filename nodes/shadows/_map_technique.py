@@ -33,8 +33,8 @@ class MapTechnique(Node):
         Visibility,
         kind="texture2d_array",
         format="r16",
-        layers=lambda node, facts: len(shadowed_lights(facts)),
-        lights=lambda node, facts: shadowed_lights(facts),
+        layers=lambda node, facts: len(node.shadowed(facts)),
+        lights=lambda node, facts: node.shadowed(facts),
         needs=("depth",),
         doc="1 lit, 0 shadowed, one layer a light.",
     )
@@ -47,11 +47,15 @@ class MapTechnique(Node):
         doc="How far a point is moved along its normal: 1 is just enough for a flat surface at any slope.",
     )
 
+    def shadowed(self, facts: Facts) -> tuple[int, ...]:
+        """The lights it knows, as the scene's indices."""
+        return shadowed_lights(facts)
+
     def record(self, steps: Steps) -> None:
         """Evaluate the function at every pixel, where anybody looks at that."""
         if not steps.used(self.visibility):
             return
-        for layer, light in enumerate(shadowed_lights(steps.facts)):
+        for layer, light in enumerate(self.shadowed(steps.facts)):
             steps.fullscreen(
                 "map_visibility.frag",
                 out={"visibility": self.visibility.layer(layer)},

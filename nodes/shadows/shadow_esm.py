@@ -13,16 +13,16 @@ class ShadowESM(FilteredMap):
     """Shadows from the mean of an exponential of depth (Annen, Mertens, Seidel, Flerackers and Kautz 2008).
 
     The step of the depth test is replaced by `exp(exponent · (z - t))`, at most 1, for something at depth z before a
-    receiver at t. It is a product of a part for each, so the map's part is filtered once a frame, in a single channel.
-    Light leaks in close behind a caster, up to about 3 / `exponent` of the range, and where the filter sees something
-    farther off than the receiver the shadow's edge is eaten away.
+    receiver at t. It is a product of a part for each, so the map's part is filtered once a frame, in a single channel;
+    what is kept is its logarithm (Salvi 2008), so that neither range nor exponent is limited. Light leaks in close
+    behind a caster, up to about 3 / `exponent` metres, and where the filter sees something farther off than the
+    receiver the shadow's edge is eaten away, the more the larger the exponent.
     """
 
     across: ClassVar[str] = "shadow_esm_across.frag"
+    up: ClassVar[str] = "shadow_esm_up.frag"
     texel: ClassVar[str] = "r32f"
 
     lookup = filtered_lookup("shadow_esm.glsl")
 
-    exponent: float = param(
-        default=80.0, min=1, max=80, doc="How steep, depth being 0 to 1 over the range of the light's view."
-    )
+    exponent: float = param(default=5.0, unit="1/m", min=0.01, max=10000, doc="How steep the step of the test is.")

@@ -13,7 +13,7 @@ params:
   threshold: {default: 1.0, min: 0, doc: "Luminance, after `gain`, that is taken off; 1 is the display's white."}
 ---*/
 #include <luminance.glsl>
-#include "halving.glsl"
+#include <halving.glsl>
 
 uniform sampler2D radiance;  // scene-linear
 #ifdef HAS_GAIN

@@ -1,6 +1,6 @@
 // Logarithms of luminance, averaged to half size: the top of the chain that ends in their mean.
 #include <luminance.glsl>
-#include "halving.glsl"
+#include <halving.glsl>
 
 uniform sampler2D radiance;  // scene-linear, alpha is coverage
 uniform float delta;         // keeps black finite

@@ -4,7 +4,11 @@
 //     vec3 tone_curve(vec3 color)
 //
 // from scene-linear after exposure, 0 to infinity, to display-linear; what leaves 0 to 1 is clipped.
+#if RADIANCE_SAMPLES > 1
+uniform sampler2DMS radiance;  // scene-linear
+#else
 uniform sampler2D radiance;  // scene-linear
+#endif
 #ifdef HAS_GAIN
 uniform sampler2D gain;      // one texel: a factor beside the stops
 #endif
@@ -13,15 +17,23 @@ uniform float white;         // luminance after exposure, for curves that have o
 out vec4 color;              // display-referred
 
 #include <CURVE>
-
-vec3 srgb(vec3 c) {
-    return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
-}
+#include <srgb.glsl>
+#if DITHER
+#include <noise.glsl>
+#endif
 
 void main() {
-    vec3 scene = max(texelFetch(radiance, ivec2(gl_FragCoord.xy), 0).rgb, 0.0) * exp2(exposure);
+    float scale = exp2(exposure);
 #ifdef HAS_GAIN
-    scene *= texelFetch(gain, ivec2(0), 0).r;
+    scale *= texelFetch(gain, ivec2(0), 0).r;
 #endif
-    color = vec4(srgb(clamp(tone_curve(min(scene, 1e9)), 0.0, 1.0)), 1.0);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < RADIANCE_SAMPLES; ++i) {
+        vec3 scene = max(texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb, 0.0) * scale;
+        sum += clamp(tone_curve(min(scene, 1e9)), 0.0, 1.0);
+    }
+    color = vec4(srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
+#if DITHER
+    color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // whole steps stay so
+#endif
 }

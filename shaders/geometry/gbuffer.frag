@@ -3,7 +3,7 @@
 #include <fragment_surface.glsl>
 
 #ifdef WRITES_ALBEDO
-out vec4 albedo;  // base colour; 1
+out vec4 albedo;  // root of the base colour; 1
 #endif
 #ifdef WRITES_NORMAL
 out vec4 normal;  // for shading, world space; 0
@@ -29,11 +29,15 @@ out vec4 phong_specular;
 #ifdef WRITES_PHONG_AMBIENT
 out vec4 phong_ambient;
 #endif
+#ifdef WRITES_VELOCITY
+#include <moved.glsl>
+out vec2 velocity;
+#endif
 
 void main() {
     Surface s = surface_here(PASS_VIEW);
 #ifdef WRITES_ALBEDO
-    albedo = vec4(s.base_color, 1.0);
+    albedo = vec4(sqrt(s.base_color), 1.0);
 #endif
 #ifdef WRITES_NORMAL
     normal = vec4(s.normal, 0.0);
@@ -49,6 +53,9 @@ void main() {
 #endif
 #ifdef WRITES_GRAIN
     grain = vec4(s.tangent, s.anisotropy);
+#endif
+#ifdef WRITES_VELOCITY
+    velocity = moved();
 #endif
     empirical_reflectance(s, materials[MATERIAL_INDEX(v_material)]);
 #ifdef WRITES_PHONG_DIFFUSE

@@ -3,7 +3,7 @@
 #include <texture_coordinates.glsl>
 
 #ifdef HAS_VERTEX_COLOR
-in vec4 v_color;
+centroid in vec4 v_color;
 #endif
 #ifdef HAS_BASE_COLOR_TEXTURE
 uniform sampler2D base_color_texture;

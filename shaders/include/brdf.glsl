@@ -7,6 +7,13 @@ float distribution_ggx(float n_h, float alpha) {
     return a2 / (PI * d * d);
 }
 
+// The same for unit vectors: their cross product keeps the digits that 1 - (N.H)^2 loses near a smooth surface's peak.
+float distribution_ggx(vec3 n, vec3 h, float alpha) {
+    vec3 sine = cross(n, h);
+    float n_h = max(dot(n, h), 0.0), a = n_h * alpha, d = dot(sine, sine) + a * a;
+    return alpha * alpha / (PI * d * d);
+}
+
 // Masking and shadowing over 4 N.L N.V.
 float visibility_smith(float n_l, float n_v, float alpha) {
     float a2 = alpha * alpha;

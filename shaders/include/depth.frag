@@ -1,11 +1,20 @@
 // Depth alone; fragments that an alpha mask cuts away are dropped.
 #ifdef ALPHA_MASK
+#include <alpha_mask.glsl>
 #include <base_color.glsl>
 flat in int v_material;
 #endif
 
+#ifdef WRITES_VELOCITY
+#include <moved.glsl>
+out vec2 velocity;
+#endif
+
 void main() {
 #ifdef ALPHA_MASK
-    if (base_color_at(v_material).a < materials[MATERIAL_INDEX(v_material)].emissive.a) discard;
+    cut_by_mask(base_color_at(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
+#endif
+#ifdef WRITES_VELOCITY
+    velocity = moved();
 #endif
 }

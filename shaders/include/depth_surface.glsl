@@ -1,19 +1,37 @@
-// Positions and geometric normals from a depth texture, by way of the view it was drawn with.
+// Positions and geometric normals from a depth texture, by way of the view it was drawn with: of one sample of a texel,
+// by its number, or in the middle of all.
+#if DEPTH_SAMPLES > 1
+uniform sampler2DMS depth;
+const int TEXEL_CENTER = -1;
+#else
 uniform sampler2D depth;
+const int TEXEL_CENTER = 0;
+#endif
 
-vec3 position_at(ivec2 texel, out float d) {
+vec3 position_at(ivec2 texel, int number, out float d) {
+    vec2 place = vec2(0.5);
+#if DEPTH_SAMPLES > 1
+    if (number == TEXEL_CENTER) {  // of a plane the mean of depths is the depth at the mean of places: the middle
+        d = 0.0;
+        for (int i = 0; i < DEPTH_SAMPLES; ++i) d += texelFetch(depth, texel, i).r / float(DEPTH_SAMPLES);
+    } else {
+        place = DEPTH_SAMPLE_POSITIONS[number];
+        d = texelFetch(depth, texel, number).r;
+    }
+#else
     d = texelFetch(depth, texel, 0).r;
-    return world_position(depth_views[0], (vec2(texel) + 0.5) * depth_views[0].viewport.zw, d);
+#endif
+    return world_position(depth_views[0], (vec2(texel) + place) * depth_views[0].viewport.zw, d);
 }
 
 // The step from the point to its neighbours along one axis, on the side where depth is closer to a straight line.
-vec3 along(ivec2 texel, ivec2 axis, vec3 here, float d) {
-    ivec2 last = textureSize(depth, 0) - 1;
+vec3 along(ivec2 texel, int number, ivec2 axis, vec3 here, float d) {
+    ivec2 last = ivec2(depth_views[0].viewport.xy) - 1;
     float before, after, before2, after2;
-    vec3 left = position_at(max(texel - axis, ivec2(0)), before);
-    vec3 right = position_at(min(texel + axis, last), after);
-    before2 = texelFetch(depth, max(texel - 2 * axis, ivec2(0)), 0).r;
-    after2 = texelFetch(depth, min(texel + 2 * axis, last), 0).r;
+    vec3 left = position_at(max(texel - axis, ivec2(0)), number, before);
+    vec3 right = position_at(min(texel + axis, last), number, after);
+    before2 = texelFetch(depth, max(texel - 2 * axis, ivec2(0)), number).r;
+    after2 = texelFetch(depth, min(texel + 2 * axis, last), number).r;
     bool at_left = any(lessThan(texel - axis, ivec2(0)));
     bool at_right = any(greaterThan(texel + axis, last));
     bool use_left = !at_left && (at_right || abs(2.0 * before - before2 - d) < abs(2.0 * after - after2 - d));
@@ -21,7 +39,9 @@ vec3 along(ivec2 texel, ivec2 axis, vec3 here, float d) {
 }
 
 // Unit normal of the surface at a texel, towards the viewer: of each pair of neighbours the one on the same surface.
-vec3 geometric_normal_at(ivec2 texel, vec3 position, float d) {
-    vec3 crossed = cross(along(texel, ivec2(1, 0), position, d), along(texel, ivec2(0, 1), position, d));
+vec3 geometric_normal_at(ivec2 texel, int number, vec3 position, float d) {
+    if (number == TEXEL_CENTER) position = position_at(texel, number = 0, d);
+    vec3 crossed =
+        cross(along(texel, number, ivec2(1, 0), position, d), along(texel, number, ivec2(0, 1), position, d));
     return crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
 }

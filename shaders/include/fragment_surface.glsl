@@ -1,16 +1,20 @@
 // The surface under a fragment of the scene's geometry: varyings, material factors, textures.
+#include <alpha_mask.glsl>
 #include <base_color.glsl>
 #include <math.glsl>
 #include <surface.glsl>
 
 in vec3 v_position;
-in vec3 v_normal;
+#if PASS_SAMPLES > 1
+centroid in vec4 v_place;  // v_position and 1, but on the surface
+#endif
+centroid in vec3 v_normal;
 flat in int v_material;
 
 #if defined(HAS_NORMAL_TEXTURE) || defined(NEEDS_GRAIN)
 #define NEEDS_TANGENT
 #ifdef HAS_TANGENT
-in vec4 v_tangent;
+centroid in vec4 v_tangent;
 #endif
 #endif
 #ifdef HAS_METALLIC_ROUGHNESS_TEXTURE
@@ -70,8 +74,12 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
 Surface surface_here(View view) {
     MaterialData m = materials[MATERIAL_INDEX(v_material)];
     Surface s;
+#if PASS_SAMPLES > 1
+    s.position = v_place.xyz / v_place.w;  // llvmpipe divides by the w of the pixel's middle: the 1 shows it
+#else
     s.position = v_position;
-    s.to_viewer = to_viewer(view, v_position);
+#endif
+    s.to_viewer = to_viewer(view, s.position);
     // Derivatives of the window's axes, right then up, so that it looks at the viewer.
     vec3 crossed = cross(dFdx(v_position), dFdy(v_position));
     s.geometric_normal = crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
@@ -143,7 +151,7 @@ Surface surface_here(View view) {
 #endif
     derive_reflectance(s, m, specular);
 #ifdef ALPHA_MASK
-    if (s.alpha < m.emissive.a) discard;
+    cut_by_mask(s.alpha, m.emissive.a);
 #endif
 #ifndef ALPHA_BLEND
     s.alpha = 1.0;

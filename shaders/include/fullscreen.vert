@@ -1,4 +1,4 @@
-// One triangle over the whole target.
+// One triangle over the whole target, at the far plane.
 out vec2 v_uv;  // 0 to 1 over the target, bottom left first
 
 void main() {

@@ -1,13 +1,27 @@
-// A surface under all lights. `shadow()` is the framework's.
+// A surface under all lights. `shadow()` is the framework's. With WRITES_LIT_SHARE it is known afterwards how much of
+// what could light the surface does.
 #include <lights.glsl>
+#include <luminance.glsl>
 #include <radiance.glsl>
+
+#ifdef WRITES_LIT_SHARE
+float could_reach = 0.0, does_reach = 0.0;  // irradiance without shadows and with them
+#endif
 
 // Light of one of them reflected to the viewer, by the scene's index.
 Reflected reflected_light(Surface s, int light) {
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
     vec3 to_light;
     vec3 irradiance = irradiance_from(lights[light], s.position, to_light);
-    if (dot(s.normal, to_light) > 0.0) irradiance *= shadow(light, s.position, s.geometric_normal);
+    if (dot(s.normal, to_light) > 0.0) {
+        float open = shadow(light, s.position, s.geometric_normal);
+#ifdef WRITES_LIT_SHARE
+        float reaching = luminance_of(irradiance) * dot(s.normal, to_light);
+        could_reach += reaching;
+        does_reach += reaching * open;
+#endif
+        irradiance *= open;
+    }
     Reflected one = reflected(s, to_light);
     return Reflected(one.diffuse * irradiance, one.specular * irradiance);
 #else

@@ -1,16 +1,20 @@
 // Radiance of a surface: its terms put together.
-#include <shading.glsl>
+#include <around.glsl>
 
 #if defined(UNLIT) || defined(NEEDS_NOTHING)
 #define NO_LIGHTS
 #endif
 
-uniform vec3 ambient;
 #ifdef HAS_OCCLUSION
 uniform sampler2D occlusion;
 #endif
 
 const float LARGEST = 65504.0;  // of half floats: what is brighter would be stored as infinity
+
+// The part that is the same seen from all sides, which is what lights other surfaces.
+Reflected without_specular(Reflected light) {
+    return Reflected(light.diffuse, vec3(0.0));
+}
 
 // The wanted terms of reflected light.
 vec3 terms_of(Reflected light) {
@@ -33,8 +37,9 @@ vec3 unlit_radiance(Surface s) {
 #endif
 }
 
-// Radiance towards the viewer: the wanted terms. Ambient light is what the surface and the picture leave open.
-vec3 radiance_of(Surface s, Reflected light) {
+// Radiance towards the viewer: the wanted terms of what lights and what all around reflect, of the latter what surface
+// and picture leave open.
+vec3 radiance_of(Surface s, Reflected light, Reflected around) {
 #ifdef NO_LIGHTS
     return unlit_radiance(s);
 #else
@@ -46,7 +51,11 @@ vec3 radiance_of(Surface s, Reflected light) {
 #ifdef HAS_OCCLUSION
     s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
 #endif
-    sum += ambient * s.ambient * s.occlusion;
+#ifdef MIRRORS_ENVIRONMENT
+    sum += around.diffuse * s.diffuse * s.occlusion + around.specular * specular_open(s, s.occlusion);
+#else
+    sum += around.diffuse * s.ambient * s.occlusion;
+#endif
 #endif
     return min(sum + terms_of(light), LARGEST);
 #endif

@@ -1,5 +1,8 @@
 // What a shading model knows of a point on a surface, whether it comes from geometry or from a G-buffer. NEEDS_PHONG
-// and NEEDS_GRAIN are defined where the model says so.
+// and NEEDS_GRAIN are defined where the model says so; with NEEDS_GRAIN_WHERE_ANY the second where a material has one.
+#if defined(NEEDS_GRAIN_WHERE_ANY) && (defined(ANISOTROPIC) || defined(HAS_GRAIN)) && !defined(NEEDS_GRAIN)
+#define NEEDS_GRAIN
+#endif
 #ifdef MATERIAL_COUNT
 #include <materials.glsl>
 #endif

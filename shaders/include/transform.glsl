@@ -5,6 +5,14 @@ in vec3 in_position;
 in vec4 in_object0;  // rows of the affine object-to-world matrix, per instance
 in vec4 in_object1;
 in vec4 in_object2;
+#ifdef WRITES_VELOCITY
+#include <previous_pass_view.glsl>
+in vec4 in_previous0;  // the same in the frame before
+in vec4 in_previous1;
+in vec4 in_previous2;
+centroid out vec4 v_now;  // where a point is and was, in clip space
+centroid out vec4 v_before;
+#endif
 
 invariant gl_Position;
 
@@ -38,4 +46,14 @@ vec3 normal_to_world(vec3 n) {
 
 vec4 world_to_clip(vec3 position) {
     return PASS_VIEW.view_projection * vec4(position, 1.0);
+}
+
+// What a fragment needs to know how far its point has moved; `velocity.glsl` says that.
+void pass_motion_on() {
+#ifdef WRITES_VELOCITY
+    vec4 q = vec4(in_position, 1.0);
+    vec3 before = vec3(dot(in_previous0, q), dot(in_previous1, q), dot(in_previous2, q));
+    v_now = world_to_clip(object_to_world(in_position));
+    v_before = PREVIOUS_PASS_VIEW.view_projection * vec4(before, 1.0);
+#endif
 }

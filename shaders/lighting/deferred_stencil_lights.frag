@@ -4,11 +4,21 @@
 
 uniform int light;  // the scene's index
 out vec4 radiance;
+#ifdef WRITES_DIFFUSE
+out vec4 diffuse;  // the same without its specular part
+#endif
 
 void main() {
     Surface s;
     radiance = vec4(0.0);  // no discard: the stencil must be wiped here too
-    if (surface_at(ivec2(gl_FragCoord.xy), s) && s.lit > 0.0) {
-        radiance.rgb = min(terms_of(reflected_light(s, light)), LARGEST);
+#ifdef WRITES_DIFFUSE
+    diffuse = radiance;
+#endif
+    if (surface_at(ivec2(gl_FragCoord.xy), HERE, s) && s.lit > 0.0) {
+        Reflected one = reflected_light(s, light);
+        radiance.rgb = min(terms_of(one), LARGEST);
+#ifdef WRITES_DIFFUSE
+        diffuse.rgb = min(terms_of(without_specular(one)), LARGEST);
+#endif
     }
 }

@@ -6,6 +6,9 @@
 #include "vertex_light_varyings.glsl"
 
 out vec4 radiance;  // scene-linear, premultiplied; alpha is coverage
+#ifdef WRITES_DIFFUSE
+out vec4 diffuse;  // the same without its specular part
+#endif
 
 void main() {
     Surface s = surface_here(PASS_VIEW);
@@ -18,5 +21,13 @@ void main() {
     }
 #endif
     light.diffuse *= s.diffuse;
-    radiance = vec4(radiance_of(s, light) * s.alpha, s.alpha);
+#ifdef HAS_ENVIRONMENT
+    Reflected around = Reflected(v_around_diffuse, v_around_specular);
+#else
+    Reflected around = light_around(s);
+#endif
+    radiance = vec4(radiance_of(s, light, around) * s.alpha, s.alpha);
+#ifdef WRITES_DIFFUSE
+    diffuse = vec4(radiance_of(s, without_specular(light), without_specular(around)) * s.alpha, s.alpha);
+#endif
 }

@@ -4,8 +4,15 @@
 #include <lighting.glsl>
 
 out vec4 radiance;  // scene-linear, premultiplied; alpha is coverage
+#ifdef WRITES_DIFFUSE
+out vec4 diffuse;  // the same without its specular part
+#endif
 
 void main() {
     Surface s = surface_here(PASS_VIEW);
-    radiance = vec4(radiance_of(s, reflected_lights(s)) * s.alpha, s.alpha);
+    Reflected light = reflected_lights(s), around = light_around(s);
+    radiance = vec4(radiance_of(s, light, around) * s.alpha, s.alpha);
+#ifdef WRITES_DIFFUSE
+    diffuse = vec4(radiance_of(s, without_specular(light), without_specular(around)) * s.alpha, s.alpha);
+#endif
 }

@@ -7,28 +7,32 @@ layout(triangle_strip, max_vertices = 3) out;
 #include "vertex_light_varyings.glsl"
 
 in vec3 g_position[];
-in vec3 g_normal[];
+#if PASS_SAMPLES > 1
+centroid in vec4 g_place[];
+centroid out vec4 v_place;
+#endif
+centroid in vec3 g_normal[];
 flat in int g_material[];
 flat in int g_object[];
 out vec3 v_position;
-out vec3 v_normal;
+centroid out vec3 v_normal;
 flat out int v_material;
 flat out int v_object;
 #ifdef HAS_UV0
-in vec2 g_uv0[];
-out vec2 v_uv0;
+centroid in vec2 g_uv0[];
+centroid out vec2 v_uv0;
 #endif
 #ifdef HAS_UV1
-in vec2 g_uv1[];
-out vec2 v_uv1;
+centroid in vec2 g_uv1[];
+centroid out vec2 v_uv1;
 #endif
 #ifdef HAS_TANGENT
-in vec4 g_tangent[];
-out vec4 v_tangent;
+centroid in vec4 g_tangent[];
+centroid out vec4 v_tangent;
 #endif
 #ifdef HAS_VERTEX_COLOR
-in vec4 g_color[];
-out vec4 v_color;
+centroid in vec4 g_color[];
+centroid out vec4 v_color;
 #endif
 
 void main() {
@@ -40,6 +44,10 @@ void main() {
     for (int i = 0; i < 3; ++i) {
         v_diffuse = light.rest.diffuse;
         v_specular = light.rest.specular;
+#ifdef HAS_ENVIRONMENT
+        v_around_diffuse = light.around.diffuse;
+        v_around_specular = light.around.specular;
+#endif
 #if SHADOW_LIGHT_COUNT > 0
         for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
             v_shadowed_diffuse[k] = light.shadowed[k].diffuse;
@@ -47,6 +55,9 @@ void main() {
         }
 #endif
         v_position = g_position[i];
+#if PASS_SAMPLES > 1
+        v_place = g_place[i];
+#endif
         v_normal = g_normal[i];
         v_material = g_material[i];
         v_object = g_object[i];

@@ -9,6 +9,10 @@ void main() {
     VertexLight light = vertex_light(v_material, v_position, normalize(v_normal));
     v_diffuse = light.rest.diffuse;
     v_specular = light.rest.specular;
+#ifdef HAS_ENVIRONMENT
+    v_around_diffuse = light.around.diffuse;
+    v_around_specular = light.around.specular;
+#endif
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
         v_shadowed_diffuse[k] = light.shadowed[k].diffuse;

@@ -11,9 +11,9 @@ float reach(Light l) {
     if (l.color.w > 0.0) return 1.0 / l.color.w;
     float farthest = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
-        vec4 p = vec4(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1, 1.0) * 2.0 - vec4(1.0, 1.0, 1.0, 1.0);
-        p = depth_views[0].inverse_view_projection * p;
-        // A far plane at infinity: beyond what float32 depth tells apart.
+        vec2 side = vec2(corner & 1, (corner >> 1) & 1) * 2.0 - 1.0;
+        vec4 p = depth_views[0].inverse_view_projection * vec4(side, float(corner >> 2), 1.0);
+        // A far plane at infinity: farther than anybody looks.
         vec3 place = abs(p.w) > 1e-7 ? p.xyz / p.w : depth_views[0].eye.xyz + normalize(p.xyz) * 1e7;
         farthest = max(farthest, distance(place, l.position.xyz));
     }

@@ -3,9 +3,10 @@
 #include <pass_view.glsl>
 #include <lights.glsl>
 #include <math.glsl>
-#include <shading.glsl>
+#include <around.glsl>
 
 struct VertexLight {
+    Reflected around;
     Reflected rest;  // of lights without shadows
 #if SHADOW_LIGHT_COUNT > 0
     Reflected shadowed[SHADOW_LIGHT_COUNT];
@@ -33,6 +34,7 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     s.diffuse = vec3(1.0);
 
     VertexLight sum;
+    sum.around = light_around(s);
     sum.rest = Reflected(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0
 #if SHADOW_LIGHT_COUNT > 0

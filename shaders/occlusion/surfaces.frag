@@ -9,7 +9,7 @@ void main() {
     ivec2 texel = texel_for(ivec2(gl_FragCoord.xy), reduced, textureSize(depth, 0));
     float d = texelFetch(depth, texel, 0).r;
     surfaces = vec4(0.0);
-    if (d == 1.0) return;
+    if (is_nothing(d)) return;
     vec3 facing = mat3(depth_views[0].view) * texelFetch(normal, texel, 0).xyz;
     surfaces = vec4(normalize(facing), linear_depth(depth_views[0], d));
 }

@@ -35,10 +35,15 @@ vec2 window_place(View v, vec3 position) {
     return clip.xy / clip.w * 0.5 + 0.5;
 }
 
-// Two float32 steps of window depth as metres along the view axis.
+// Unit vector from a view-space position towards the eye.
+vec3 to_eye(View v, vec3 position) {
+    return v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, 1.0) : -normalize(position);
+}
+
+// Two float32 steps of window depth as metres along the view axis: a share of the distance, or of the range where the
+// view is orthographic.
 float depth_error(View v, float distance) {
-    float slope = v.projection[2][3] == 0.0 ? v.range.y - v.range.x : distance * distance / v.range.x;
-    return slope * 1.2e-7;
+    return 2.4e-7 * (v.projection[2][3] == 0.0 ? v.range.y - v.range.x : distance);
 }
 
 // Whether a point at `offset` from a surface stands out from its tangent plane, by more than depth can be wrong.

@@ -6,8 +6,8 @@ out vec4 visibility;
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     float d;
-    vec3 position = position_at(texel, d);
+    vec3 position = position_at(texel, TEXEL_CENTER, d);
     visibility = vec4(1.0);
-    if (d == 1.0) return;  // nothing is there
-    visibility = vec4(shadow(LIGHT, position, geometric_normal_at(texel, position, d)));
+    if (is_nothing(d)) return;
+    visibility = vec4(shadow(LIGHT, position, geometric_normal_at(texel, TEXEL_CENTER, position, d)));
 }

@@ -1,23 +1,32 @@
-// Exponentials of the depth z in one layer of a shadow map, averaged along rows, and the share of texels where
-// something is.
-#include "range_fraction.glsl"
+// The logarithm of the mean of exponentials of depth along rows of one layer of a shadow map, and the share of texels
+// where something is. Sums of exponentials overflow; their logarithms, taken from the largest on, do not.
+#include "view_depth.glsl"
 
 uniform sampler2D shadow_map;
-uniform int radius;  // texels
-uniform float exponent;
+uniform int radius;      // texels
+uniform float exponent;  // 1/m
 out float filtered;
 out float covered;
+
+const float NOTHING = -1e30;  // the logarithm of no light
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     int last = textureSize(shadow_map, 0).x - 1;
-    vec2 sum = vec2(0.0);
+    View view = shadow_map_views[LAYER];
+    float most = NOTHING;
+    float sum = 0.0;  // of exponentials, over exp(most)
+    covered = 0.0;
     for (int i = -radius; i <= radius; ++i) {
-        float depth = texelFetch(shadow_map, ivec2(clamp(texel.x + i, 0, last), texel.y), 0).r;
-        if (depth == 1.0) continue;  // nothing is there
-        sum += vec2(exp(exponent * range_fraction(shadow_map_views[LAYER], depth)), 1.0);
+        ivec2 other = ivec2(clamp(texel.x + i, 0, last), texel.y);
+        float depth = texelFetch(shadow_map, other, 0).r;
+        if (is_nothing(depth)) continue;
+        float here = exponent * view_depth(view, vec3((vec2(other) + 0.5) * view.viewport.zw, depth));
+        sum = here > most ? sum * exp(most - here) + 1.0 : sum + exp(here - most);
+        most = max(most, here);
+        covered += 1.0;
     }
-    sum /= float(2 * radius + 1);
-    filtered = sum.x;
-    covered = sum.y;
+    float taps = float(2 * radius + 1);
+    filtered = sum > 0.0 ? most + log(sum / taps) : NOTHING;
+    covered /= taps;
 }

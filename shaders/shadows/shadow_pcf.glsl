@@ -79,14 +79,14 @@ float filtered_tests(int layer, vec3 place) {
 #endif
 
 #ifdef HAS_EDGES
-uniform sampler2DArray edges;  // the least and the largest depth a kernel may meet that is centred in a tile
+uniform sampler2DArray edges;  // the nearest and the farthest depth a kernel may meet that is centred in a tile
 
 float map_visibility(int layer, vec3 place) {
     vec2 tiles = vec2(textureSize(edges, 0).xy);
     ivec2 tile = ivec2(min(place.xy * tiles, tiles - 1.0));
     vec2 range = texelFetch(edges, ivec3(tile, layer), 0).rg;
-    if (place.z <= range.x) return 1.0;
-    if (place.z > range.y) return 0.0;
+    if (!nearer(range.x, place.z)) return 1.0;
+    if (nearer(range.y, place.z)) return 0.0;
     return filtered_tests(layer, place);
 }
 #else

@@ -1,15 +1,10 @@
 // Variance shadow maps (W. Donnelly, A. Lauritzen, "Variance Shadow Maps", 2006).
+#include "filtered_map.glsl"
 #include "range_fraction.glsl"
 
 uniform sampler2DArray filtered;  // means of z and z² over the filter, 0 where nothing is
-uniform sampler2DArray covered;   // share of the filter where something is
 uniform float min_variance;
 uniform float light_bleeding;
-
-#define MAP_HALF_WIDTH 1.0  // the filter's width needs no offset: a slope has a variance
-#define MAP_VIEWS filtered_views
-#define MAP_LIGHTS filtered_lights
-#define MAP_LAYERS FILTERED_LAYERS
 
 // The most that can lie behind t of something with this mean and mean square, less what counts as bleeding.
 float share_behind(vec2 moments, float t) {
@@ -21,7 +16,7 @@ float share_behind(vec2 moments, float t) {
 }
 
 float map_visibility(int layer, vec3 place) {
-    float t = range_fraction(MAP_VIEWS[layer], place.z);
+    float t = range_fraction(MAP_VIEWS[layer], place);
     vec3 at = vec3(place.xy, float(layer));
     // Where nothing is drawn lies the receiver itself.
     vec2 empty = (1.0 - textureLod(covered, at, 0.0).r) * vec2(t, t * t);

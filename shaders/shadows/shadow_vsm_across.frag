@@ -11,10 +11,12 @@ void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     int last = textureSize(shadow_map, 0).x - 1;
     vec3 sum = vec3(0.0);
+    View view = shadow_map_views[LAYER];
     for (int i = -radius; i <= radius; ++i) {
-        float depth = texelFetch(shadow_map, ivec2(clamp(texel.x + i, 0, last), texel.y), 0).r;
-        if (depth == 1.0) continue;  // nothing is there
-        float z = range_fraction(shadow_map_views[LAYER], depth);
+        ivec2 other = ivec2(clamp(texel.x + i, 0, last), texel.y);
+        float depth = texelFetch(shadow_map, other, 0).r;
+        if (is_nothing(depth)) continue;
+        float z = range_fraction(view, vec3((vec2(other) + 0.5) * view.viewport.zw, depth));
         sum += vec3(z, z * z, 1.0);
     }
     sum /= float(2 * radius + 1);

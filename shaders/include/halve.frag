@@ -1,5 +1,5 @@
 // A level of a mip chain: the exact area mean of the level above.
-#include "halving.glsl"
+#include <halving.glsl>
 
 uniform sampler2D source;  // the level above
 out vec4 level;

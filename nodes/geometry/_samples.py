@@ -1,0 +1,15 @@
+"""How many samples a texel what draws geometry has."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from rendergraph.api import Facts
+
+Samples = Literal[1, 2, 4, 8, 16]
+
+
+def own_samples(node: Any, _facts: Facts) -> int:
+    """The node's parameter."""
+    count: int = node.samples
+    return count

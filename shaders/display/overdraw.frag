@@ -1,0 +1,15 @@
+// One for each fragment, added up by blending; what an alpha mask cuts away counts for nothing.
+#ifdef ALPHA_MASK
+#include <alpha_mask.glsl>
+#include <base_color.glsl>
+flat in int v_material;
+#endif
+
+out float count;
+
+void main() {
+#ifdef ALPHA_MASK
+    cut_by_mask(base_color_at(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
+#endif
+    count = 1.0;
+}

@@ -1,0 +1,21 @@
+// The environment as it is seen behind everything: laid under what the picture covers.
+#include <pass_view.glsl>
+
+uniform float backdrop_blur;
+in vec2 v_uv;
+out vec4 radiance;
+#ifdef WRITES_DIFFUSE
+out vec4 diffuse;
+#endif
+
+void main() {
+    View view = PASS_VIEW;
+    vec4 ahead = view.inverse_projection * vec4(v_uv * 2.0 - 1.0, 0.5, 1.0);
+    vec3 seen = view.eye.w > 0.0 ? ahead.xyz / ahead.w : vec3(0.0, 0.0, -1.0);
+    vec3 direction = normalize(mat3(view.inverse_view) * seen);
+    float pixel = max(max(length(dFdx(direction)), length(dFdy(direction))), 1e-6);
+    radiance = vec4(light_from(direction, backdrop_blur > 0.0 ? backdrop_blur : -pixel), 0.0);
+#ifdef WRITES_DIFFUSE
+    diffuse = radiance;
+#endif
+}

@@ -1,0 +1,2 @@
+// Nothing but what the fixed function does.
+void main() {}

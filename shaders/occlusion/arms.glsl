@@ -1,0 +1,46 @@
+// Arms: lines on the screen away from a pixel, along which it looks at surfaces from near to far. Each pixel turns and
+// stretches its arms in one of 16 ways, and any 4×4 pixels have them all: what they share is one pixel with 16 times as
+// many arms (the pattern of J. Jimenez et al., "Practical Real-Time Strategies for Accurate Indirect Occlusion", 2016).
+#include <math.glsl>
+#if ANIMATED
+#include <frame.glsl>
+#endif
+
+#ifndef STEPS
+#if ANIMATED  // other arms follow, but what lies between steps is never seen
+#define STEPS (SAMPLES < 16 ? 4 : 8)
+#else
+#define STEPS (SAMPLES < 32 ? 4 : 8)
+#endif
+#endif
+#define ARMS (SAMPLES / STEPS / 2 * 2)
+
+// Unit vector of a pixel's arm 0 of `arms` on the screen.
+vec2 first_arm(ivec2 texel, int arms) {
+    float turn = float((texel.x + texel.y & 3) << 2 | texel.x & 3) + 0.5;
+#if ANIMATED
+    turn = 16.0 * fract(turn / 16.0 + 0.618034 * float(frame_index & 1023));
+#endif
+    float angle = 2.0 * PI * turn / (16.0 * float(arms));
+    return vec2(cos(angle), sin(angle));
+}
+
+// How far the samples of a pixel's arm lie within their steps, 0 to 1.
+float stretch_of(ivec2 texel, int arm) {
+    float stretch = float((texel.y - texel.x & 3) << 2 | texel.y & 3) + 0.5;
+#if ANIMATED
+    stretch += 16.0 * 0.754878 * float(frame_index & 1023);
+#endif
+    return fract(stretch / 16.0 + 0.618034 * float(arm));
+}
+
+// The next arm counter-clockwise.
+vec2 turned(vec2 along, int arms) {
+    float angle = 2.0 * PI / float(arms);
+    return mat2(cos(angle), sin(angle), -sin(angle), cos(angle)) * along;
+}
+
+// What a length in metres at a point covers of the window, 0 to 1, along its axes; `w` is clip space's there.
+vec2 covered(View v, float length, float w) {
+    return 0.5 * length / w * vec2(v.projection[0][0], v.projection[1][1]);
+}

@@ -1,0 +1,71 @@
+// Ground-truth ambient occlusion (J. Jimenez et al., 2016): in each slice through the eye and the pixel the two
+// horizons, and of the light between them the integral in closed form.
+#include "surfaces.glsl"
+#include "arms.glsl"
+#include "slice.glsl"
+#include "quad.glsl"
+#include "value.glsl"
+uniform sampler2D surfaces;
+uniform ivec2 screen;
+uniform float radius;  // metres
+out Value unfiltered;
+
+// The highest that surfaces rise along an arm, or `lowest`, as a cosine to the eye.
+float horizon_along(
+    View v, ivec2 texel, vec2 middle, vec2 reach, vec3 position, vec4 here, float lowest, float stretch
+) {
+    ivec2 size = textureSize(surfaces, 0);
+    vec3 eye = to_eye(v, position);
+    float horizon = lowest;
+    for (int i = 0; i < STEPS; ++i) {
+        float out_to = (float(i) + stretch) / float(STEPS);
+        ivec2 there = ivec2(floor((middle + out_to * reach) * vec2(size)));
+        if (there != clamp(there, ivec2(0), size - 1) || there == texel) continue;
+        vec4 seen = texelFetch(surfaces, there, 0);
+        if (seen.w == 0.0) continue;
+        vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
+        float apart = length(offset);
+        if (apart > radius || !rises(v, offset, here.xyz, max(here.w, seen.w))) continue;
+        horizon = max(horizon, dot(offset, eye) / apart);
+    }
+    return clamp(horizon, -1.0, 1.0);
+}
+
+// Openness in w; in xyz, with FOUR, the direction of what is open.
+vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
+    vec2 reach = covered(v, radius, clip_w(v, here.w));
+    vec3 eye = to_eye(v, position);
+    vec2 along = first_arm(texel, ARMS);
+    vec3 open = vec3(0.0);
+    float blocked = 0.0;
+    float whole = 0.0;
+    for (int number = 0; number < ARMS / 2; ++number) {
+        Slice s = slice_along(along, eye, here.xyz);
+        float stretch = stretch_of(texel, number);
+        float low = sin(s.lean);
+        float after = acos(horizon_along(v, texel, middle, reach * along, position, here, -low, stretch));
+        float before = -acos(horizon_along(v, texel, middle, -reach * along, position, here, low, 1.0 - stretch));
+        blocked += s.share * (arc(s, acos(-low)) - arc(s, after) + arc(s, -acos(low)) - arc(s, before));
+#ifdef FOUR
+        open += s.share * arc_direction(s, before, after);
+#endif
+        whole += s.share * whole_arc(s);
+        along = turned(along, ARMS);
+    }
+    return vec4(open / whole, 1.0 - blocked / whole);
+}
+
+void main() {
+    View v = surfaces_views[0];
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec4 here = texelFetch(surfaces, texel, 0);
+    vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
+    vec3 position = view_position(v, middle, here.w);
+    vec4 found = here.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : open_at(v, texel, middle, position, here);
+    found = mean_of_quad(found, here, position, 0.1 * radius + depth_error(v, here.w));
+#ifdef FOUR
+    unfiltered = vec4(mat3(v.inverse_view) * found.xyz, found.w);
+#else
+    unfiltered = found.w;
+#endif
+}

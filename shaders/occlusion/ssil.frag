@@ -1,0 +1,108 @@
+// Occlusion and light by a visibility bitmask (O. Therrien, Y. Levesque and G. Gilet, "Screen Space Indirect Lighting
+// with Visibility Bitmask", 2023): each slice of the hemisphere has 32 sectors of equal weight, and a surface fills
+// those that lie between its front and its back. Light comes from the first to fill a sector.
+#include "surfaces.glsl"
+#include "arms.glsl"
+#include "slice.glsl"
+#include "quad.glsl"
+uniform sampler2D surfaces;
+uniform sampler2D diffuse;
+uniform ivec2 screen;
+uniform float radius;     // metres; farther away nothing occludes
+uniform float wider;      // light comes from this many times as far
+uniform float thickness;  // metres
+out vec4 unfiltered;
+
+// The share of a slice's light from below an angle, 0 to 1.
+float share_below(Slice s, float angle) {
+    angle = clamp(angle, s.lean - 0.5 * PI, s.lean + 0.5 * PI);
+    float below = arc(s, s.lean - 0.5 * PI) + sign(angle) * arc(s, angle);
+    return clamp(below / whole_arc(s), 0.0, 1.0);
+}
+
+// The sectors between two shares.
+uint sectors(float from, float to) {
+    int first = int(round(from * 32.0));
+    int count = int(round(to * 32.0)) - first;
+    return count < 32 ? bitfieldInsert(0u, 0xFFFFFFFFu, first, max(count, 0)) : 0xFFFFFFFFu;
+}
+
+// Where a surface, extended, is seen at another place of the window: an offset from the pixel, for one of its own. No
+// farther along it than the pixel is away.
+vec3 extended(View v, vec2 place, vec3 position, vec3 offset, vec3 normal) {
+    bool orthographic = v.projection[2][3] == 0.0;
+    vec3 start = orthographic ? view_position(v, place, 0.0) : vec3(0.0);
+    vec3 sight = orthographic ? vec3(0.0, 0.0, -1.0) : view_position(v, place, 1.0);
+    float slope = dot(normal, sight);
+    vec3 there = start + sight * (dot(normal, position + offset - start) / slope) - position;
+    vec3 along = there - offset;
+    return abs(slope) > 1e-4 && dot(along, along) < dot(offset, offset) ? there : offset;
+}
+
+// The angle of an offset to the eye.
+float angle_of(vec3 offset, vec3 eye) {
+    return acos(clamp(dot(offset, eye) * inversesqrt(max(dot(offset, offset), 1e-20)), -1.0, 1.0));
+}
+
+// Irradiance over pi in xyz, openness in w.
+vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
+    ivec2 size = textureSize(surfaces, 0);
+    float region = radius * wider;
+    vec2 reach = covered(v, region, clip_w(v, here.w));
+    vec3 eye = to_eye(v, position);
+    vec2 along = first_arm(texel, ARMS);
+    vec3 light = vec3(0.0);
+    float blocked = 0.0;
+    float whole = 0.0;
+    for (int number = 0; number < ARMS / 2; ++number) {
+        Slice s = slice_along(along, eye, here.xyz);
+        float weight = s.share * whole_arc(s) / 32.0;
+        float stretch = stretch_of(texel, number);
+        uint filled = 0u;    // by all in the region
+        uint occluded = 0u;  // by what is within the radius
+        for (int i = 0; i < 2 * STEPS; ++i) {
+            bool back = (i & 1) == 1;  // both arms outwards at once: what is near fills its sectors first
+            float u = (float(i >> 1) + (back ? 1.0 - stretch : stretch)) / float(STEPS);
+            vec2 way = back ? -along : along;
+            ivec2 there = ivec2(floor((middle + u * u * reach * way) * vec2(size)));
+            if (there != clamp(there, ivec2(0), size - 1) || there == texel) continue;
+            vec4 seen = texelFetch(surfaces, there, 0);
+            if (seen.w == 0.0) continue;
+            vec3 at = view_position(v, place_for(there, size, screen), seen.w);
+            vec3 offset = at - position;
+            float apart = length(offset);
+            if (apart > region || !rises(v, offset, here.xyz, max(here.w, seen.w))) continue;
+            // Each stands for the part of its surface half-way to the samples before and after it.
+            float inner = u - 0.5 / float(STEPS);
+            float outer = u + 0.5 / float(STEPS);
+            vec3 after = extended(v, middle + outer * outer * reach * way, position, offset, seen.xyz);
+            vec3 before = extended(v, middle + inner * abs(inner) * reach * way, position, offset, seen.xyz);
+            vec3 behind = offset - to_eye(v, at) * thickness;
+            float middling = angle_of(offset, eye);
+            float front = min(middling, angle_of(after, eye));
+            float rear = max(max(middling, angle_of(before, eye)), angle_of(behind, eye));
+            uint fills = back ? sectors(share_below(s, -rear), share_below(s, -front))
+                              : sectors(share_below(s, front), share_below(s, rear));
+            if (dot(seen.xyz, offset) < 0.0) {
+                vec3 sent = texelFetch(diffuse, texel_for(there, size, screen), 0).rgb;
+                light += weight * float(bitCount(fills & ~filled)) * sent;
+            }
+            filled |= fills;
+            if (apart <= radius) occluded |= fills;
+        }
+        blocked += weight * float(bitCount(occluded));
+        whole += 32.0 * weight;
+        along = turned(along, ARMS);
+    }
+    return vec4(light / whole, 1.0 - blocked / whole);
+}
+
+void main() {
+    View v = surfaces_views[0];
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec4 here = texelFetch(surfaces, texel, 0);
+    vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
+    vec3 position = view_position(v, middle, here.w);
+    vec4 found = here.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : gathered_at(v, texel, middle, position, here);
+    unfiltered = mean_of_quad(found, here, position, 0.1 * radius + depth_error(v, here.w));
+}

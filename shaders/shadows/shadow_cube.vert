@@ -1,0 +1,9 @@
+// Positions in the world, for a geometry shader that sees them from every view, and what an alpha mask needs.
+#include "layered_names.glsl"
+#include <mask_vertex.glsl>
+#include <transform.glsl>
+
+void main() {
+    pass_mask_on();
+    gl_Position = vec4(object_to_world(in_position), 1.0);
+}

@@ -1,0 +1,40 @@
+// Moment shadow maps (C. Peters, R. Klein, "Moment Shadow Mapping", 2015).
+#include "filtered_map.glsl"
+#include "range_fraction.glsl"
+
+uniform sampler2DArray filtered;  // means of z to z^4 over the filter, 0 where nothing is
+uniform float moment_bias;
+uniform float light_bleeding;
+
+// The least that can lie before t of something with these means: of all that has them, one thing at t and two elsewhere
+// has least there. The other two are the zeros of the polynomial that is orthogonal to those below it under the means.
+float share_before(vec4 b, float t) {
+    b = mix(b, vec4(0.5), moment_bias);
+    // Solve the matrix of means (1 b1 b2; b1 b2 b3; b2 b3 b4) for (1, t, t^2), by Cholesky's way.
+    float variance = b.y - b.x * b.x;
+    float skew = b.z - b.x * b.y;
+    float rest = (b.w - b.y * b.y) * variance - skew * skew;
+    vec3 c = vec3(1.0, t - b.x, t * t - b.y);
+    c.z = (c.z - skew / variance * c.y) * variance / rest;
+    c.y = (c.y - skew * c.z) / variance;
+    c.x -= b.x * c.y + b.y * c.z;
+    float middle = -0.5 * c.y / c.z;
+    float apart = sqrt(max(middle * middle - c.x / c.z, 0.0));
+    vec2 zeros = vec2(middle - apart, middle + apart);
+    if (t <= zeros.x) return 0.0;
+    if (t <= zeros.y) {  // only the first lies before t: its share
+        return (t * zeros.y - b.x * (t + zeros.y) + b.y) / ((zeros.y - zeros.x) * (t - zeros.x));
+    }
+    return 1.0 - (zeros.x * zeros.y - b.x * (zeros.x + zeros.y) + b.y) / ((t - zeros.x) * (t - zeros.y));
+}
+
+float map_visibility(int layer, vec3 place) {
+    float t = range_fraction(MAP_VIEWS[layer], place);
+    vec3 at = vec3(place.xy, float(layer));
+    float t2 = t * t;
+    // Where nothing is drawn lies the receiver itself.
+    vec4 b = textureLod(filtered, at, 0.0) + (1.0 - textureLod(covered, at, 0.0).r) * vec4(t, t2, t2 * t, t2 * t2);
+    return clamp(1.0 - share_before(b, t) / (1.0 - light_bleeding), 0.0, 1.0);
+}
+
+#include "map_shadow.glsl"

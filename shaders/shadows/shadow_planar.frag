@@ -1,0 +1,15 @@
+// Shadow on the receiver, but where an alpha mask cuts the caster away.
+#ifdef ALPHA_MASK
+#include <alpha_mask.glsl>
+#include <base_color.glsl>
+flat in int v_material;
+#endif
+
+out vec4 visibility;
+
+void main() {
+#ifdef ALPHA_MASK
+    cut_by_mask(base_color_at(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
+#endif
+    visibility = vec4(0.0);
+}
