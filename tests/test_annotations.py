@@ -57,8 +57,9 @@ BEYOND: list[tuple[Range, float, str | None]] = [
     (Range(0, 4), -1, "must be at least 0"),
     (Range(0, 4), 4.5, "must be at most 4"),
     (Range(0, above=True), 0, "must be above 0"),
-    (Range(), 10**400, None),
+    (Range(), 10**400, "must be from -3.4028235e+38 to 3.4028235e+38"),
     (Range(), float("nan"), "must be finite"),
+    (Range(), 1e39, "must be from -3.4028235e+38 to 3.4028235e+38"),
     (Range(high=4), float("-inf"), "must be finite"),
 ]
 

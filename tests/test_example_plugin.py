@@ -78,7 +78,7 @@ def test_everything_is_installed(source: Path, site: Path) -> None:
 
 @pytest.mark.slow
 def test_it_is_found_by_its_entry_points(site: Path) -> None:
-    done = python(site, "-m", "rendergraph.cli", "nodes", "--json")
+    done = python(site, "-m", "rendergraph", "nodes", "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     (outline,) = [node for node in told["nodes"] if node["name"] == "outline"]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import rendergraph as rg
 from rendergraph.api import Facts, LightFacts, Node, ObjectFacts, Output, Radiance, SceneError, Steps, casting_lights
-from rendergraph.scene.model import Mesh
-from rendergraph.scene.objects import is_closed, object_facts
+from rendergraph.scene.objects import object_facts
 
 LIGHTS = (
     LightFacts("fill", "directional", casts_shadow=False),
@@ -37,9 +36,10 @@ def test_lights_that_cast(wanted: Any, found: tuple[int, ...]) -> None:
     assert Facts((1, 1), LIGHTS).casting(wanted) == found == casting_lights(wanted, LIGHTS)
 
 
-def test_auto_takes_a_spot_light_where_no_directional_one_casts_and_nothing_else() -> None:
+def test_auto_takes_a_spot_light_where_no_directional_one_casts_then_a_point_light() -> None:
     assert casting_lights("auto", LIGHTS[:2]) == (1,)
-    assert casting_lights("auto", LIGHTS[3:]) == ()
+    assert casting_lights("auto", LIGHTS[3:]) == (0,)
+    assert casting_lights("auto", ()) == ()
 
 
 def test_a_light_that_is_not_there() -> None:
@@ -71,6 +71,12 @@ def test_record_is_told_of_the_scenes_objects(bench: Any) -> None:
     assert (ball.name, ball.blended, ball.double_sided, ball.casts_shadow) == ("ball", True, False, True)
     assert (box.name, box.triangles, box.casts_shadow) == ("box", 12, False)
     assert [one.closed for one in objects] == [False, True, True, True]
+    assert floor.gap == (
+        "object 'floor' is not closed: in its mesh 'plane' only one triangle has the edge from (-2, 0, -2) to (-2, 0, 2)"
+    )
+    assert box.gap == ""
+    assert [one.flat for one in objects] == [True, False, False, False]
+    assert [one.most_layers for one in objects] == [1, 1, 2, 1], "flat; convex, from outside; from both sides; convex"
     assert gone.hidden
     assert gone not in Facts((1, 1), objects=objects).drawn("all")
     assert all(draws.values())
@@ -91,18 +97,10 @@ def test_shipped_scenes_are_told_of() -> None:
     assert len({one.name for one in objects}) == len(objects)
 
 
-def test_a_mesh_is_closed_where_every_edge_has_two_sides() -> None:
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint32)
-
-    def mesh(indices: Any, positions: Any = corners) -> Mesh:
-        return Mesh("m", positions, indices, positions)
-
-    assert is_closed(mesh(faces))
-    apart = mesh(np.arange(12, dtype=np.uint32).reshape(4, 3), corners[faces.reshape(-1)])
-    assert is_closed(apart)  # welded by position
-    assert not is_closed(mesh(faces[:3]))
-    assert not is_closed(mesh(np.concatenate([faces, faces])))
-    assert not is_closed(mesh(np.concatenate([faces[:3], faces[3:, ::-1]])))
-    assert is_closed(mesh(np.concatenate([faces, np.array([[0, 1, 1]], np.uint32)])))
-    assert not is_closed(mesh(np.zeros((0, 3), np.uint32)))
+def test_what_is_not_convex_may_be_met_as_often_as_it_has_triangles(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(
+        "scene: 1\nobjects:\n  ring: {shape: torus}\n  can: {shape: cylinder}\n  hat: {shape: cone}\n"
+    )
+    ring, can, hat = object_facts(rg.load("forward", scene=tmp_path / "a.yaml").link().scene)
+    assert ring.most_layers == ring.triangles
+    assert (can.most_layers, hat.most_layers) == (1, 1)

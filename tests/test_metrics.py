@@ -75,10 +75,12 @@ def test_linear_pictures_are_measured_in_light() -> None:
 
 def test_broken_values_are_not_overlooked() -> None:
     picture = noise()
-    broken = picture.copy()
-    broken[3, 4] = math.nan
-    found, _ = metrics.measure(broken, picture, encoding="linear")
-    assert not found.rmse <= 1
+    for value in (math.nan, math.inf, -math.inf):
+        broken = picture.copy()
+        broken[3, 4] = value
+        for pair in ((broken, picture), (picture, broken), (broken, broken + 0)):
+            found, _ = metrics.measure(*pair, encoding="linear")
+            assert all(map(math.isnan, (found.rmse, found.psnr or 0, found.ssim, found.flip)))
 
 
 def test_small_pictures_have_a_similarity_too() -> None:

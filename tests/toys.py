@@ -107,7 +107,7 @@ class DepthPrepass(Node):
     """Depth before everything else."""
 
     view = Input(View, kind="view", optional=True, doc="Seen from.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
 
 class ForwardLighting(Node):
@@ -129,7 +129,7 @@ class Gbuffer(Node):
     view = Input(View, kind="view", optional=True, doc="Seen from.")
     albedo = Output(Albedo, format="rgba8", doc="Base colour.")
     normal = Output(Normal, doc="Normal.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
 
 class MsaaGbuffer(Node):
@@ -144,7 +144,7 @@ class Resolve(Node):
     """One sample of many."""
 
     source = Input(api.Any, samples="multi", doc="Multisampled.")
-    resolved = Output(like="source", doc="The mean.")
+    resolved = Output(like="source", samples=1, doc="The mean.")
 
 
 class DeferredLighting(Node):

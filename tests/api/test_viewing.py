@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -177,3 +178,64 @@ def test_visible_part_agrees_with_sampling() -> None:
         if len(seen):
             assert np.all(seen >= box[0] - 1e-6)
             assert np.all(seen <= box[1] + 1e-6)
+
+
+def test_bounds_of_balls_hold_them_and_no_more() -> None:
+    """Against points on the sphere, projected one by one: perspective, parallel, off-centre, endless."""
+    rng = np.random.default_rng(3)
+    around = viewing.unit(rng.normal(size=(8000, 3)))
+    view = viewing.view_along((0.2, -0.1, -1), eye=(0.5, 0.3, 4))
+    projections = (
+        (viewing.perspective(0.9, 1.5, 0.5, 40), 40.0),
+        (viewing.perspective(0.9, 1.5, 0.5, math.inf), math.inf),
+        (viewing.frustum(-0.1, 0.4, -0.3, 0.1, 0.5, 40), 40.0),
+        (viewing.orthographic(-3, 2, -2, 2, 0.5, 40), 40.0),
+    )
+    checked = 0
+    for (projection, far), center, radius in itertools.product(
+        projections, rng.uniform(-4, 3, (25, 3)), (0.2, 1.0, 2.5)
+    ):
+        made = ViewMatrices(view, projection, (300, 200), 0.5, far)
+        (x, y, width, height), (least, most) = viewing.sphere_bounds(made, center, radius)
+        clip = np.column_stack([center + radius * around, np.ones(len(around))]) @ (projection @ view).T
+        ahead = clip[:, 3] > 1e-6
+        ndc = clip[ahead, :3] / clip[ahead, 3:]
+        pixels, depth = (ndc[:, :2] + 1) / 2 * (300, 200), (1 - ndc[:, 2]) / 2
+        shown = np.all(np.abs(ndc[:, :2]) <= 1, axis=1) & (depth >= 0) & (depth <= 1)
+        if not ahead.all():
+            assert not shown.any() or (x, y, width, height) == (0, 0, 300, 200)
+            continue
+        if shown.any():
+            assert np.all((pixels[shown] >= (x, y)) & (pixels[shown] <= (x + width, y + height)))
+            assert np.all((depth[shown] >= least) & (depth[shown] <= most))
+        if width and shown.all():
+            checked += 1
+            assert np.abs(pixels.min(axis=0) - (x, y)).max() < 1.6
+            assert np.abs(pixels.max(axis=0) - (x + width, y + height)).max() < 1.6
+            assert least == pytest.approx(depth.min(), rel=1e-2)
+            assert most == pytest.approx(depth.max(), rel=1e-2)
+    assert checked > 20
+    behind = viewing.sphere_bounds(ViewMatrices(view, projections[0][0], (300, 200), 0.5, 40), (0.5, 0.3, 9), 1)
+    assert behind[0] == (0, 0, 0, 0)
+
+
+def test_corners_of_a_region() -> None:
+    """A box's own; and of a box that a frustum cuts those that its faces and edges, cut one by one, have."""
+    found = viewing.region_corners(viewing.box_planes(UNIT_BOX))
+    assert {tuple(corner) for corner in found} == {tuple(corner) for corner in viewing.box_corners(UNIT_BOX)}
+    made = camera((0.2, 0.1, 1.5), (0.3, 0, 0))
+    cut = viewing.region_corners(np.concatenate([viewing.box_planes(UNIT_BOX), viewing.frustum_planes(made)]))
+    expected = viewing.visible_part(made, UNIT_BOX)
+    for some, others in ((cut, expected), (expected, cut)):
+        apart = np.linalg.norm(some[:, np.newaxis] - others, axis=-1).min(axis=1)
+        assert apart.max() < 1e-6
+    assert len(viewing.region_corners(np.array([[0, 1.0, 0, 0], [0, -1, 0, -1], *viewing.box_planes(UNIT_BOX)]))) == 0
+
+
+def test_a_narrowed_view_holds_its_rectangle() -> None:
+    wide = viewing.cone_view((0, 0, 0), (0, 0, -1), 1.0, 0.1, 50.0, 100)
+    made = viewing.narrowed_view(wide, (-0.2, 0.1), (0.4, 0.3), 2.0, 10.0, margin=10)
+    matrix = made.projection @ made.view
+    sides = clip(matrix, [(x * 5, y * 5, -5.0) for x, y in ((-0.2, 0.1), (0.4, 0.3))])
+    np.testing.assert_allclose(sides[:, :2], [[-0.8, -0.8], [0.8, 0.8]], atol=1e-9)
+    np.testing.assert_allclose(clip(matrix, [(0, 0, -2.0), (0, 0, -10.0)])[:, 2], [-1, 1], atol=1e-9)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
+import subprocess
+import sys
 import textwrap
 import time
 from collections.abc import Callable
@@ -125,6 +129,13 @@ HOSTILE = {
     "children": (
         "import os, time\nif os.fork() == 0:\n    time.sleep(30)\nos._exit(4)\n",
         r"glow.py:4:1: RG450 .* status 4",
+    ),
+    "garbles": (
+        "import os, stat\nfor fd in range(3, 99):\n    try:\n"
+        "        if stat.S_ISFIFO(os.fstat(fd).st_mode):\n"
+        '            os.write(fd, b\'{"report": 5}\\n{"failed": [1], "exit_code": 3}\\n[\' + b\'[\' * 9999 + b\'\\n\\xff{"sta\')\n'
+        "    except OSError:\n        pass\nraise BaseException('over')\n",
+        r"glow.py:8:1: RG491 .* BaseException: over",
     ),
     "closes": ("import os\nos.closerange(3, 100)\nos._exit(0)\n", r"glow.py.* RG450 it ends the process"),
     "closes and sleeps": (
@@ -548,7 +559,7 @@ class Glow(Node):
 
     color = Output(Radiance, samples=lambda node, facts: node.samples, clear=0.0, doc="Colour.")
     four = Output(Any, format="r32ui", samples=4, clear=0, doc="Four samples.")
-    depth = Output(Depth, format="depth32f", samples=lambda node, facts: node.samples, clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", samples=lambda node, facts: node.samples, clear=0.0, doc="Depth.")
     samples: int = structural(default=4, min=1, max=16, doc="Samples a texel: more than some devices have.")
 
     def record(self, steps: Steps) -> None:
@@ -603,10 +614,37 @@ class Glow(base.ForwardLighting):
     """Forward lighting with samples."""
 
     radiance = Output(Radiance, clear=0.0, {of}
-    surface_depth = Output(Depth, format="depth32f", clear=1.0, {of}
+    diffuse = Output(Radiance, clear=0.0, {of}
+    surface_depth = Output(Depth, format="depth32f", clear=0.0, {of}
 '''
     (problem,) = check_node(written(tmp_path, text)).problems
     assert (problem.code, problem.severity) == ("RG425", "warning")
     assert problem.text.endswith("; tried without 'depth', which is inherited")
-    broken = check_node(written(tmp_path, text.replace("clear=1.0, samples=lambda node, facts: 4", "clear=1.0")))
+    one_of_them = text.replace("Radiance, clear=0.0, samples=lambda node, facts: 4", "Radiance, clear=0.0")
+    broken = check_node(written(tmp_path, one_of_them))
     assert any(problem.severity == "error" for problem in broken.problems)
+
+
+def test_a_hangup_ends_the_child_too_and_leaves_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "temporary").mkdir()
+    hanging = HEAD + "import os, time\nprint(os.getpid(), file=open('pid', 'w'), flush=True)\ntime.sleep(60)\n"
+    (tmp_path / "glow.py").write_text(hanging)
+    parent = subprocess.Popen(
+        [sys.executable, "-m", "rendergraph", "check-node", "glow.py", "--limit", "import-seconds=60"],
+        cwd=tmp_path,
+        env=os.environ | {"TMPDIR": str(tmp_path / "temporary")},
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
+    )
+    end = time.monotonic() + PATIENCE
+    pid = tmp_path / "pid"
+    while not (pid.exists() and pid.read_text().strip()) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert list((tmp_path / "temporary").iterdir())
+    parent.send_signal(signal.SIGHUP)
+    assert parent.communicate(timeout=PATIENCE)[1] == "terminated\n"
+    assert parent.returncode == 129
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text()), 0)
+    assert not list((tmp_path / "temporary").iterdir())

@@ -30,7 +30,7 @@ class Surfaces(Node):
 
     albedo = Output(Radiance, format="rgba8", doc="Colour.")
     normal = Output(Normal, format="rgba16f", doc="Normal.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
 
 class Occlude(Node):

@@ -68,7 +68,7 @@ def commands(scene: Path, folder: Path) -> dict[str, list[str]]:
     """What is run, by name; each writes a PNG of its name."""
     python = sys.executable
     size = f"{SIZE[0]}x{SIZE[1]}"
-    run = [python, "-m", "rendergraph.cli", "run", "forward", "--scene", str(scene), "--size", size]
+    run = [python, "-m", "rendergraph", "run", "forward", "--scene", str(scene), "--size", size]
     return {
         "by hand": [python, str(Path(__file__)), "--by-hand", str(folder / "by hand.png")],
         "rendergraph run": [*run, "-o", str(folder / "rendergraph run.png")],

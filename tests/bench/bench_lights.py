@@ -1,11 +1,13 @@
-"""Four ways to light a scene against 1, 8, 64 and 512 local lights: `python tests/bench/bench_lights.py`.
+"""Six ways to light a scene against 1, 8, 64 and 512 local lights: `python tests/bench/bench_lights.py`.
 
 A floor with spheres under point lights whose range shrinks with their number, so that about as many of them reach any
 point however many there are. Milliseconds are medians over frames of the process's CPU time, driver threads included,
 which is where a software rasteriser's frame happens; fragments are those that pass depth and stencil in the steps of
-`light` (a query of the device), and evaluations those times the lights each of them loops over.
+`light` (a query of the device), and evaluations those times the lights each of them loops over. With four samples a
+pixel the query counts samples: a shader that is run for each of them counts in full, one that is not a quarter.
 Beside them what the document's Table 1 predicts: L (V + F) for forward with a pass a light, V + L F' for deferred with
-volumes; the two that loop over all lights in one shader cost V + L F. V is counted in vertices, F in fragments.
+volumes; those that loop over all lights in one shader cost V + L F, and with four samples behind a G-buffer also L times the
+samples of pixels that are marked as edges. V is counted in vertices, F in fragments.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ import numpy as np
 from lights_plot import plot
 from measure import cpu_and_wall, figures, frame_loop, keep_memory, markdown, options, save
 
-SIZE = (480, 270)
+SIZE = (240, 135)
 COUNTS = (1, 8, 64, 512)
-PIPELINES = ("forward", "forward-multipass", "deferred", "deferred-stencil-lights")
+PIPELINES = ("forward", "forward-multipass", "deferred", "deferred-stencil-lights", "forward-msaa", "deferred-msaa")
+MOST_EDGES = 0.08
+"""Of the pixels, where several samples may draw another picture than one."""
 _SAMPLES_PASSED, _RESULT = 0x8914, 0x8866
 
 
@@ -64,7 +68,7 @@ def write_scene(folder: Path, lights: int) -> Path:
         x, z = (((i % side) + 0.5) / side - 0.5) * 18, ((i // side + 0.5) / side - 0.5) * 18
         r, g, b = rng.uniform(0.2, 1, 3)
         lines.append(
-            f"  l{i}: {{type: point, at: [{x:.3f}, {0.4 * reach:.3f}, {z:.3f}], range: {reach:.3f}, "
+            f"  l{i}: {{type: point, at: [{x:.3f}, {0.4 * reach:.3f}, {z:.3f}], range: {reach:.3f}, casts_shadow: false, "
             f"intensity: {0.7 * reach**2:.3f}, color: [{r:.2f}, {g:.2f}, {b:.2f}]}}"
         )
     lines.append("cameras: {main: {eye: [0, 9, 15], target: [0, 0, 1], fov_y_degrees: 50, near: 0.1, far: 60}}")
@@ -85,31 +89,40 @@ def shaded(session: Any, executable: Any) -> list[tuple[Any, int]]:
             value = ctypes.c_uint64()
             raw.glGetQueryObjectui64v(query, _RESULT, ctypes.byref(value))
             raw.delete("glDeleteQueries", query)
-            if compiled.step.node == "light" and any(write.use == "color" for write in compiled.step.writes):
-                found.append((compiled.step, value.value))
+            if compiled.step.node == "light" and any(write.name == "radiance" for write in compiled.step.writes):
+                step = compiled.step
+                together = step.samples if "PER_SAMPLE" not in dict(step.defines) else 1
+                found.append((step, value.value // together))
     return found
+
+
+def marked(steps: list[tuple[Any, int]]) -> int:
+    """Samples that are lit one by one."""
+    return sum(count for step, count in steps if step.label == "samples")
 
 
 def evaluations(pipeline: str, steps: list[tuple[Any, int]], lights: int, covered: int) -> int:
     """Fragments times the lights that their shader loops over; where nothing is, deferred's ends before its loop."""
-    if pipeline == "deferred":
-        return covered * lights
-    if pipeline == "forward":
+    if pipeline.startswith("deferred") and pipeline != "deferred-stencil-lights":
+        return (covered + marked(steps)) * lights
+    if pipeline.startswith("forward") and pipeline != "forward-multipass":
         return sum(count for _, count in steps) * lights
     return sum(count for step, count in steps if any(name == "light" for name, _ in step.uniforms))
 
 
-def predict(pipeline: str, lights: int, vertices: int, drawn: int, covered: int, local: int) -> float:
+def predict(pipeline: str, lights: int, vertices: int, drawn: int, covered: int, local: int, edges: int) -> float:
     """Table 1 for V vertices and L lights.
 
     F is what a technique shades: all that forward draws in its order (`drawn`), or what is seen (`covered`); `local` is
-    the sum of F', the fragments that each light reaches.
+    the sum of F', the fragments that each light reaches, `edges` the samples of pixels that are marked as edges.
     """
     return {
         "forward": vertices + lights * drawn,
         "forward-multipass": lights * (vertices + covered),
         "deferred": vertices + lights * covered,
         "deferred-stencil-lights": vertices + local,
+        "forward-msaa": vertices + lights * drawn,
+        "deferred-msaa": vertices + lights * (covered + edges),
     }[pipeline]
 
 
@@ -121,13 +134,14 @@ def bench(frames: int, folder: str | None) -> tuple[list[Cell], str]:
     with tempfile.TemporaryDirectory() as temporary, rg.Session() as session:
         for lights in COUNTS:
             scene = write_scene(Path(temporary), lights)
-            pictures, counted, times, vertices = {}, {}, {}, 0
+            pictures, counted, times, vertices, covered = {}, {}, {}, 0, 0
             for name in PIPELINES:
                 # Nothing else in the picture: no sun casts here, and the G-buffer's rounding stays out.
                 sets = ["gbuffer.precision=full"] if name.startswith("deferred") else []
                 made = rg.load(name, scene=scene, size=SIZE, sets=sets)
                 drawn = np.asarray(session.render(made, outputs=["radiance"])["radiance"])
-                pictures[name], covered = drawn[..., :3], int((drawn[..., 3] == 1).sum())
+                pictures[name] = drawn[..., :3]
+                covered = int((drawn[..., 3] == 1).sum()) if name == "forward" else covered
                 save(folder, **{f"lights_{lights}_{name}": pictures[name] ** (1 / 2.2)})
                 loop = frame_loop(session, made)
                 loop(1)
@@ -136,10 +150,11 @@ def bench(frames: int, folder: str | None) -> tuple[list[Cell], str]:
                 vertices = sum(
                     len(made.link().scene.meshes[entry.mesh].positions) for entry in made.link().scene.objects
                 )
+            edges = marked(counted["deferred-msaa"])
             local = evaluations("deferred-stencil-lights", counted["deferred-stencil-lights"], lights, covered)
             for name in PIPELINES:
                 off = np.abs(pictures[name] - pictures["forward"]).max(-1) > 0.01 * pictures["forward"].max()
-                if off.mean() > 1e-3:
+                if off.mean() > (MOST_EDGES if name.endswith("msaa") else 1e-3):
                     raise SystemExit(f"{name} draws another picture at {lights} lights")
                 fragments = sum(count for _, count in counted[name])
                 cells.append(
@@ -151,7 +166,7 @@ def bench(frames: int, folder: str | None) -> tuple[list[Cell], str]:
                         max(times[name]),
                         fragments,
                         evaluations(name, counted[name], lights, covered),
-                        predict(name, lights, vertices, sum(c for _, c in counted["forward"]), covered, local),
+                        predict(name, lights, vertices, sum(c for _, c in counted["forward"]), covered, local, edges),
                     )
                 )
         return cells, session.device.renderer

@@ -69,7 +69,7 @@ def framework(count: int, folder: Path, pictures: str | None) -> dict[str, float
         save(pictures, **{f"objects_{count}_framework": picture, f"objects_{count}_by_hand": by_hand.picture()})
         check_pictures(f"{count} objects", picture, by_hand.picture(), bound=4, share=0.002)
         with session.device.current():
-            runner = session.compile(pipeline).runner
+            runner = session.compile(pipeline, reuse=False).runner
             scene = pipeline.link().scene
             still = view_matrices(next(iter(scene.cameras.values())), SIZE)
             views = []

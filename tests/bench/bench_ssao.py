@@ -1,9 +1,9 @@
-"""Screen-space occlusion against 8 to 128 samples: `python tests/bench/bench_ssao.py`.
+"""Occlusion and light between surfaces against 8 to 128 samples: `python tests/bench/bench_ssao.py`.
 
-Both techniques over the same G-buffer, as the document's figure 28. Milliseconds are those of `ao`
-alone: a frame's CPU time, driver threads included, which is where a software rasteriser's frame happens, less that of
-the G-buffer, measured in turn with it; medians over the turns. `blur` is part of the hemispheres' time and `ms at half
-size` is with `scale` 0.5.
+All techniques over the same G-buffer, as the document's figures 28 (occlusion) and 30 (with light between surfaces).
+Milliseconds are those of `ao` or `gi` alone: a frame's CPU time, driver threads included, which is where a software
+rasteriser's frame happens, less that of the G-buffer and of the light that is gathered, measured in turn with it;
+medians over the turns. Filters are part of it, and `ms at half size` is with `scale` 0.5.
 """
 
 from __future__ import annotations
@@ -16,10 +16,21 @@ import numpy as np
 from measure import cpu_and_wall, figures, frame_loop, keep_memory, markdown, options, save
 from occlusion_plot import plot
 
-SIZE = (480, 270)
+SIZE = (320, 180)
+SCENE = "cornell_box"
 SAMPLES = (8, 16, 32, 64, 128)
-PIPELINES = ("ssao-hemisphere", "ssao-disc")
 SURFACES = {"image": None, "radiance": None, "depth": "gbuffer.depth", "normal": "gbuffer.normal"}
+LIT = SURFACES | {"diffuse": "light.diffuse"}
+OPEN, SENT = {"occlusion": "ao.occlusion"}, {"indirect": "gi.indirect"}
+PIPELINES: dict[str, tuple[dict[str, str | None], dict[str, str]]] = {  # what it stands on, and what it makes
+    "ssao-hemisphere": (SURFACES, OPEN),
+    "ssao-disc": (SURFACES, OPEN),
+    "ssao-hbao": (SURFACES, OPEN),
+    "ssao-gtao": (SURFACES, OPEN),
+    "ssgi": (LIT, SENT),
+    "ssao-ssgi": (LIT, SENT | {"occlusion": "gi.occlusion"}),
+    "ssil": (LIT, SENT | {"occlusion": "gi.occlusion"}),
+}
 
 
 @dataclass(frozen=True)
@@ -28,9 +39,9 @@ class Cell:
 
     Attributes:
         pipeline, samples: what was drawn.
-        ms: median CPU time of `ao`, with the least and the most.
+        ms: median CPU time of `ao` or `gi`, with the least and the most.
         half_ms: median with `scale` 0.5.
-        mean: mean occlusion of the picture, to show that the work was done.
+        mean: mean of what it makes, to show that the work was done: how open surfaces are, or the light they get.
     """
 
     pipeline: str
@@ -48,18 +59,20 @@ def bench(frames: int, turns: int, folder: str | None) -> tuple[list[Cell], str]
 
     cells: list[Cell] = []
     with rg.Session() as session:
-        bare = rg.load("deferred", size=SIZE, patches=[{"outputs": SURFACES}])
-        for name in PIPELINES:
+        for name, (stands_on, makes) in PIPELINES.items():
+            bare = rg.load("deferred", scene=SCENE, size=SIZE, patches=[{"outputs": stands_on}])
+            node = "gi" if makes.keys() & SENT.keys() else "ao"
             for samples in SAMPLES:
-                patch = {"outputs": SURFACES | {"occlusion": "ao.occlusion"}}
+                patch = {"outputs": stands_on | makes}
                 whole, half_size = (
-                    rg.load(name, size=SIZE, sets=[f"ao.samples={samples}", f"ao.scale={scale}"], patches=[patch])
+                    rg.load(name, scene=SCENE, size=SIZE, sets=[*sets, f"{node}.scale={scale}"], patches=[patch])
+                    for sets in [[f"{node}.samples={samples}"]]
                     for scale in (1, 0.5)
                 )
-                picture = np.asarray(session.render(whole)["occlusion"])
+                picture = np.asarray(session.render(whole)[next(iter(makes))])
                 if not np.isfinite(picture).all() or np.ptp(picture) < 0.3:
                     raise SystemExit(f"{name}: the picture is empty")
-                save(folder, **{f"{name}-{samples}": np.repeat(picture, 3, -1)})
+                save(folder, **{f"{name}-{samples}": picture[..., :3] if node == "gi" else np.repeat(picture, 3, -1)})
                 turn = [[_time(session, made, frames) for made in (bare, whole, half_size)] for _ in range(turns)]
                 full = [row[1] - row[0] for row in turn]
                 half = [row[2] - row[0] for row in turn]
@@ -71,7 +84,7 @@ def bench(frames: int, turns: int, folder: str | None) -> tuple[list[Cell], str]
                         min(full),
                         max(full),
                         statistics.median(half),
-                        float(picture.mean()),
+                        float(picture[..., :3].mean()),
                     )
                 )
         return cells, session.device.renderer
@@ -85,23 +98,25 @@ def _time(session: Any, pipeline: Any, frames: int) -> float:
 
 
 def table(cells: list[Cell], device: str) -> str:
-    """Markdown."""
-    heads = ("technique", "samples", "CPU ms (least to most)", "ms at half size", "mean occlusion")
+    """Markdown: a row a technique, a column a number of samples."""
+    heads = ("technique", *(f"{samples}, half size" for samples in SAMPLES))
     rows = [
         (
-            c.pipeline,
-            str(c.samples),
-            f"{c.ms:.1f} ({c.least_ms:.1f} to {c.most_ms:.1f})",
-            f"{c.half_ms:.1f}",
-            f"{c.mean:.3f}",
+            name,
+            *(
+                f"{c.ms:.1f}, {c.half_ms:.1f}"
+                for samples in SAMPLES
+                for c in cells
+                if (c.pipeline, c.samples) == (name, samples)
+            ),
         )
-        for c in cells
+        for name in PIPELINES
     ]
     return markdown(device, SIZE, heads, rows)
 
 
 def main() -> None:
-    chosen = options(__doc__, frames=3, turns=5)
+    chosen = options(__doc__, frames=2, turns=3)
     keep_memory()
     cells, device = bench(chosen.frames, chosen.turns, chosen.save)
     figures(chosen, "occlusion", device, cells, table(cells, device), plot)

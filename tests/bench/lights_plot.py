@@ -11,14 +11,18 @@ COLORS = {
     "forward-multipass": "#d99a2b",
     "deferred": "#2b6cb0",
     "deferred-stencil-lights": "#2f855a",
+    "forward-msaa": "#8c3f8c",
+    "deferred-msaa": "#6b7280",
 }
 FORMULAS = {
     "forward": "V + L·F",
     "forward-multipass": "L·(V + F)",
     "deferred": "V + L·F",
     "deferred-stencil-lights": "V + ΣF′",
+    "forward-msaa": "V + L·F",
+    "deferred-msaa": "V + L·(F + 4E)",
 }
-WIDTH, HEIGHT, LEFT, TOP, PANEL = 920, 430, 70, 50, 340
+WIDTH, HEIGHT, LEFT, TOP, PANEL = 920, 450, 70, 50, 340
 
 
 def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
@@ -40,10 +44,10 @@ def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
     for number, (title, key, other) in enumerate(panels):
         out += _panel(rows, LEFT + number * (PANEL + 100), title, key, other)
     for number, (name, color) in enumerate(COLORS.items()):
-        x = LEFT + number * 205
-        out.append(f'<line x1="{x}" y1="395" x2="{x + 22}" y2="395" stroke="{color}" stroke-width="2.5"/>')
-        out.append(f'<text x="{x + 28}" y="399">{name}: {FORMULAS[name]}</text>')
-    out.append(f'<text x="{LEFT}" y="420" fill="#777">{device}: a software rasteriser; its times are no GPU’s.</text>')
+        x, y = LEFT + number % 3 * 270, 395 + number // 3 * 18
+        out.append(f'<line x1="{x}" y1="{y}" x2="{x + 22}" y2="{y}" stroke="{color}" stroke-width="2.5"/>')
+        out.append(f'<text x="{x + 28}" y="{y + 4}">{name}: {FORMULAS[name]}</text>')
+    out.append(f'<text x="{LEFT}" y="440" fill="#777">{device}: a software rasteriser; its times are no GPU’s.</text>')
     return "\n".join([*out, "</svg>"]) + "\n"
 
 

@@ -130,11 +130,11 @@ def check_pictures(
 
 
 def frame_loop(session: Any, pipeline: Any) -> Draw:
-    """The framework's bare frame loop over a pipeline that is compiled once."""
+    """The framework's bare frame loop over a pipeline that is compiled once; every step of every frame is run."""
     from rendergraph.scene.cameras import view_matrices
 
     with session.device.ctx:
-        drawing = session.compile(pipeline)
+        drawing = session.compile(pipeline, reuse=False)
     linked, runner = drawing.expanded.linked, drawing.runner
     scene = linked.scene
     camera = view_matrices(next(iter(scene.cameras.values())), linked.graph.size)

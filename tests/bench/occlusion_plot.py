@@ -6,8 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-COLORS = {"ssao-hemisphere": "#b3541e", "ssao-disc": "#2b6cb0"}
-WIDTH, HEIGHT, LEFT, TOP, WIDE, TALL = 560, 400, 70, 44, 440, 270
+COLORS = {
+    "ssao-hemisphere": "#b3541e",
+    "ssao-disc": "#2b6cb0",
+    "ssao-hbao": "#2c9163",
+    "ssao-gtao": "#805ad5",
+    "ssgi": "#d69e2e",
+    "ssao-ssgi": "#c53030",
+    "ssil": "#333",
+}
+WIDTH, HEIGHT, LEFT, TOP, WIDE, TALL = 620, 372, 70, 44, 400, 270
 
 
 def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
@@ -28,7 +36,7 @@ def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" '
         'font-size="12" fill="#333">',
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
-        f'<text x="{LEFT}" y="{TOP - 18}" font-weight="bold">CPU milliseconds of `ao` against samples</text>',
+        f'<text x="{LEFT}" y="{TOP - 18}" font-weight="bold">CPU milliseconds of `ao` or `gi` against samples</text>',
     ]
     for number in range(5):
         _, y = at(0, top * number / 4)
@@ -42,8 +50,8 @@ def plot(rows: Sequence[Mapping[str, Any]], device: str) -> str:
             "{:.1f},{:.1f}".format(*at(row["samples"], row["ms"])) for row in rows if row["pipeline"] == name
         )
         out.append(f'<polyline points="{line}" fill="none" stroke="{color}" stroke-width="2.5"/>')
-        x = LEFT + number * 170
-        out.append(f'<line x1="{x}" y1="360" x2="{x + 22}" y2="360" stroke="{color}" stroke-width="2.5"/>')
-        out.append(f'<text x="{x + 28}" y="364">{name}</text>')
-    out.append(f'<text x="{LEFT}" y="386" fill="#777">{device}: a software rasteriser; its times are no GPU’s.</text>')
+        x, y = LEFT + WIDE + 16, TOP + 14 + 22 * number
+        out.append(f'<line x1="{x}" y1="{y}" x2="{x + 22}" y2="{y}" stroke="{color}" stroke-width="2.5"/>')
+        out.append(f'<text x="{x + 28}" y="{y + 4}">{name}</text>')
+    out.append(f'<text x="{LEFT}" y="358" fill="#777">{device}: a software rasteriser; its times are no GPU’s.</text>')
     return "\n".join([*out, "</svg>"]) + "\n"

@@ -199,7 +199,7 @@ def sketch(write: Write) -> Path:
 
 
 def image(gl: rg.Session, name: str, plugin: Path, **settings: str) -> Any:
-    pipeline = rg.load(name, plugins=[plugin], size=(48, 48))
+    pipeline = rg.load(name, plugins=[plugin], scene="cornell_box", size=(48, 48))
     for path, value in settings.items():
         pipeline = pipeline.set(path.replace("__", "."), value)
     return gl.render(pipeline)["image"].astype(int)
@@ -369,7 +369,7 @@ def test_a_plugins_mesh_is_a_scene(gl: rg.Session, loaders: Path, tmp_path: Path
 
 
 def test_a_plugins_mesh_and_image_in_a_scene_file(gl: rg.Session, loaders: Path, tmp_path: Path) -> None:
-    from rendergraph.images import decode
+    from rendergraph.images import decode_light
 
     pipeline = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml", size=(8, 8))
     scene = pipeline.link().scene
@@ -378,7 +378,7 @@ def test_a_plugins_mesh_and_image_in_a_scene_file(gl: rg.Session, loaders: Path,
     assert len(scene.meshes) == 1
     assert scene.materials[scene.objects[1].material].base_color[:3] == (1, 0, 0)
     assert scene.environment is not None
-    pixels = decode(scene.environment.image, srgb=False)
+    pixels = decode_light(scene.environment.image)
     assert pixels.shape == (2, 4, 4)
     assert pixels.dtype == np.float16
     np.testing.assert_array_equal(pixels[1, 3], [21, 22, 23, 1])
@@ -455,14 +455,11 @@ def test_what_a_mesh_loader_gives_is_checked(loaders: Path, tmp_path: Path, give
     ],
 )
 def test_what_an_image_loader_gives_is_checked(loaders: Path, tmp_path: Path, gives: str, said: str) -> None:
-    from rendergraph.images import decode
-
     with (loaders / "loaders.py").open("a") as file:
         file.write(f"\ndef read_raw(data):\n    return {gives}\n")
-    environment = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml").link().scene.environment
-    assert environment is not None
+    pipeline = rg.load("forward", plugins=[loaders], scene=tmp_path / "s.yaml")
     with pytest.raises(InputError, match=said):
-        decode(environment.image, srgb=False)
+        pipeline.link()  # which asks how large it is
 
 
 def test_a_session_notices_changed_files_of_a_plugin(sketch: Path) -> None:

@@ -11,7 +11,7 @@ from rendergraph.nodes.lighting.forward_lighting import ForwardLighting
 
 import rendergraph as rg
 from rendergraph.api import DROPPED
-from rendergraph.authoring.examine import examine
+from rendergraph.authoring.examine import examine, find_node
 from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError
 
@@ -86,6 +86,40 @@ def test_a_file_of_its_own_goes_before_the_bases(gl: rg.Session, plugin: Path, t
     file.write_text(PIPELINE % "fragment")
     frame = gl.render(rg.load(file, plugins=[plugin], size=(8, 8)), outputs=["radiance"])
     assert set(np.unique(frame["radiance"])) <= {0.0, 0.25}
+
+
+OPEN = '''"""Occlusion that is none."""
+
+from rendergraph.api import Steps
+from rendergraph.nodes.occlusion._screen_space import ScreenSpaceOcclusion
+
+
+class Open(ScreenSpaceOcclusion):
+    """All surfaces are open within a metre, those farther off count by their distance."""
+
+    def record(self, steps: Steps) -> None:
+        self.gather_surfaces(steps)
+        steps.fullscreen("open.frag", out=self.occlusion, surfaces=self.surfaces)
+'''
+OPEN_SHADER = """#include "surfaces.glsl"
+uniform sampler2D surfaces;
+uniform float radius;
+out float occlusion;
+
+void main() {
+    vec4 here = texelFetch(surfaces, ivec2(gl_FragCoord.xy), 0);
+    occlusion = here.w == 0.0 ? 1.0 : radius / max(radius, clip_w(surfaces_views[0], here.w));
+}
+"""
+
+
+def test_a_shader_of_its_own_takes_in_what_lies_beside_those_of_the_base(gl: rg.Session, tmp_path: Path) -> None:
+    (tmp_path / "open.py").write_text(OPEN)
+    (tmp_path / "open.frag").write_text(OPEN_SHADER)
+    pipeline = rg.load("ssao-hbao", sets=["ao.type=open"], plugins=[tmp_path / "open.py"], size=(16, 12))
+    frame = gl.render(pipeline.set("ao.radius", 1e6), outputs=[], taps=["ao.occlusion"])
+    np.testing.assert_array_equal(frame["ao.occlusion"], 1.0)
+    assert examine(find_node(tmp_path / "open.py")).problems == ()
 
 
 def test_a_link_to_a_dropped_port_is_refused(plugin: Path, tmp_path: Path) -> None:

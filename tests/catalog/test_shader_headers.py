@@ -344,3 +344,62 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
 )
 def test_wrong_compute_shaders(tmp_path: Path, text: str, message: str) -> None:
     assert mistakes(tmp_path, text, "effect.comp")[0].startswith(message)
+
+
+CONTRADICTIONS = {
+    "a second header": (
+        "outputs: {c: {doc: C.}}\n---*/\nout vec4 c;\n/*---\ndoc: Y.",
+        "",
+        "5:1: RG440 a file has one header, and this one has begun another in line 1; put both into one",
+    ),
+    "a limit that is none": (
+        "outputs: {c: {doc: C.}}\nparams: {k: {default: 1, min: .nan, doc: K.}}",
+        "uniform float k;\nout vec4 c;",
+        "3:31: RG440 'min' takes a number, this is nan",
+    ),
+    "threads of a fragment shader": (
+        "threads: [8, 8]\noutputs: {c: {doc: C.}}",
+        "out vec4 c;",
+        "2:1: RG443 'threads' is a compute shader's; a full-screen pass runs once a texel of what it makes",
+    ),
+    "a sampler as a function": (
+        "inputs: {s: {kind: function, semantic: shadow}}\noutputs: {c: {doc: C.}}",
+        "uniform sampler2D s;\nout vec4 c;",
+        "2:20: RG444 the header has 's' as a function, but the shader declares 'uniform sampler2D s'; "
+        "leave one of them out",
+    ),
+    "a depth as an out": (
+        "outputs: {c: {format: depth32f}}",
+        "out vec4 c;",
+        "2:23: RG444 format depth32f does not hold what 'out vec4 c' is; leave that out, and write gl_FragDepth",
+    ),
+    "whole numbers as a vec4": (
+        "outputs: {c: {format: rgba32ui}}",
+        "out vec4 c;",
+        "2:23: RG444 format rgba32ui does not hold what 'out vec4 c' is; a uint format takes uvec4",
+    ),
+    "a uvec4 as fractions": (
+        "outputs: {c: {format: rgba8}}",
+        "out uvec4 c;",
+        "2:23: RG444 format rgba8 does not hold what 'out uvec4 c' is; that format takes float to vec4",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CONTRADICTIONS)
+def test_what_a_header_says_against_itself_or_its_text(tmp_path: Path, name: str) -> None:
+    header, text, said = CONTRADICTIONS[name]
+    assert mistakes(tmp_path, f"/*---\n{header}\n---*/\n{text}\nvoid main() {{ }}\n") == [said]
+
+
+@pytest.mark.parametrize(
+    ("header", "text"),
+    [
+        ("outputs: {c: {format: rgba32ui}}", "out uvec4 c;"),
+        ("outputs: {c: {format: r32i}}", "out int c;"),
+        ("outputs: {d: {format: depth32f}, c: {format: rgba8}}", "out vec4 c;"),
+        ("params: {f: {default: 1, role: structural}}\noutputs: {c: {format: rgba8}}", "out vec3 c;"),
+    ],
+)
+def test_formats_that_hold_what_is_declared(tmp_path: Path, header: str, text: str) -> None:
+    assert load(tmp_path, f"/*---\n{header}\n---*/\n{text}\nvoid main() {{ }}\n").cls.outputs()

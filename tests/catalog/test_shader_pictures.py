@@ -241,7 +241,7 @@ def test_what_a_header_keeps_is_made_once(gl: rg.Session, tmp_path: Path) -> Non
     (tmp_path / "show.frag").write_text(show)
     text = "nodes: {t: {type: ./table.frag}, s: {type: ./show.frag, inputs: {table: t.table}}}\noutputs: {image: s.shown}\n"
     (tmp_path / "p.yaml").write_text(text)
-    frame = rg.load(tmp_path / "p.yaml", size=SIZE).render(session=gl)
+    frame = rg.load(tmp_path / "p.yaml", size=SIZE).render(session=gl, timed=True)
     assert (frame["image"] == 3.0).all()
     assert [entry["node"] for entry in frame.passes] == ["s"]
     (tmp_path / "table.frag").write_text(KEPT.replace("= value", "= value * camera.eye.x"))

@@ -55,6 +55,7 @@ class FakeStages:
     def __init__(self, outputs: tuple[str, ...] = ("image", "radiance")) -> None:
         self.graph = SimpleNamespace(outputs=dict.fromkeys(outputs))
         self.calls: dict[str, Any] = {}
+        self.figures: tuple[str, ...] = ()
         self.fail: BaseException | None = None
         self.device: int | None = None
 
@@ -62,7 +63,9 @@ class FakeStages:
         return SimpleNamespace(selection=selection)
 
     def link(self, resolved: Any) -> Any:
-        return SimpleNamespace(selection=resolved.selection, graph=self.graph, warnings=())
+        return SimpleNamespace(
+            selection=resolved.selection, graph=self.graph, warnings=(), frames=range(1, 2), fps=30.0
+        )
 
     def expand(self, linked: Any, options: RenderOptions) -> Any:
         return SimpleNamespace(linked=linked, options=options, wanted={})
@@ -86,6 +89,7 @@ class FakeFrame:
         self.metadata = {"pipeline": "nodes: {}\n"}
         self.number = number
         self.warnings: tuple[Any, ...] = ()
+        self.unsound: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
         return np.full((4, 6, 4), self.number / 10, np.float32)
@@ -104,15 +108,17 @@ class FakeFrame:
             "frame_ms": {"median": 1.0, "min": 1.0, "max": 1.0},
             "memory": {},
             "culled": {"idle": "nobody reads it"},
+            "figures": {"share": 0.25, "pair": [1.0, 2.0]},
         }
 
 
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> FakeStages:
     """What `run` goes through in this test."""
-    from rendergraph.session import gpu, stages
+    from rendergraph.session import gpu, stages, wanted
 
     made = FakeStages()
+    monkeypatch.setattr(wanted, "figures", lambda graph: made.figures)
     for name in ("resolve", "link", "expand", "draw"):
         monkeypatch.setattr(stages, name, getattr(made, name))
     monkeypatch.setattr(gpu, "Gpu", made.gpu)

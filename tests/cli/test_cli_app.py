@@ -17,7 +17,7 @@ import pytest
 from rendergraph.cli.app import VERBS
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError
 
-PROGRAM = [sys.executable, "-m", "rendergraph.cli"]
+PROGRAM = [sys.executable, "-m", "rendergraph"]
 HEAVY = {"numpy", "moderngl", "networkx", "OpenImageIO", "pydantic", "yaml", "rich", "rich_click", "scipy", "trimesh"}
 
 
@@ -140,7 +140,7 @@ def test_errors_become_messages_and_exit_codes(cli: Any, fake: Any, kind: Any, c
         (KeyboardInterrupt(), 130, "interrupted"),
         (ZeroDivisionError("a\nb"), 1, "RG599 a mistake in rendergraph, not yours: ZeroDivisionError: a b; "),
         (MemoryError(), 1, "RG509 out of memory"),
-        (OSError(28, "No space left on device", "x"), 1, "RG509 x: No space left on device"),
+        (OSError(28, "No space left on device", "x"), 1, "x: RG509 No space left on device"),
         (BrokenPipeError(), 0, ""),
     ],
 )
@@ -180,7 +180,7 @@ def test_sigterm_ends_with_143_and_leaves_no_files(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_signals_end_the_process_cleanly(tmp_path: Path, name: str) -> None:
     code = (
         "import sys, time; from rendergraph.cli import main; from rendergraph.session import stages\n"
@@ -193,14 +193,14 @@ def test_signals_end_the_process_cleanly(tmp_path: Path, name: str) -> None:
         stderr=subprocess.PIPE,
         cwd=tmp_path,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job's suite ignores SIGINT
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
+        preexec_fn=lambda: [signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGHUP)],
+    )  # a background job's suite ignores SIGINT, and one under nohup SIGHUP
+    assert process.stderr is not None
+    assert process.stderr.readline() == "ready\n"  # stdout is for data
     process.send_signal(getattr(signal, name))
-    _, err = process.communicate(timeout=10)
-    assert process.returncode == {"SIGINT": 130, "SIGTERM": 143}[name]
-    assert err == {"SIGINT": "interrupted\n", "SIGTERM": "terminated\n"}[name]
+    out, err = process.communicate(timeout=10)
+    assert process.returncode == {"SIGINT": 130, "SIGTERM": 143, "SIGHUP": 129}[name]
+    assert (out, err) == ("", {"SIGINT": "interrupted\n"}.get(name, "terminated\n"))
 
 
 @pytest.mark.slow
@@ -226,7 +226,7 @@ def test_a_full_disk_behind_stdout_is_exit_1() -> None:
 @pytest.mark.slow
 def test_without_stdout_and_stderr_it_still_works() -> None:
     for redirect in (">&-", "2>&-", ">&- 2>&-"):
-        done = subprocess.run(f"exec '{sys.executable}' -m rendergraph.cli nodes {redirect}", shell=True)
+        done = subprocess.run(f"exec '{sys.executable}' -m rendergraph nodes {redirect}", shell=True)
         assert done.returncode == 0, redirect
 
 
@@ -293,3 +293,47 @@ def test_no_command_line_ends_in_a_traceback(cli: Any, seed: int) -> None:
     assert "RG599" not in result.err, (words, result)
     if "--json" in words and result.out:
         json.loads(result.out)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "deaf"), [("SIGTERM", True), ("SIGINT", True), ("SIGTERM", False)])
+def test_what_cannot_hear_a_signal_is_ended_after_a_while(tmp_path: Path, name: str, deaf: bool) -> None:
+    code = (
+        "import sys, time; from rendergraph.cli import main, watchdog; from rendergraph.session import stages\n"
+        "def resolve(*a, **k):\n print('ready', flush=True)\n"
+        f" {'max(range(10**13))' if deaf else 'time.sleep(30)'}\n"
+        f"watchdog.PATIENCE = {0.5 if deaf else 15}; stages.resolve = resolve; sys.argv[1:] = ['check', 'x']\nsys.exit(main())"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job's suite ignores SIGINT
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline() == "ready\n"
+    time.sleep(0.5)  # until it is deaf
+    start = time.monotonic()
+    process.send_signal(getattr(signal, name))
+    _, err = process.communicate(timeout=20)
+    taken = time.monotonic() - start
+    assert (process.returncode, err) == ((-signal.SIGKILL, "") if deaf else (143, "terminated\n"))
+    assert taken > 0.4 if deaf else taken < 15
+
+
+@pytest.mark.slow
+def test_the_watcher_ends_with_the_process_and_holds_none_of_its_streams(tmp_path: Path) -> None:
+    start = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-m", "rendergraph", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("rendergraph, version ")
+    assert time.monotonic() - start < 20
+
+
+@pytest.mark.parametrize("frames", ["1-999999999", "5-100005"])
+def test_more_frames_than_anybody_waits_for_are_refused(cli: Any, frames: str) -> None:
+    found = cli("run", "forward", "--frames", frames, "-o", "a.####.png", "--size", "8x8")
+    assert found.code == 2
+    assert "frames are more than 100000 at a time; draw them in parts" in found.err

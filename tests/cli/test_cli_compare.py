@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import signal
 import subprocess
@@ -10,7 +11,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+
+import rendergraph as rg
 
 SMALL = ("--size", "48x27", "-s", "sun.resolution=64")
 
@@ -50,6 +54,51 @@ def test_beyond_a_threshold_is_exit_code_4(cli: Any) -> None:
     assert itself.code == 0
 
 
+BROKEN = """// Light that is no number in a corner, and what 8 bits show of it.
+/*---
+outputs:
+  light: {semantic: radiance, format: rgba32f, doc: Light.}
+  shown: {semantic: display_color, format: rgba8, doc: Colour.}
+params:
+  much: {default: 0.5, min: -1, max: 1, doc: How much.}
+---*/
+uniform float much;
+layout(location = 0) out vec4 light;
+layout(location = 1) out vec4 shown;
+void main() {
+    light = vec4(gl_FragCoord.x < 3.0 && gl_FragCoord.y < 2.0 ? sqrt(much) : 0.5);
+    shown = vec4(0.5);
+}
+"""
+BROKEN_FILE = (
+    "rendergraph: 1\nsize: [16, 8]\nnodes: {a: {type: broken}}\noutputs: {radiance: a.light, image: a.shown}\n"
+)
+
+
+def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "broken.frag").write_text(BROKEN)
+    (tmp_path / "p.yaml").write_text(BROKEN_FILE)
+    plugin = ("--plugin", "broken.frag")
+    warning = "warning: RG619 6 of 128 pixels of 'radiance' (a.light) are NaN or infinite"
+    found = cli("run", "p.yaml", *plugin, "-s", "a.much=-1", "-o", "a.####.exr", "--frames", "1-3")
+    assert found.code == 0
+    assert found.err.count(warning) == 1
+    assert "RG619" not in cli("run", "p.yaml", *plugin, "-o", "a.exr").err
+    tapped = cli("run", "p.yaml", *plugin, "-s", "a.much=-1", "--tap", "a.light=b.exr", "-o", "image=b.png")
+    assert "warning: RG619 6 of 128 pixels of 'a.light' are NaN" in tapped.err
+    words = ("-x", "a.much=0.5,-1", "-n", "1", "-o", "out", "--fail-above", "flip=0.9", "--json")
+    swept = cli("sweep", "p.yaml", *plugin, *words)
+    assert swept.code == 4
+    good, bad = swept.json["runs"]
+    assert (good["not_finite"], bad["not_finite"], bad["flip"]) == (0, 6, 0)
+    assert (good["pareto"], bad["pareto"], bad["radiance_rmse"]) == (True, False, None)
+    assert "a.much=-1: warning: RG619 6 pixels of its outputs are NaN or infinite" in swept.err
+    compared = cli("compare", "p.yaml", *plugin, "-s", "a.much=-1", "--reference", "p.yaml", "-n", "1")
+    assert "p: warning: RG619 6 pixels" in compared.err
+    again = cli("sweep", "p.yaml", *plugin, *words, "--resume")
+    assert [run["not_finite"] for run in again.json["runs"]] == [0, 6]
+
+
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
@@ -68,7 +117,7 @@ def test_beyond_a_threshold_is_exit_code_4(cli: Any) -> None:
         (
             ("compare", "forward", "deferred", "-s", "gbuffer.oct_bits=8"),
             3,
-            "--set gbuffer.oct_bits=8: RG109 in forward: there is no node 'gbuffer'; there is display, light, shadows, sun; "
+            "--set gbuffer.oct_bits=8: RG109 in forward: there is no node 'gbuffer'; there is display, environment, light, shadows, sun; "
             "-s holds for all pipelines; for one alone: rendergraph compare deferred --reference forward -s …",
         ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
@@ -116,7 +165,7 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
         "axes: {shadows.taps: [1, 3]}\n"
     )
     told = cli("sweep", "study.yaml", "-x", "display.curve=aces,none", "-o", "out", "--json").json
-    assert told["axes"] == {"shadows.taps": ["1", "3"], "display.curve": ["aces", "none"]}
+    assert told["axes"] == {"shadows.taps": [1, 3], "display.curve": ["aces", "none"]}
     assert told["size"] == [48, 27]
     assert len((tmp_path / "out" / "results.jsonl").read_text().splitlines()) == 4
 
@@ -131,8 +180,8 @@ def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> 
     file.write_text(text.replace("none", "acse").replace("shadows.taps", "shadows.tap"))
     found = cli("check", "study.yaml")
     assert found.code == 3
-    assert "-x display.curve=acse: RG104" in found.err
-    assert "-x shadows.tap=1: RG103" in found.err
+    assert "study.yaml:4:29: RG104" in found.err
+    assert "study.yaml:4:8: RG103" in found.err
     for verb in ("run", "plan", "graph"):
         found = cli(verb, "study.yaml")
         assert found.code == 3
@@ -154,7 +203,7 @@ def test_a_sweep_writes_its_chart_as_a_picture(cli: Any, tmp_path: Path) -> None
 def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any, tmp_path: Path) -> None:
     words = ["sweep", "forward", "-x", f"display.exposure={','.join(map(str, range(18)))}", *SMALL, "-n", "400"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "rendergraph.cli", *words, "-o", "out"],
+        [sys.executable, "-m", "rendergraph", *words, "-o", "out"],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         text=True,
@@ -169,8 +218,80 @@ def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any
     assert 2 <= kept < 18
     assert told[-2].startswith(f"{kept} runs kept in out; go on with: rendergraph sweep forward -x display.exposure=0,")
     assert told[-2].endswith("-n 400 -o out --resume")
-    before = {file: file.stat().st_mtime_ns for file in tmp_path.glob("out/*/image.png")}
+    whole = [file.with_name("image.png") for file in tmp_path.glob("out/*/run.json")]  # one may have been begun
+    before = {file: file.stat().st_mtime_ns for file in whole}
     words[-1] = "1"
     report = cli(*words, "-o", "out", "--resume", "--json").json
     assert (report["timed_again"], report["redrawn"], len(report["runs"])) == (kept, 0, 18)
     assert {file: file.stat().st_mtime_ns for file in before} == before
+
+
+# --- variants by settings, ports, tables -----------------------------------------------------------------------------
+
+
+def test_settings_make_variants_of_one_pipeline(cli: Any) -> None:
+    words = ("--size", "32x18", "-n", "1", "--json")
+    told = cli(
+        "compare", "forward", "--with", "shadows.taps=1", "--with", "shadows.taps=1 display.curve=aces", *words
+    ).json
+    assert [variant["name"] for variant in told["variants"]] == ["shadows.taps=1", "shadows.taps=1 display.curve=aces"]
+    assert [change["name"] for change in told["variants"][1]["diff"]["parameters"]] == ["curve"]
+    alone = cli("compare", "forward", "--with", "display.curve=aces", *words).json
+    assert [variant["name"] for variant in alone["variants"]] == ["forward", "display.curve=aces"]
+    assert alone["variants"][1]["flip"] > 0.01
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (
+            ["--with", "shadows.tps=1"],
+            3,
+            "--with 'shadows.tps=1': RG103 node 'shadows' (shadow_pcf) has no param or input",
+        ),
+        (["deferred", "--with", "shadows.taps=1"], 2, "RG500 --with makes variants of one pipeline"),
+        (["--with", "taps"], 2, "'taps' is not PATH=VALUE"),
+        (["deferred", "--metric", "ao.occlusion"], 3, "--metric ao.occlusion: RG109 in forward: there is no node 'ao'"),
+        (["deferred", "--metric", "sun.shadow_map"], 3, "--metric sun.shadow_map: RG523 "),
+    ],
+)
+def test_variants_and_ports_that_cannot_be_are_told(cli: Any, words: list[str], code: int, message: str) -> None:
+    result = cli("compare", "forward", *words, "--size", "16x9", "-n", "1")
+    assert result.code == code, result
+    assert message in result.err
+
+
+def test_any_port_is_measured(cli: Any, gl: rg.Session, tmp_path: Path) -> None:
+    size = (32, 18)
+    names = ("ssao-hemisphere", "ssao-disc")
+    one, other = (gl.render(name, size, taps="ao.occlusion")["ao.occlusion"] for name in names)
+    told = cli("compare", *names, "--metric", "ao.occlusion", "--size", "32x18", "-n", "1", "--json").json
+    expected = np.sqrt(np.mean((one.astype(float) - other) ** 2))
+    assert told["metric"] == "ao.occlusion"
+    assert told["variants"][1]["rmse"] == pytest.approx(expected)
+    # against a picture of the same port
+    assert cli("run", names[0], "--size", "32x18", "--tap", "ao.occlusion=truth.exr").code == 0
+    words = ("--reference", "truth.exr", "--metric", "ao.occlusion", "--size", "32x18", "-n", "1", "--json")
+    against = cli("compare", *names, *words).json
+    assert [variant["rmse"] for variant in against["variants"]] == pytest.approx([0, expected], abs=2e-3)
+
+
+def test_a_sweep_keeps_typed_values_and_a_table(cli: Any, tmp_path: Path) -> None:
+    axes = ("-x", "ao.samples=8,16", "-x", "light.ambient=0.5,[0.1, 0.2, 0.3]")
+    words = ("--metric", "ao.occlusion", "--size", "16x9", "-n", "1", "--csv", "-o", "out")
+    result = cli("sweep", "ssao-hemisphere", *axes, *words)
+    assert result.code == 0, result
+    assert result.out.endswith("out/results.csv\n")
+    lines = [json.loads(line) for line in (tmp_path / "out" / "results.jsonl").read_text().splitlines()]
+    assert [line["settings"] for line in lines] == [
+        {"ao.samples": samples, "light.ambient": ambient} for samples in (8, 16) for ambient in (0.5, [0.1, 0.2, 0.3])
+    ]
+    with (tmp_path / "out" / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["ao.samples"] for row in rows] == ["8", "8", "16", "16"]
+    assert [float(row["rmse"]) for row in rows] == [line["rmse"] for line in lines]
+    assert [float(row["rmse"]) for row in rows][:2] == [0, 0]  # what is measured does not see the light
+    assert float(rows[2]["rmse"]) > 0
+    assert {row["pareto"] for row in rows} <= {"True", "False"}
+    assert (tmp_path / "out" / rows[0]["run"] / "metric.exr").is_file()
+    assert cli("sweep", "ssao-hemisphere", *axes, *words, "--resume", "--json").json["resumed"] == 4

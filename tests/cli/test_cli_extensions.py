@@ -115,11 +115,34 @@ def test_sweep_keeps_a_plugins_metric(cli: Any, plugin: Path) -> None:
     assert without["resumed"] == 0
 
 
+def test_what_a_plugin_prints_is_no_data(cli: Any, plugin: Path) -> None:
+    text = EXTENSION.replace("    assert image.shape ==", "    print('measuring')\n    assert image.shape ==")
+    (plugin / "extension.py").write_text("print('hello')\n" + text)
+    words = ("compare", "forward", "forward", *SMALL, "--plugin", str(plugin), "--json")
+    found = cli(*words)
+    assert found.json["variants"][0]["plugin_metrics"] == {"darker": 0}
+    assert {"hello", "measuring"} <= set(found.err.splitlines())
+    assert "Usage:" in cli("compare", "--help").out
+
+
+@pytest.mark.parametrize(
+    ("what", "code"), [("SystemExit(0)", "RG494"), ("BaseException()", "RG494"), ("KeyboardInterrupt", "")]
+)
+def test_an_extension_that_ends_is_a_mistake(cli: Any, plugin: Path, what: str, code: str) -> None:
+    (plugin / "extension.py").write_text(f"raise {what}\n")
+    found = cli("run", "forward", *SMALL[:2], "-s", "display.curve=halve", "--plugin", str(plugin))
+    assert found.code == (3 if code else 130)
+    assert code in found.err
+
+
 @pytest.mark.parametrize(
     ("body", "code", "said"),
     [
         ("return 1 / 0", 3, "extension.py:2:1: RG497 metric 'darker' of "),
         ("return 'dark'", 3, "plugin 'sketch' gave str, not a number"),
+        ("raise SystemExit(0)", 3, "extension.py:2:1: RG497 metric 'darker' of "),
+        ("raise BaseException('enough')", 3, "BaseException: enough (plugin 'sketch')"),
+        ("raise ValueError('long ' * 1000)", 3, "long long … (plugin 'sketch')"),
     ],
 )
 def test_a_metric_that_fails_is_named(cli: Any, plugin: Path, body: str, code: int, said: str) -> None:

@@ -25,17 +25,24 @@ def examples(cli: Any, *verb: str) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in text.splitlines() if line.strip().startswith("rendergraph ")]
 
 
-LONG = ("sweep", "compare", "check-node", "run", "doctor", "bench")  # their examples take seconds
+def has_no_end(words: list[str]) -> bool:
+    return "--watch" in words or (words[0] == "view" and "--export" not in words)
+
+
+LONG = ("view", "sweep", "compare", "check-node", "run", "doctor", "bench")  # their examples take seconds
 
 
 @pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=pytest.mark.slow if v in LONG else ()) for v in VERBS)])
 def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> None:
     if verb == "config":
         assert cli("run", "forward", *SMALL).code == 0
+    if verb == "compare":
+        assert cli("run", "forward", *SMALL, "-o", "soft.png").code == 0
+        assert cli("run", "forward", *SMALL, "-s", "shadows.taps=1", "-o", "hard.png").code == 0
     if verb == "check-node":
         assert cli("new-node", "vignette").code == cli("new-node", "grain", "--kind", "shader-only").code == 0
     (tmp_path / "my.yaml").write_text("extends: forward\n")
-    found = [words for words in examples(cli, *filter(None, [verb])) if "--watch" not in words]  # which has no end
+    found = [words for words in examples(cli, *filter(None, [verb])) if not has_no_end(words)]
     assert found
     for words in found:
         result = cli(*words)
@@ -99,7 +106,10 @@ def test_taps_keep_values_and_are_viewable(cli: Any) -> None:
 
 def test_taps_of_parts_become_pictures_and_keep_values(cli: Any) -> None:
     words = ["bloom.glow[mip=1]=g.exr", "sun.shadow_map[0]=s.png", "sun.shadow_map[0]=s.exr"]
-    assert cli("run", "bloom", *SMALL, *(word for tap in words for word in ("--tap", tap))).code == 0
+    assert (
+        cli("run", "bloom", "--scene", "cornell_box", *SMALL, *(word for tap in words for word in ("--tap", tap))).code
+        == 0
+    )
     assert images.read("g.exr").shape == (9, 16, 4)
     assert images.read("s.png").shape == (2048, 2048, 1)
     assert images.read("s.exr").shape == (2048, 2048, 1)
@@ -107,7 +117,7 @@ def test_taps_of_parts_become_pictures_and_keep_values(cli: Any) -> None:
 
 @pytest.mark.slow
 def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_path: Path) -> None:
-    result = cli("run", "bloom", *SMALL, "--tap-all", "a/inside", "-o", "b.exr")
+    result = cli("run", "bloom", "--scene", "cornell_box", *SMALL, "--tap-all", "a/inside", "-o", "b.exr")
     assert result.code == 0
     names = [line.removeprefix("a/inside/") for line in result.out.splitlines()[1:]]
     assert [name.partition("-")[0] for name in names[:-1]] == [f"{n:02d}" for n in range(1, len(names))]
@@ -122,7 +132,7 @@ def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_pa
 
 @pytest.mark.slow
 def test_all_ports_of_several_frames_are_numbered(cli: Any, tmp_path: Path) -> None:
-    assert cli("run", "forward", *SMALL, "--tap-all", "in", "--frames", "1-2").code == 0
+    assert cli("run", "forward", "--scene", "spheres", *SMALL, "--tap-all", "in", "--frames", "1-2").code == 0
     assert {"contact.0001.png", "contact.0002.png"} < {path.name for path in (tmp_path / "in").iterdir()}
     assert not (tmp_path / "forward.png").exists()
 
@@ -299,6 +309,26 @@ def test_doctor_survives_a_broken_driver(
     assert result.json["problem"] == problem
     assert result.json["install"] == ["apt install libgl1-mesa-dri   (software rendering; or your GPU vendor's driver)"]
     assert problem in cli("doctor").out
+
+
+@pytest.mark.parametrize(
+    ("renderer", "version", "said"),
+    [
+        ("zink (llvmpipe (LLVM 15.0.6, 256 bits))", "4.6 (Core Profile) Mesa 22.3.6", True),
+        ("zink (llvmpipe (LLVM 19.1.0, 256 bits))", "4.6 (Core Profile) Mesa 25.0.1", False),
+        ("llvmpipe (LLVM 15.0.6, 256 bits)", "4.5 (Core Profile) Mesa 22.3.6", False),
+    ],
+)
+def test_doctor_knows_a_driver_that_crashes(
+    cli: Any, monkeypatch: pytest.MonkeyPatch, renderer: str, version: str, said: bool
+) -> None:
+    from rendergraph.cli import doctor
+
+    device = {"number": 0, "renderer": renderer, "version": version, "gl": "4.5", "software": True, "features": {}}
+    monkeypatch.setattr(doctor, "_probe", lambda *number: device if number else {"devices": [{"number": 0}]})
+    report = cli("doctor", "--json").json
+    assert report["ok"]
+    assert any("lavapipe of Mesa 22 crashes on some programs" in line for line in report["install"]) == said
 
 
 def test_doctor_says_what_to_install(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:

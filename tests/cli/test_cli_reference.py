@@ -50,7 +50,9 @@ def test_every_node_can_be_explained(cli: Any, name: str) -> None:
     for port in (*told["inputs"], *told["outputs"], *told["parameters"]):
         assert port["name"] in text
         assert port["doc"] in text
-    assert f"type: {name}" in text
+    alone = re.fullmatch(r"extends: (.*)\n?", told["example"])
+    whole = (folder("pipelines") / f"{alone[1]}.yaml").read_text() if alone else text
+    assert f"type: {name}" in whole
 
 
 @pytest.mark.slow
@@ -205,6 +207,17 @@ def test_what_is_kept_says_so(cli: Any) -> None:
     assert "kept from frame to frame" in cli("explain", "ssao_hemisphere").out
 
 
+def test_a_node_that_is_installed_says_how_it_is_extended(cli: Any, tmp_path: Path) -> None:
+    shown = cli("explain", "hbao").out
+    assert (
+        "  from rendergraph.nodes.occlusion.hbao import HBAO\n  from rendergraph.nodes.occlusion._arms import" in shown
+    )
+    (tmp_path / "loose.py").write_text(
+        'from rendergraph.nodes.occlusion.hbao import HBAO\n\n\nclass Loose(HBAO):\n    """The same."""\n'
+    )
+    assert cli("explain", "loose", "--plugin", "loose.py", "--json").json["extends"] == []
+
+
 # --- programs --------------------------------------------------------------------------------------------------------
 
 
@@ -225,6 +238,17 @@ def test_the_program_of_a_type_and_of_a_node(cli: Any) -> None:
     )
 
 
+def test_what_needs_an_environment_is_shown_under_one_and_what_a_step_does_not_bind_is_nobodys(cli: Any) -> None:
+    shown = cli("explain", "environment_light", "--glsl").out
+    assert "input 'map': the scene's environment" in shown
+    assert "nothing in this step" not in shown  # what it writes is there for all that
+    shown = cli("explain", "forward_lighting", "--glsl").out
+    assert "//   uniform sampler2D base_color_texture             the scene's materials" in shown
+    assert (
+        "//   uniform sampler2D brdf_table                     nothing in this step, which has no use for it" in shown
+    )
+
+
 def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) -> None:
     shown = cli("explain", "ao", "--glsl", "--pipeline", "ssao-hemisphere", "--step", "2").out
     assert "step 2 of node 'ao' (ssao_hemisphere)" in shown
@@ -232,7 +256,8 @@ def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) ->
     (tmp_path / "two.yaml").write_text(
         "scene: 1\nobjects: {a: {shape: box}, b: {shape: plane, material: thin}}\nmaterials: {thin: {double_sided: true}}\n"
     )
-    shown = cli("explain", "light", "--glsl", "--pipeline", "forward", "--scene", "two.yaml").out
+    dark = ("--scene", "two.yaml", "-s", "light.environment=null")  # which would be lit by more than is asked here
+    shown = cli("explain", "light", "--glsl", "--pipeline", "forward", *dark).out
     assert "// the first of 2 variants, which differ in DOUBLE_SIDED 1\n" in shown
     assert "variants" not in cli("explain", "light", "--glsl", "--pipeline", "forward").out
 

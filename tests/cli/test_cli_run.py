@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rendergraph import images
@@ -25,9 +26,27 @@ def test_without_a_file_the_picture_is_named_after_the_pipeline(cli: Any, fake: 
 def test_json_is_one_document_with_the_paths(cli: Any, fake: Any) -> None:
     result = cli("run", "x", "-o", "a.png", "-o", "b.exr", "--tap", "n.p=c.exr", "--json")
     assert result.json["outputs"] == ["a.png", "b.exr", "c.exr"]
-    assert set(result.json) == {"pipeline", "device", "size", "passes", "frame_ms", "memory", "culled", "outputs"}
+    assert set(result.json) == {
+        "pipeline",
+        "device",
+        "size",
+        "passes",
+        "frame_ms",
+        "memory",
+        "culled",
+        "figures",
+        "outputs",
+    }
     assert fake.calls["outputs"] == ("image", "radiance")
     assert fake.calls["taps"] == ("n.p",)
+
+
+def test_outputs_of_one_texel_are_figures_of_the_run(cli: Any, fake: Any) -> None:
+    fake.figures = ("share", "pair")
+    result = cli("run", "x", "-o", "a.png", "--json")
+    assert fake.calls["outputs"] == ("image", "share", "pair")
+    assert result.json["figures"] == {"share": 0.25, "pair": [1.0, 2.0]}
+    assert "share: 0.25\npair: 1, 2\n" in result.err
 
 
 @pytest.mark.parametrize(
@@ -153,5 +172,59 @@ def test_one_pass_is_a_pass(capsys: pytest.CaptureFixture[str]) -> None:
     from rendergraph.cli.output import say_summary
 
     device = {"renderer": "none", "software": False}
-    say_summary({"culled": {}, "device": device, "size": (6, 4), "passes": [{}], "frame_ms": {"median": 1.0}})
+    say_summary(
+        {"culled": {}, "figures": {}, "device": device, "size": (6, 4), "passes": [{}], "frame_ms": {"median": 1.0}}
+    )
     assert capsys.readouterr().err == "6×4, 1 pass, 1.0 ms a frame on none\n"
+
+
+def test_no_picture_takes_the_place_of_a_texture_that_is_read(cli: Any, tmp_path: Path) -> None:
+    images.write(tmp_path / "wood.0001.png", np.full((2, 2, 3), 90, np.uint8))
+    (tmp_path / "s.yaml").write_text(
+        "scene: 1\nobjects: {o: {shape: box, size: [1, 1, 1], material: m}}\n"
+        "materials: {m: {base_color_texture: wood.0001.png}}\n"
+    )
+    before = (tmp_path / "wood.0001.png").read_bytes()
+    (tmp_path / "link").symlink_to(tmp_path)
+    for name in ("wood.0001.png", "link/wood.0001.png", "wood.####.png"):
+        found = cli("run", "forward", "--scene", "s.yaml", "--size", "8x8", "-o", name)
+        assert (found.code, found.err) == (2, f"RG502 '{name}' is read by this very run; write to another file\n")
+    assert (tmp_path / "wood.0001.png").read_bytes() == before
+    assert cli("run", "forward", "--scene", "s.yaml", "--size", "8x8", "-o", "wood2.png").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("run", "forward", "--asset-root", "none"), 3, "--asset-root: RG011 there is no folder 'none'"),
+        (("check", "forward", "--asset-root", "file"), 3, "--asset-root: RG011 'file' is a file, a folder is needed"),
+        (("run", "forward", "--asset-root", ""), 2, "invalid value for '--asset-root': '' names no file"),
+        (("run", "forward", "--plugin", ""), 2, "invalid value for '--plugin': '' names no file"),
+        (("run", "forward", "--tap-all", ""), 2, "invalid value for '--tap-all': '' names no file and no folder"),
+        (("run", "forward", "-p", ""), 2, "invalid value for '-p'"),
+        (("graph", "forward", "-o", ""), 2, "invalid value for '-o'"),
+        (("sweep", "forward", "-x", "shadows.taps=1", "-o", ""), 2, "invalid value for '-o'"),
+        (("compare", "forward", "forward", "-o", ""), 2, "invalid value for '-o'"),
+        (("check-node", ""), 2, "invalid value for 'FILE'"),
+    ],
+)
+def test_an_empty_word_is_no_path_and_a_root_is_a_folder(
+    cli: Any, tmp_path: Path, words: tuple[str, ...], code: int, message: str
+) -> None:
+    (tmp_path / "file").touch()
+    found = cli(*words)
+    assert found.code == code
+    assert message in found.err
+
+
+def test_names_of_any_bytes_are_names(cli: Any) -> None:
+    name = "a\udcff"
+    small = ("--size", "8x8", "-s", "sun.resolution=64", "-n", "1")
+    assert cli("sweep", "forward", "-x", "shadows.taps=1", *small, "-o", name).code == 0
+    assert (
+        cli("sweep", "forward", "-x", "shadows.taps=1", *small, "-o", name, "--resume", "--json").json["resumed"] == 1
+    )
+    assert cli("compare", "forward", "forward", *small, "-o", f"{name}.html").code == 0
+    for ending in ("png", "exr", "hdr"):
+        assert cli("run", "forward", *small[:2], "-o", f"{name}.{ending}").code == 0
+        assert cli("compare", "forward", "--reference", f"{name}.{ending}", *small).code == 0

@@ -50,7 +50,7 @@ class Watched:
     """A child process with its lines as they come."""
 
     def __init__(self, folder: Path, *words: str) -> None:
-        command = [sys.executable, "-m", "rendergraph.cli", "run", "my.yaml", "--watch", *words]
+        command = [sys.executable, "-m", "rendergraph", "run", "my.yaml", "--watch", *words]
         self.process = subprocess.Popen(
             command,
             cwd=folder,

@@ -54,6 +54,18 @@ def test_variants_are_measured_against_the_first(gl: rg.Session) -> None:
     assert told["size"] == list(SIZE)
 
 
+def test_a_comparison_is_told_in_a_line_and_shown_in_a_notebook(gl: rg.Session) -> None:
+    base = rg.load("forward", size=(32, 18))
+    found = compare([base, base.set("display.curve", "aces")], frames=1, session=gl)
+    assert repr(found).startswith(
+        "<Comparison on cornell_box, 32×18, FLIP against forward: forward 0.0000, forward-2 0."
+    )
+    assert all(len(repr(value)) < 100 for value in (found.reference, *found.results, found.results[1].first))
+    page = found._repr_html_()
+    assert page.count("data:image/png;base64,") == 3  # two pictures, one map
+    assert f"FLIP of forward-2: {found.results[1].metrics.flip:.4f}" in page
+
+
 def test_all_stand_on_the_stage_of_the_first(gl: rg.Session) -> None:
     other = rg.load("forward-prepass", size=(20, 10), scene="spheres")
     found = compare([rg.load("forward", size=SIZE), other], frames=1, session=gl)

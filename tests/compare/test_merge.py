@@ -120,6 +120,30 @@ def test_last_frame_closes_circles(make: Any, gl: rg.Session) -> None:
         np.testing.assert_array_equal(together, own)
 
 
+def test_batches_share_the_first_passes_whichever_axis_comes_first(make: Any) -> None:
+    """Eight patterns, each mixed in eight ways: 16 runs a batch, so two patterns a batch are drawn once each."""
+    nodes = {"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}
+    base = make(nodes, "q.color")
+    values = [number / 10 for number in range(8)]
+    first = [base.set("p.seed", seed).set("q.gain", gain).check() for seed in values for gain in values]
+    swapped = [base.set("p.seed", seed).set("q.gain", gain).check() for gain in values for seed in values]
+    for planned in (first, swapped):
+        found = batches(planned, range(64))
+        assert sorted(number for batch in found for number in batch.numbers) == list(range(64))
+        assert sum(batch.pass_count for batch in found) == 8 + 64
+
+
+def test_a_batch_ends_where_what_follows_shares_less(make: Any) -> None:
+    nodes = {"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}
+    base = make(nodes, "q.color")
+    planned = [
+        base.set("p.seed", seed / 10).set("q.gain", gain / 10).check() for seed in range(3) for gain in range(10)
+    ]
+    found = batches(planned, range(30))
+    assert [len(batch.numbers) for batch in found] == [10, 10, 10]
+    assert sum(batch.pass_count for batch in found) == 3 + 30
+
+
 def test_little_memory_means_several_batches(make: Any, gl: rg.Session) -> None:
     nodes = {"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}
     base = make(nodes, "q.color")

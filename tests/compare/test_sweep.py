@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
+from rendergraph.cli.compare import summary
 from rendergraph.compare import product
 from rendergraph.compare.axes import (
     Axis,
@@ -20,12 +24,14 @@ from rendergraph.compare.axes import (
     pipelines,
     read_sweep,
     run_name,
+    typed,
 )
 from rendergraph.compare.batches import batches
 from rendergraph.compare.ledger import Ledger, checksum
 from rendergraph.compare.product import pareto, sweep
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.study import RESULTS, kept_runs
+from rendergraph.compare.table import csv_text
 from rendergraph.errors import InputError
 from rendergraph.images import read, write
 
@@ -51,7 +57,7 @@ def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
         np.testing.assert_array_equal(gl.render(alone)["image"], result.pixels)
         np.testing.assert_array_equal(read(tmp_path / "out" / result.name / "image.png"), result.pixels[..., :3])
         told = json.loads((tmp_path / "out" / result.name / "run.json").read_text())
-        assert told["settings"] == result.settings
+        assert told["settings"] == {path: typed(value) for path, value in result.settings.items()}
         assert told["flip"] == result.metrics.flip
         assert "nodes:" in told["resolved"]
     assert found.comparison.results[0].metrics.flip == 0
@@ -60,6 +66,27 @@ def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
     front = pareto(found.comparison.results)
     assert found.comparison.results[0].name in {result.name for result in front}
     assert "Pareto front" in sweep_page(found, "rendergraph sweep")
+
+
+def test_figures_of_a_run_are_columns_everywhere(gl: rg.Session, tmp_path: Path) -> None:
+    """Those of each run alone, also where it is read back."""
+    shown = rg.load("overdraw", scene="cornell_box", size=(24, 16))
+    axes = [parse_axis("overdraw.depth=null,prepass.depth")]
+    for resume in (False, True):
+        found = sweep(shown, axes, tmp_path / "out", frames=1, session=gl, resume=resume)
+        results = found.comparison.results
+        for result in results:
+            alone = gl.render(shown.set("overdraw.depth", result.settings["overdraw.depth"]))
+            assert result.figures == alone.figures
+            assert set(result.figures) == {"mean", "maximum"}
+        assert results[0].columns["mean"] > results[1].columns["mean"] > 0
+        rows = list(csv.DictReader(io.StringIO(csv_text(found))))
+        assert [float(row["mean"]) for row in rows] == [result.columns["mean"] for result in results]
+        assert [run["figures"] for run in found.as_json()["runs"]] == [result.figures for result in results]
+        page = sweep_page(found, "rendergraph sweep")
+        assert '<th scope="col" class=num>maximum</th>' in page
+        heads, told = summary(results)
+        assert [row[heads.index("mean")] for row in told] == [f"{result.columns['mean']:.4g}" for result in results]
 
 
 def test_resuming_draws_what_is_missing_and_nothing_else(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
@@ -148,6 +175,92 @@ def test_runs_are_kept_before_they_are_measured(
 def test_what_is_drawn_together_is_few_enough_to_lose(base: rg.Pipeline) -> None:
     many = pipelines(base, combinations([Axis("display.exposure", tuple(map(str, range(20))))]))
     assert [len(batch.numbers) for batch in batches([each.check() for each in many], range(20))] == [16, 4]
+
+
+BAD = """// A colour; one of its modes is no GLSL.
+/*---
+outputs:
+  color: {semantic: radiance, format: rgba16f, doc: The colour.}
+params:
+  mode: {default: 1, min: 1, max: 9, role: define, doc: Which.}
+---*/
+out vec4 color;
+void main() {
+#if MODE == 3
+    color = vec4(nonsense);
+#else
+    color = vec4(1.0 / float(MODE));
+#endif
+}
+"""
+
+
+def bad(folder: Path) -> rg.Pipeline:
+    (folder / "fx.frag").write_text(BAD)
+    file = folder / "p.yaml"
+    file.write_text("rendergraph: 1\nsize: [8, 8]\nnodes: {a: {type: fx}}\noutputs: {radiance: a.color}\n")
+    return rg.load(file, plugins=[folder / "fx.frag"])
+
+
+def lines(folder: Path) -> list[dict[str, Any]]:
+    return Ledger(folder / RESULTS).read()[0]
+
+
+def test_a_value_that_fails_is_a_row_and_the_others_go_on(gl: rg.Session, tmp_path: Path) -> None:
+    out, base = tmp_path / "out", bad(tmp_path)
+    found = sweep(base, (Axis("a.mode", ("1", "2", "3", "4")),), out, frames=1, session=gl)
+    assert [result.name for result in found.comparison.results] == ["a.mode=1", "a.mode=2", "a.mode=4"]
+    (failure,) = found.failures
+    assert (failure.name, failure.settings) == ("a.mode=3", {"a.mode": "3"})
+    assert "RG410" in failure.text
+    assert "nonsense" in failure.text
+    assert "a-" not in failure.text
+    told = {line["name"]: line.get("error") for line in lines(out)}
+    assert told == {"a.mode=1": None, "a.mode=2": None, "a.mode=4": None, "a.mode=3": failure.text}
+    assert "a.mode=3 failed" in sweep_page(found, "rendergraph sweep")
+    again = sweep(base, (Axis("a.mode", ("1", "2", "3", "4")),), out, frames=1, session=gl, resume=True)
+    assert (again.resumed, len(again.failures), len(lines(out))) == (3, 1, 4)
+    with pytest.raises(InputError, match="RG410"):
+        sweep(base, (Axis("a.mode", ("3", "1")),), tmp_path / "c", frames=1, session=gl)
+
+
+def test_lines_that_were_lost_are_written_again(gl: rg.Session, tmp_path: Path) -> None:
+    out, base, axes = tmp_path / "out", bad(tmp_path), (Axis("a.mode", ("1", "2", "4")),)
+    options: dict[str, Any] = {"frames": 1, "session": gl, "resume": True}
+    first = sweep(base, axes, out, frames=1, session=gl)
+    whole = lines(out)
+    (out / RESULTS).write_bytes((out / RESULTS).read_bytes()[:-300])
+    (out / "a.mode=4" / ".image.png.0badcafe.part").touch()
+    again = sweep(base, axes, out, **options)
+    assert (again.resumed, again.executed, again.torn) == (3, 0, 1)
+    assert sorted(map(str, lines(out))) == sorted(map(str, whole))
+    assert not list(out.rglob("*.part"))
+    (out / RESULTS).unlink()
+    assert sweep(base, axes, out, **options).executed == 0
+    assert len(lines(out)) == 3
+    (out / RESULTS).unlink()
+    run = out / "a.mode=2" / "run.json"
+    told = json.loads(run.read_text())
+    for changed in (told | {"flip": 0.0, "rmse": 0.0}, {name: told[name] for name in told if name != "frames"}):
+        run.write_text(json.dumps(changed))
+        again = sweep(base, axes, out, **options)
+        assert (again.resumed, again.redrawn) == (2, 1)
+        assert again.comparison.results[1].metrics == first.comparison.results[1].metrics
+        (out / RESULTS).unlink()
+
+
+def test_a_folder_has_one_sweep_at_a_time(gl: rg.Session, tmp_path: Path) -> None:
+    out, base = tmp_path / "out", bad(tmp_path)
+
+    def second(done: int, total: int) -> None:
+        with pytest.raises(InputError, match="RG504 cannot be written: another sweep is at work in it"):
+            sweep(base, (Axis("a.mode", ("1",)),), out, frames=1, resume=True)
+        seen.append(done)
+
+    seen: list[int] = []
+    sweep(base, (Axis("a.mode", ("1", "2")),), out, frames=1, session=gl, progress=second)
+    assert seen
+    assert sweep(base, (Axis("a.mode", ("1", "2")),), out, frames=1, session=gl, resume=True).resumed == 2
 
 
 GLOW = """
@@ -295,6 +408,14 @@ def test_malformed_axes_are_told(text: str, message: str) -> None:
         parse_axis(text)
 
 
+def test_many_values_are_read_in_no_time() -> None:
+    start = time.monotonic()
+    assert len(parse_axis("a.b=" + ",".join(map(str, range(100_000)))).values) == 100_000
+    with pytest.raises(ValueError, match="has the value 7 twice"):
+        parse_axis("a.b=" + ",".join(map(str, [*range(100_000), 7])))
+    assert time.monotonic() - start < 20  # comparing each with each takes minutes
+
+
 def test_axes_as_a_whole_are_checked() -> None:
     with pytest.raises(InputError, match="RG524 the sweep has no axis"):
         check_axes([])
@@ -338,7 +459,9 @@ def test_a_sweep_is_a_file_too(tmp_path: Path) -> None:
 
 def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "study.yaml"
-    path.write_text("sweep: 2\naxis: {a.b: [1]}\nsize: [48]\naxes: {a.b: [], c.d: 3, e.f: [1, 1]}\nframes: 0\n")
+    path.write_text(
+        "sweep: 2\naxis: {a.b: [1]}\nsize: [48]\naxes: {a.b: [], c.d: 3, e.f: [1, 1]}\nframes: 1000000000000\n"
+    )
     with pytest.raises(InputError) as caught:
         read_sweep(path)
     told = [f"{p.place.line if p.place else 0} {p.text}" for p in caught.value.problems]
@@ -348,7 +471,7 @@ def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
         "3 'size' takes width and height in pixels, 1 to 16384, as in size: [1280, 720], this is [48]",
         "4 'a.b' takes a list of values, as in axes: {NODE.PARAM: [VALUE, VALUE]}, this is []",
         "4 'c.d' takes a list of values, as in axes: {NODE.PARAM: [VALUE, VALUE]}, this is 3",
-        "5 'frames' takes a whole number from 1 up, this is 0",
+        "5 'frames' takes a whole number from 1 to 10000, this is 1000000000000",
         "1 a sweep needs 'pipeline'; add pipeline: NAME",
         "4 axis 'e.f' has the value 1 twice",
     ]
@@ -375,14 +498,15 @@ def test_what_is_no_sweep_is_none(tmp_path: Path) -> None:
     assert not any(is_sweep(tmp_path / name) for name in ("p.yaml", "bad.yaml", "missing.yaml"))
 
 
-def fake(ms: float, flip: float) -> Any:
+def fake(ms: float, flip: float, not_finite: int = 0) -> Any:
     from types import SimpleNamespace
 
-    return SimpleNamespace(
-        times=SimpleNamespace(headline=SimpleNamespace(median=ms)), metrics=SimpleNamespace(flip=flip)
-    )
+    times, figures = SimpleNamespace(headline=SimpleNamespace(median=ms)), SimpleNamespace(flip=flip)
+    return SimpleNamespace(times=times, metrics=figures, not_finite=not_finite)
 
 
 def test_the_front_is_what_nothing_beats() -> None:
     slow, quick, worse, broken = fake(3, 0.1), fake(1, 0.5), fake(2, 0.6), fake(0.5, float("nan"))
     assert pareto([slow, quick, worse, broken]) == [quick, slow]
+    hidden = fake(0.5, 0.0, not_finite=3)  # 8 bits show nothing of it
+    assert pareto([slow, quick, hidden]) == [quick, slow]

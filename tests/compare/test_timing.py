@@ -31,7 +31,7 @@ TEXT = "nodes: {t: {type: twice}}\noutputs: {image: t.color}"
 
 
 def test_each_step_has_its_times_and_the_label_that_its_author_gave(bench: Any) -> None:
-    frame = bench.draw(TEXT, Twice, shaders=SHADERS, frames=range(1, 4))
+    frame = bench.draw(TEXT, Twice, shaders=SHADERS, frames=range(1, 4), timed=True)
     found = step_times(frame.times)
     assert [(step["node"], step["step"], step["label"]) for step in found] == [("t", 0, ""), ("t", 1, "double")]
     assert all(step["cpu_ms"]["min"] <= step["cpu_ms"]["median"] <= step["cpu_ms"]["max"] for step in found)

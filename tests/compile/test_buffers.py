@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import moderngl
@@ -159,6 +160,136 @@ def test_a_draw_whose_count_a_compute_shader_decides(draw: Draw) -> None:
         "image"
     ]
     assert image.sum() == 5
+
+
+class Commands(Node):
+    """Two of three draw commands that the CPU writes."""
+
+    color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 at every point.")
+    commands = Internal(kind="buffer", bytes=3 * 20)
+
+    def record(self, steps: Steps) -> None:
+        for command in (0, 2):
+            steps.draw("one.frag", vertex="points.vert", vertices=self.commands, command=command, topology="points")
+
+    def update(self, frame: Frame) -> None:
+        frame.write(self.commands, np.array([[2, 1, 0, 0, 0], [4, 1, 2, 0, 0], [3, 1, 6, 0, 0]], np.int32))
+
+
+def test_a_draw_takes_one_of_several_commands(draw: Draw) -> None:
+    shaders = {
+        "one.frag": "out float r; void main() { r = 1.0; }",
+        "points.vert": """void main() { gl_PointSize = 1.0;
+            gl_Position = vec4((float(gl_VertexID) + 0.5) / 8.0 - 1.0, 1.0 / 8.0 - 1.0, 0.0, 1.0); }""",
+    }
+    image = draw("nodes: {c: {type: commands}}\noutputs: {image: c.color}", Commands, shaders=shaders, size=(16, 8))
+    assert np.flatnonzero(image["image"][-1, :, 0]).tolist() == [0, 1, 6, 7, 8]
+
+
+class Fill(Node):
+    """A buffer that holds one number."""
+
+    values = Output(AnyTexel, kind="buffer", bytes=4 * 128, doc="The number.")
+    value: float = param(default=1.0, doc="The number.")
+
+    def record(self, steps: Steps) -> None:
+        steps.compute("fill.comp", over=128)
+
+
+class Shown(Node):
+    """A buffer's numbers, and the mean of those far away."""
+
+    values = Input(AnyTexel, kind="buffer", doc="What is shown.")
+    color = Output(Radiance, format="r32f", doc="The numbers.")
+
+
+FILL = {
+    "fill.comp": """layout(local_size_x = 64) in; layout(std430) buffer values { float v[]; };
+        uniform float value;
+        void main() { v[gl_GlobalInvocationID.x] = value; }""",
+    "shown.frag": """layout(std430) readonly buffer values { float v[]; }; out float color;
+        void main() {
+            int at = int(gl_FragCoord.y) * 16 + int(gl_FragCoord.x);
+            for (int i = 0; i < 64; i++) color += v[(at + i * i) % 128] / 64.0;
+        }""",
+}
+
+
+def test_a_buffer_is_not_filled_again_before_who_reads_it_is_done(bench: Any) -> None:
+    """A draw that reads it may not have run when the next shader that stores there begins."""
+    text = """nodes:
+  a: {type: fill, params: {value: 1}}
+  b: {type: fill, params: {value: 2}}
+  one: {type: shown, inputs: {values: a.values}}
+  two: {type: shown, inputs: {values: b.values}}
+outputs: {image: one.color, other: two.color}"""
+    pipeline = bench.pipeline(text, Fill, Shown, shaders=FILL)
+    plan = pipeline.plan()
+    assert plan.placement["a.values"] == plan.placement["b.values"]
+    frame = bench.session.render(pipeline)
+    assert (frame["image"] == 1).all()
+    assert (frame["other"] == 2).all()
+
+
+class Redrawn(Node):
+    """Drawn, looked at, and drawn again; after another target's turn a compute shader looks at it."""
+
+    color = Output(Radiance, format="r32f", doc="What the compute shader found.")
+    first = Output(Radiance, format="r32f", doc="What was there at first.")
+    twice = Internal(format="r32f", clear=0.0)
+    other = Internal(format="r32f", clear=0.0)
+    values = Internal(kind="buffer", bytes=4 * 128)
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("number.frag", out={"c": self.twice}, number=1.0)
+        steps.fullscreen("look.frag", out={"c": self.first}, source=self.twice)
+        steps.fullscreen("number.frag", out={"c": self.twice}, number=2.0)
+        steps.fullscreen("number.frag", out={"c": self.other}, number=3.0)
+        steps.compute("look.comp", over=128, out=self.values, source=self.twice, other=self.other)
+        steps.fullscreen("shown.frag", out=self.color, values=self.values)
+
+
+def test_a_compute_shader_sees_what_was_drawn_last(bench: Any) -> None:
+    """Mesa's software rasteriser gave it what an earlier draw had left."""
+    shaders = FILL | {
+        "number.frag": """uniform float number; out float c;
+            void main() { for (int i = 0; i < 4096; i++) c += number / 4096.0; }""",
+        "look.frag": "uniform sampler2D source; out float c;"
+        "void main() { c = texelFetch(source, ivec2(gl_FragCoord.xy), 0).r; }",
+        "look.comp": """layout(local_size_x = 64) in; uniform sampler2D source; uniform sampler2D other;
+            layout(std430) buffer values { float v[]; };
+            void main() {
+                int i = int(gl_GlobalInvocationID.x);
+                ivec2 p = ivec2(i % 16, i / 16);
+                v[i] = texelFetch(source, p, 0).r;
+            }""",
+    }
+    text = "nodes: {r: {type: redrawn}}\noutputs: {image: r.color, first: r.first}"
+    for frame in bench.frames(text, Redrawn, shaders=shaders, size=(64, 64), frames=range(1, 9)):
+        assert (frame["first"] == 1).all()
+        assert (frame["image"] == 2).all()
+
+
+class Filled(Node):
+    """Filled twice, then looked at."""
+
+    color = Output(Radiance, format="r32f", doc="What is there.")
+    values = Internal(kind="buffer", bytes=4 * 128)
+
+    def record(self, steps: Steps) -> None:
+        steps.compute("fill.comp", over=128, out=self.values, value=1.0)
+        steps.compute("fill.comp", over=128, out=self.values, value=2.0)
+        steps.fullscreen("shown.frag", out=self.color, values=self.values)
+
+
+def test_one_barrier_stands_between_two_steps_that_store(bench: Any) -> None:
+    pipeline = bench.pipeline("nodes: {f: {type: filled}}\noutputs: {image: f.color}", Filled, shaders=FILL)
+    with bench.session.current():
+        (steps,) = bench.session.compile(pipeline).executable.lists
+        barrier = bench.session.device.raw.glMemoryBarrier
+        flat = [getattr(call, "func", None) is barrier for step in steps for call in step.calls]
+    assert [len(list(run)) for is_barrier, run in groupby(flat) if is_barrier] == [1, 1, 1]
+    assert (bench.session.render(pipeline)["image"] == 2).all()
 
 
 class Seeded(Node):

@@ -22,6 +22,7 @@ class Program:
         self.glo = glo
         self.looks_at = looks_at
         self.blocks: dict[str, int] = {}
+        self.uniforms = looks_at
 
     def writer(self, name: str, value: Any) -> Callable[[], None] | None:
         return partial(say, f"{self.glo}.{name}={value}") if name in self.looks_at else None
@@ -39,7 +40,9 @@ def step(number: int, *draws: Draw, **more: Any) -> CompiledStep:
 def executable(*steps: CompiledStep) -> Executable:
     nothing = cast(Any, None)
     plan = cast(Any, SimpleNamespace(resources={}, schedule=SimpleNamespace(steps=[one.step for one in steps])))
-    made = Executable(nothing, plan, nothing, nothing, binds=[[]], steps=[list(steps)], timers=[nothing] * len(steps))
+    made = Executable(
+        nothing, plan, nothing, nothing, nothing, binds=[[]], steps=[list(steps)], timers=[nothing] * len(steps)
+    )
     made.assemble()
     return made
 

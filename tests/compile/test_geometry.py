@@ -42,7 +42,7 @@ class Ids(Node):
     """The object's number plus one, 0 where nothing is."""
 
     color = Output(Radiance, format="r32f", clear=0.0, doc="Object.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
     objects: str | tuple[str, ...] = structural(default="all", doc="Which.")
 
     def record(self, steps: Steps) -> None:
@@ -131,7 +131,7 @@ class Behind(Node):
             materials="none",
             depth=self.depth.tested(),
             view=self.depth,
-            state=State(depth_write=False, depth_func="less"),
+            state=State(depth_write=False, depth_func="greater"),
         )
 
 
@@ -149,7 +149,7 @@ class Through(Node):
     """The scene's depth through a view."""
 
     view = Input(View, kind="view", doc="Which.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
     def record(self, steps: Steps) -> None:
         steps.geometry(None, vertex="<depth.vert>", out=self.depth, materials="none")
@@ -158,14 +158,14 @@ class Through(Node):
 def test_a_node_that_makes_nothing_but_views_is_updated(draw: Draw) -> None:
     scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
     text = "nodes: {b: {type: back}, t: {type: through, inputs: {view: b.views}}}\noutputs: {depth: t.depth}"
-    assert draw(text, Back, Through, scene=scene)["depth"].min() < 1.0
+    assert draw(text, Back, Through, scene=scene)["depth"].max() > 0.0
 
 
 class Turned(Node):
     """Depth of one object, seen from the other side."""
 
     views = Views(doc="From behind.")
-    depth = Output(Depth, format="depth32f", clear=1.0, view="views", doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, view="views", doc="Depth.")
 
     def record(self, steps: Steps) -> None:
         steps.geometry(None, out=self.depth, objects=("left",), materials="none", view=self.views)
@@ -369,3 +369,68 @@ cameras: {main: {eye: [0, 0, 5], target: [0, 0, 0], height: 2, near: 0.1, far: 5
     )
     seen = [float(frame["image"][4, 4, 0]) for frame in frames]
     np.testing.assert_allclose(seen, [0.5 * 2 + 0.25 * 1, 0.5 * 1 + 0.25 * 2])
+
+
+class Folds(Node):
+    """Faces by how many of their three neighbours lie in their plane."""
+
+    color = Output(Radiance, format="rg32f", clear=-1.0, doc="Neighbours in the plane, and the object.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
+    objects: str | tuple[str, ...] = structural(default="opaque", doc="Which.")
+
+    def record(self, steps: Steps) -> None:
+        out = {"color": self.color, "depth": self.depth}
+        steps.geometry(
+            "folds.frag", geometry="folds.geom", out=out, objects=self.objects, topology="triangles_adjacency"
+        )
+
+
+FOLDS = {
+    "folds.geom": """
+        layout(triangles_adjacency) in;
+        layout(triangle_strip, max_vertices = 3) out;
+        in vec3 v_position[];
+        flat in int v_object[];
+        flat out vec2 g_color;
+        void main() {
+            vec3 normal = cross(v_position[2] - v_position[0], v_position[4] - v_position[0]);
+            float flat_ones = 0.0;
+            for (int i = 1; i < 6; i += 2) {
+                flat_ones += float(abs(dot(normal, v_position[i] - v_position[0])) < 1e-5);
+            }
+            for (int i = 0; i < 6; i += 2) {
+                g_color = vec2(flat_ones, float(v_object[0]));
+                gl_Position = gl_in[i].gl_Position;
+                EmitVertex();
+            }
+        }""",
+    "folds.frag": "flat in vec2 g_color; out vec2 color; void main() { color = g_color; }",
+}
+FOLDED = (
+    "objects:\n"
+    "  left: {shape: box, at: [-0.5, 0, 0], rotate_degrees: [20, 30, 0], scale: 0.5}\n"
+    "  right: {shape: box, at: [0.5, 0, 0], rotate_degrees: [20, 30, 0], scale: [-0.5, 0.5, 0.5]}\n" + CAMERA
+)
+
+
+def test_triangles_with_adjacency_know_their_neighbours(draw: Draw) -> None:
+    """Two triangles make a face of a box: each has one neighbour in its plane, and two round the corner."""
+    text = "nodes: {f: {type: folds}}\noutputs: {image: f.color}"
+    frame = draw(text, Folds, shaders=FOLDS, scene=FOLDED, size=(32, 32))
+    assert {tuple(color) for color in frame["image"].reshape(-1, 2)} == {(-1, -1), (1, 0), (1, 1)}
+    again = draw(text, Folds, shaders=FOLDS, scene=FOLDED, size=(32, 32))
+    assert np.array_equal(frame["image"], again["image"])
+
+
+def test_open_meshes_have_no_neighbours_and_check_says_where(bench: Any) -> None:
+    scene = FOLDED.replace("  left:", "  floor: {shape: plane, size: [2, 2], casts_shadow: false}\n  left:")
+    text = "nodes: {f: {type: folds}}\noutputs: {image: f.color}"
+    expected = (
+        r"RG209 node 'f' \(folds\): object 'floor' is not closed: in its mesh 'plane' only one triangle has the edge "
+        r"from \(-1, 0, -1\) to \(-1, 0, 1\)"
+    )
+    with pytest.raises(InputError, match=expected):
+        bench.pipeline(text, Folds, shaders=FOLDS, scene=scene).check()
+    bench.pipeline(
+        text.replace("folds}", "folds, params: {objects: casters}}"), Folds, shaders=FOLDS, scene=scene
+    ).check()

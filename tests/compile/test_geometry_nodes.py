@@ -180,7 +180,7 @@ def test_what_the_device_cannot_hold_is_said_with_numbers(author: Any, gl: rg.Se
         pytest.skip("this device can")
     author.node(body)
     (said,) = author.said(lambda: gl.render(author.pipeline()))
-    assert said == f"RG435 {text}, which is more than this device's {gl.device.limits[limit]}"
+    assert said.rpartition("3: ")[2] == f"RG435 {text}, which is more than this device's {gl.device.limits[limit]}"
 
 
 def test_more_views_than_a_block_holds(author: Any, gl: rg.Session) -> None:
@@ -189,7 +189,7 @@ def test_more_views_than_a_block_holds(author: Any, gl: rg.Session) -> None:
         'def record(self, steps):\n    steps.geometry("wrong.frag", view=self.views)\n\n'
         "def update(self, frame):\n    frame.set_views(self.views, [frame.camera] * 200)"
     )
-    most = gl.device.limits["uniform_block"] // 432
+    most = gl.device.limits["uniform_block"] // 448
     if most >= 200:
         pytest.skip("this device can")
     (said,) = author.said(lambda: gl.render(author.pipeline(scene=SCENE.replace("file: quad.obj", "shape: box"))))
@@ -210,8 +210,8 @@ def test_more_targets_than_the_device_takes(author: Any, gl: rg.Session) -> None
 def test_more_tables_and_buffers_than_the_device_binds(
     author: Any, gl: rg.Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(gl.device.limits, "uniform_bindings", 6)
-    monkeypatch.setitem(gl.device.limits, "storage_bindings", 6)
+    monkeypatch.setitem(gl.device.limits, "uniform_bindings", 7)
+    monkeypatch.setitem(gl.device.limits, "storage_bindings", 7)
     author.node(
         'color = Output(Radiance, doc="Colour.")\nviews = Views(doc="One.")\none = Internal(kind="buffer", bytes=8)\n'
         'two = Internal(kind="buffer", bytes=8)\n\ndef record(self, steps):\n'

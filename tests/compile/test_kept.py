@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from rendergraph.api import (
     State,
     Steps,
     param,
+    structural,
 )
 from rendergraph.errors import InputError
 
@@ -74,6 +76,12 @@ outputs: {image: b.color}
 """
 
 
+@pytest.fixture
+def draw(bench: Any) -> Draw:
+    """Draws with each step measured: so the frame knows which ran."""
+    return partial(bench.draw, timed=True)
+
+
 def ran(frame: rg.Frame) -> list[list[str]]:
     """The nodes of each frame's steps."""
     return [[step.node for step in times.steps] for times in frame.times]
@@ -93,20 +101,20 @@ def test_the_warm_up_frame_pays(draw: Draw) -> None:
 
 def test_a_session_keeps_it_between_renders(bench: Any) -> None:
     pipeline = bench.pipeline(TEXT, Table, Show, shaders=SHADERS)
-    bench.session.render(pipeline, warm_up=False)
-    assert ran(bench.session.render(pipeline, warm_up=False)) == [["b"]]
-    gained = bench.session.render(pipeline.set("b.gain", 2.0), warm_up=False)
+    bench.session.render(pipeline, warm_up=False, timed=True)
+    assert ran(bench.session.render(pipeline, warm_up=False, timed=True)) == [["b"]]
+    gained = bench.session.render(pipeline.set("b.gain", 2.0), warm_up=False, timed=True)
     assert ran(gained) == [["b"]]
     assert (gained["image"] == 12.0).all()
 
 
 def test_a_changed_value_makes_it_and_what_reads_it_again(bench: Any) -> None:
     pipeline = bench.pipeline(TEXT, Table, Show, shaders=SHADERS)
-    bench.session.render(pipeline, warm_up=False)
-    again = bench.session.render(pipeline.set("a.value", 5.0), frames=range(1, 3), warm_up=False)
+    bench.session.render(pipeline, warm_up=False, timed=True)
+    again = bench.session.render(pipeline.set("a.value", 5.0), frames=range(1, 3), warm_up=False, timed=True)
     assert ran(again) == [["a", "a", "b"], ["b"]]
     assert (again["image"] == 10.0).all()
-    assert (bench.session.render(pipeline, warm_up=False)["image"] == 6.0).all()
+    assert (bench.session.render(pipeline, warm_up=False, timed=True)["image"] == 6.0).all()
 
 
 def test_a_change_downstream_leaves_what_is_before_it(bench: Any) -> None:
@@ -128,12 +136,12 @@ nodes:
 outputs: {image: b.color}
 """
     pipeline = bench.pipeline(text, Table, Show, Later, shaders=SHADERS)
-    first = bench.session.render(pipeline, warm_up=False)
+    first = bench.session.render(pipeline, warm_up=False, timed=True)
     assert ran(first) == [["a", "c", "b"]]
-    again = bench.session.render(pipeline.set("c.gain", 2.0), warm_up=False)
+    again = bench.session.render(pipeline.set("c.gain", 2.0), warm_up=False, timed=True)
     assert ran(again) == [["c", "b"]]
     assert (again["image"] == 6.0).all()
-    assert ran(bench.session.render(pipeline.set("a.value", 1.0).set("c.gain", 2.0), warm_up=False)) == [
+    assert ran(bench.session.render(pipeline.set("a.value", 1.0).set("c.gain", 2.0), warm_up=False, timed=True)) == [
         ["a", "c", "b"]
     ]
 
@@ -152,10 +160,41 @@ class Summed(Node):
 def test_what_is_drawn_onto_is_made_again_with_what_is_drawn(bench: Any) -> None:
     text = TEXT.replace("type: table", "type: summed").replace("a.doubled", "a.table")
     pipeline = bench.pipeline(text, Summed, Show, shaders=SHADERS)
-    assert (bench.session.render(pipeline, warm_up=False)["image"] == 4.0).all()
-    again = bench.session.render(pipeline.set("a.value", 5.0), warm_up=False)
+    assert (bench.session.render(pipeline, warm_up=False, timed=True)["image"] == 4.0).all()
+    again = bench.session.render(pipeline.set("a.value", 5.0), warm_up=False, timed=True)
     assert ran(again) == [["a", "a", "b"]]
     assert (again["image"] == 6.0).all()
+
+
+class Overdrawn(Node):
+    """A kept table that is drawn onto after another has been made of it."""
+
+    table = Output(Radiance, format="rgba32f", size=(4, 4), kept=True, doc="The value, and once more.")
+    middle = Output(Radiance, format="rgba32f", size=(4, 4), kept=True, doc="The first value times a gain.")
+    value: float = param(default=3.0, min=-100, max=100, doc="Value.")
+    gain: float = structural(default=1.0, min=-100, max=100, doc="Factor, in one step alone.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("fill.frag", out=self.table, label="fill")
+        out = {"color": self.middle}
+        steps.fullscreen("show.frag", table=self.table, out=out, label="middle", gain=self.gain)
+        steps.fullscreen("fill.frag", out=self.table, state=State(blend=ADD), label="add")
+
+
+def test_what_was_read_before_it_was_drawn_over_is_made_again_first(bench: Any) -> None:
+    text = """
+nodes:
+  a: {type: overdrawn}
+  b: {type: show, inputs: {table: a.middle}}
+  c: {type: show, inputs: {table: a.table}}
+outputs: {image: b.color, table: c.color}
+"""
+    pipeline = bench.pipeline(text, Overdrawn, Show, shaders=SHADERS)
+    first = bench.session.render(pipeline, warm_up=False, timed=True)
+    assert ((first["image"] == 3.0) & (first["table"] == 6.0)).all()
+    again = bench.session.render(pipeline.set("a.gain", 2.0), warm_up=False, timed=True)
+    assert [step.label for step in again.times[0].steps if step.label] == ["fill", "middle", "add"]
+    assert ((again["image"] == 6.0) & (again["table"] == 6.0)).all()
 
 
 class Trail(Node):
@@ -196,7 +235,8 @@ def test_a_tapped_kept_value_stays_kept(draw: Draw) -> None:
 def test_kept_memory_is_in_the_plan(bench: Any) -> None:
     plan = bench.pipeline(TEXT, Table, Show, shaders=SHADERS).plan()
     assert plan.resources["a.table"].role == plan.resources["a.doubled"].role == "kept"
-    assert [(life.first, life.last) for life in plan.lifetimes.values()] == [(0, 2)] * 3
+    lives = {id: (life.first, life.last) for id, life in plan.lifetimes.items()}
+    assert lives == {"a.table": (0, 2), "a.doubled": (0, 2), plan.schedule.wanted["image"]: (2, 2)}
     assert plan.memory.allocated_bytes == 16 * 16 + 4 * 16 + 16 * 8 * 8
     assert plan.memory.lower_bound_bytes == plan.memory.allocated_bytes
     assert plan.reasons["a.table"].startswith("it outlives the frame")
@@ -308,7 +348,7 @@ class Uploads(Made):
 class DepthMaker(Node):
     """Depth that is not kept."""
 
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
     def record(self, steps: Steps) -> None:
         steps.clear(self.depth, 1.0)

@@ -200,7 +200,7 @@ def test_stencil_marks_where_the_next_step_draws(draw: Draw) -> None:
         """A triangle marks the stencil, a full-screen pass draws where the mark is, another where it is not."""
 
         color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 inside, 2 outside.")
-        marks = Internal(Depth, format="depth24_stencil8", clear=1.0)
+        marks = Internal(Depth, format="depth24_stencil8", clear=0.0)
 
         def record(self, steps: Steps) -> None:
             mark = StencilFace(func="always", reference=1, depth_pass="replace")
@@ -230,7 +230,7 @@ def test_stencil_is_cleared_whatever_mask_the_frame_before_has_left(draw: Draw) 
         """Counts up in the stencil, then draws where it counts one, with the stencil guarded against writing."""
 
         color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 where the stencil is 1.")
-        marks = Internal(Depth, format="depth32f_stencil8", clear=1.0)
+        marks = Internal(Depth, format="depth32f_stencil8", clear=0.0)
 
         def record(self, steps: Steps) -> None:
             count = State(stencil=Stencil(StencilFace(func="always", depth_pass="incr")), depth_write=False)
@@ -249,10 +249,10 @@ def test_depth_of_another_node_is_tested_and_not_written(draw: Draw) -> None:
     class Near(Node):
         """A triangle at window depth 0.5."""
 
-        depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+        depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
         def record(self, steps: Steps) -> None:
-            steps.draw(None, vertex="triangle.vert", vertices=3, height=0.0)
+            steps.draw(None, vertex="triangle.vert", vertices=3, height=0.5)
 
     class Behind(Node):
         """Draws the whole picture behind and before that triangle."""
@@ -261,7 +261,7 @@ def test_depth_of_another_node_is_tested_and_not_written(draw: Draw) -> None:
         color = Output(AnyTexel, format="r32f", clear=0.0, doc="Where it is seen.")
 
         def record(self, steps: Steps) -> None:
-            steps.draw("number.frag", vertex="whole.vert", vertices=3, height=0.5, number=1.0)
+            steps.draw("number.frag", vertex="whole.vert", vertices=3, height=0.25, number=1.0)
 
     whole = """uniform float height; void main() {
         vec2 p = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2); gl_Position = vec4(p * 2.0 - 1.0, height, 1.0); }"""
@@ -272,7 +272,7 @@ def test_depth_of_another_node_is_tested_and_not_written(draw: Draw) -> None:
     frame = draw(text, Near, Behind, shaders=shaders, size=(8, 8))
     assert frame["image"][-1, 0, 0] == 0.0
     assert frame["image"][0, -1, 0] == 1.0
-    assert set(np.unique(frame["d"])) == {0.5, 1.0}
+    assert set(np.unique(frame["d"])) == {0.0, 0.5}
 
 
 def test_scissor_mask_and_blend(draw: Draw) -> None:
@@ -379,7 +379,7 @@ def test_a_clear_fills_missing_channels_with_zero_and_stays_in_range(draw: Draw)
 
 
 class Slope(Node):
-    """Depth that a shader computes, nearer to the right."""
+    """Depth that a shader computes, farther to the right."""
 
     slope = Output(Depth, format="depth32f", clear=0.25, doc="Depth.")
 
@@ -395,5 +395,5 @@ def test_a_fullscreen_step_writes_the_depth_it_computes(draw: Draw) -> None:
     expected = np.broadcast_to(1 - (np.arange(16, dtype=np.float32) + 0.5) / 16, (8, 16))
     text = "nodes: {s: {type: slope, params: {tested: %s}}}\noutputs: {depth: s.slope}\n"
     np.testing.assert_array_equal(draw(text % "false", Slope, shaders=shaders)["depth"][..., 0], expected)
-    kept = np.minimum(expected, 0.25)
+    kept = np.maximum(expected, 0.25)
     np.testing.assert_array_equal(draw(text % "true", Slope, shaders=shaders)["depth"][..., 0], kept)

@@ -196,7 +196,13 @@ def test_the_picture_is_well_formed_and_says_what_changed(make: Maker) -> None:
     a, b = make(BASE), make(nodes, sets=("ao.radius=0.75",), name="q")
     picture = diff_svg(a, b, diff(a, b))
     ET.fromstring(picture)
-    for text in ("radius 0.5 → 0.75", "− removed", "radiance ← light.radiance"):
+    for text in (
+        "radius 0.5 → 0.75",
+        "− removed",
+        "light.radiance → display.radiance",
+        "stable.stable → display.radiance",
+        "stroke-dasharray",
+    ):
         assert text in picture
 
 

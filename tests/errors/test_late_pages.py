@@ -196,6 +196,48 @@ def test_authors_mistakes(bench: Any, code: str, node: type[Node]) -> None:
     assert any(word in Path(__file__).read_text().splitlines()[int(here[2]) - 1] for word in ("steps.", "frame."))
 
 
+class Twice(Node):
+    """Declares one of two."""
+
+    color = Output(Radiance, doc="The picture.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("twice.frag", out=self.color)
+
+
+def test_an_out_that_nobody_declares(bench: Any) -> None:
+    def drawn(shader: str) -> rg.Pipeline:
+        shaders = {"twice.frag": f"{shader} void main() {{ color = vec4(1.0); }}"}
+        made: rg.Pipeline = bench.pipeline(
+            "nodes: {a: {type: twice}}\noutputs: {radiance: a.color}", Twice, shaders=shaders
+        )
+        return made
+
+    with pytest.raises(RendergraphError, match="RG448") as caught:
+        drawn("out vec4 color; out vec4 mask;").check()
+    told = re.sub(r"\S+\.py:\d+", "blur.py:2", said(caught.value))
+    assert re.sub(r"^\S+twice\.frag:(?=\d)", "", told) == page("RG448")["message"]
+    drawn("out vec4 color;\n#ifdef HAS_MASK\nout vec4 mask;\n#endif\n").check()
+    drawn("out vec4 color;").check()
+
+
+class Endless(Node):
+    """Never has enough."""
+
+    color = Output(Radiance, doc="Nothing.")
+
+    def record(self, steps: Steps) -> None:
+        while True:
+            steps.clear(self.color)
+
+
+@pytest.mark.slow
+def test_a_node_that_records_without_end_is_told(bench: Any) -> None:
+    pipeline = bench.pipeline("nodes: {a: {type: endless}}\noutputs: {radiance: a.color}", Endless)
+    with pytest.raises(RendergraphError, match=r"RG606 node 'a' .*records more than 100000 steps"):
+        bench.session.render(pipeline)
+
+
 def test_outputs_and_taps(gl: rg.Session, tmp_path: Path) -> None:
     forward = rg.load("forward", size=(16, 16))
     for code, options in (("RG205", {"outputs": ["imgae"]}), ("RG206", {"taps": ["light.radience"]})):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rendergraph.api import ADD, History, InOut, Input, Luminance, Node, Output, State, Steps
+from rendergraph.api import ADD, Depth, History, InOut, Input, Luminance, Node, Output, State, Steps
 from rendergraph.api import Any as AnyTexel
 from rendergraph.declare import declaration_mistakes
 from rendergraph.errors import InputError
@@ -61,6 +61,18 @@ outputs: {image: b.after}"""
     assert np.all(draw(text, Increment, shaders=SHADERS, frames=range(1, 5))["image"] == 108)
 
 
+def test_history_that_is_read_before_it_is_written_has_one_texture(bench: Any) -> None:
+    text = """nodes:
+  a: {type: increment, inputs: {before: b.after@previous}}
+  b: {type: increment, inputs: {before: a.after}}
+outputs: {image: b.after}"""
+    pipeline = bench.pipeline(text, Increment, shaders=SHADERS)
+    assert len(pipeline.plan().placement["b.after"]) == 1
+    for options in ({}, {"alias": False}, {"poison": True}):
+        frames = list(bench.session.frames(pipeline, frames=range(1, 5), **options))
+        assert [frame["image"].mean() for frame in frames] == [102, 104, 106, 108]
+
+
 def test_history_of_the_nodes_own(draw: Draw) -> None:
     text = "nodes: {c: {type: counter}}\noutputs: {image: c.color}"
     for frames in (1, 2, 3):
@@ -76,7 +88,7 @@ def test_history_starts_afresh_in_every_run(draw: Draw) -> None:
 
 
 @pytest.mark.parametrize("units", [None, 24])
-def test_history_goes_back_a_frame_whichever_are_drawn_and_however_few_units_there_are(
+def test_history_goes_back_a_frame_whichever_are_looked_at_and_however_few_units_there_are(
     bench: Any, gl: rg.Session, monkeypatch: pytest.MonkeyPatch, units: int | None
 ) -> None:
     if units is not None:
@@ -84,7 +96,21 @@ def test_history_goes_back_a_frame_whichever_are_drawn_and_however_few_units_the
     text = "nodes: {c: {type: counter}}\noutputs: {image: c.color}"
     size = (8, 8 if units is None else 9)  # another plan, so that it is compiled anew
     frames = bench.frames(text, Counter, shaders=SHADERS, size=size, frames=range(2, 9, 2))
-    assert [frame["image"][0, 0].tolist() for frame in frames] == [[6, 5], [7, 6], [8, 7], [9, 8]]
+    assert [frame["image"][0, 0].tolist() for frame in frames] == [[7, 6], [9, 8], [11, 10], [13, 12]]
+
+
+def test_a_frame_is_the_same_whichever_others_are_looked_at(bench: Any) -> None:
+    text = "nodes: {c: {type: counter}}\noutputs: {image: c.color}"
+    for frames in (range(7, 8), range(3, 8, 2), range(7, 4, -1), range(1, 9)):
+        drawn = bench.frames(text, Counter, shaders=SHADERS, frames=frames)
+        assert [frame["image"][0, 0, 0] for frame in drawn] == [5 + frame.number for frame in drawn]
+
+
+def test_nothing_leads_up_to_a_frame_that_remembers_nothing(bench: Any) -> None:
+    frame = bench.draw(
+        "nodes: {o: {type: ones}}\noutputs: {image: o.color}", Ones, shaders=CONTINUED, frames=range(10**9, 10**9 + 1)
+    )
+    assert frame.number == 10**9
 
 
 class Halve(Node):
@@ -238,3 +264,44 @@ def test_buffers_have_no_history() -> None:
         "count",
         "'count' is a History of a buffer; only textures keep last frame's values",
     )
+
+
+class Seen(Node):
+    """Depth of the scene."""
+
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="From the camera.")
+
+    def record(self, steps: Steps) -> None:
+        steps.geometry(None, vertex="<depth.vert>", out=self.depth, materials="none")
+
+
+class LastSurfaces(Node):
+    """World-space places of what the last frame's depth holds, by the view that belongs to it and by this frame's."""
+
+    depth = Input(Depth, doc="Last frame's.")
+    now = Input(Depth, doc="This frame's.")
+    there = Output(AnyTexel, format="rgba32f", doc="Height by last frame's view, by this one's, twice the former; 1.")
+
+
+def test_what_was_drawn_last_frame_has_last_frame_s_view(draw: Draw) -> None:
+    """A plane at a height of 0 under a camera that turns and sinks: each depth with its own view lies in it."""
+    scene = (
+        "objects: {plane: {shape: plane, size: [90, 90]}}\n"
+        "cameras: {main: {eye: [0, 3, 5], target: [0, 0, 0]}}\n"
+        "keyframes: {cameras.main.eye: {0: [0, 3, 5], 1: [2, 1, 4]}}\n"
+    )
+    shader = """uniform sampler2D depth; uniform sampler2D now; in vec2 v_uv; out vec4 there; void main() {
+        ivec2 p = ivec2(gl_FragCoord.xy);
+        float d = texelFetch(depth, p, 0).r;
+        there = vec4(world_position(depth_views[0], v_uv, d).y, world_position(now_views[0], v_uv, d).y,
+            world_position(previous_now_views[0], v_uv, d).y, is_nothing(d) ? 0.0 : 1.0); }"""
+    text = """nodes:
+  seen: {type: seen}
+  a: {type: last_surfaces, inputs: {depth: seen.depth@previous, now: seen.depth}}
+outputs: {image: a.there}"""
+    options: Any = {"frames": range(1, 9), "scene": scene}
+    found = draw(text, Seen, LastSurfaces, shaders={"last_surfaces.frag": shader}, **options)["image"]
+    places = found[found[..., 3] == 1]
+    assert len(places) > 50
+    assert np.abs(places[:, [0, 2]]).max() < 1e-3
+    assert np.abs(places[:, 1]).max() > 0.02

@@ -40,7 +40,69 @@ class Mix(Node):
         steps.fullscreen("mix.frag", out=self.mixed, scratch=self.scratch, b=self.b)
 
 
+class Tally(Node):
+    """A neighbour through two buffers: one that a compute shader fills, one that a fragment shader does."""
+
+    a = Input(AnyTexel, doc="One.")
+    b = Input(AnyTexel, doc="Two.")
+    mixed = Output(Radiance, format="rgba16f", doc="Both.")
+    filled = Internal(kind="buffer", bytes=16 * 8 * 16)
+    marked = Internal(kind="buffer", bytes=16 * 8 * 16)
+    shift: int = define(default=1, min=0, max=5, doc="How far the neighbour is.")
+
+    def record(self, steps: Steps) -> None:
+        steps.compute("fill.comp", over=(16, 8, 1), out=self.filled, a=self.a)
+        steps.fullscreen("mark.frag", out={"mixed": self.mixed, "marked": self.marked}, filled=self.filled, b=self.b)
+        steps.compute("fill.comp", over=(16, 8, 1), out={"filled": self.filled}, a=self.mixed)
+        steps.fullscreen("unmark.frag", out=self.mixed, marked=self.marked, filled=self.filled, b=self.b)
+
+
+class Stamp(Node):
+    """Drawn twice and looked at between, then an image that a compute shader stores."""
+
+    a = Input(AnyTexel, doc="One.")
+    b = Input(AnyTexel, doc="Two.")
+    mixed = Output(Radiance, format="rgba16f", doc="Both.")
+    twice = Internal(format="rgba16f")
+    before = Internal(format="rgba16f")
+    shift: int = define(default=1, min=0, max=5, doc="How far the neighbour is.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("copy.frag", out={"color": self.twice}, source=self.a)
+        steps.fullscreen("copy.frag", out={"color": self.before}, source=self.twice)
+        steps.fullscreen("copy.frag", out={"color": self.twice}, source=self.b)
+        steps.compute("stamp.comp", out=self.mixed, twice=self.twice, before=self.before)
+
+
 SHADERS = {
+    "copy.frag": "uniform sampler2D source; out vec4 color; void main() { color = texelFetch(source, ivec2(gl_FragCoord.xy), 0); }",
+    "fill.comp": """layout(local_size_x = 8, local_size_y = 8) in;
+        uniform sampler2D a; layout(std430) writeonly buffer filled { vec4 texels[]; };
+        void main() {
+            ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+            texels[p.y * 16 + p.x] = texelFetch(a, p, 0);
+        }""",
+    "mark.frag": """uniform sampler2D b; out vec4 mixed;
+        layout(std430) readonly buffer filled { vec4 texels[]; };
+        layout(std430) writeonly buffer marked { vec4 marks[]; };
+        void main() {
+            ivec2 p = ivec2(gl_FragCoord.xy);
+            mixed = texels[(p.y * 16 + p.x + SHIFT) % 128];
+            marks[p.y * 16 + p.x] = texelFetch(b, p, 0);
+        }""",
+    "unmark.frag": """uniform sampler2D b; out vec4 mixed;
+        layout(std430) readonly buffer filled { vec4 texels[]; };
+        layout(std430) readonly buffer marked { vec4 marks[]; };
+        void main() {
+            int at = int(gl_FragCoord.y) * 16 + int(gl_FragCoord.x);
+            mixed = texels[at] * 0.5 + marks[(at + SHIFT) % 128] * 0.25 + texelFetch(b, ivec2(gl_FragCoord.xy), 0) * 0.125;
+        }""",
+    "stamp.comp": """layout(local_size_x = 8, local_size_y = 8) in;
+        uniform sampler2D twice; uniform sampler2D before; uniform writeonly image2D mixed;
+        void main() {
+            ivec2 p = ivec2(gl_GlobalInvocationID.xy);
+            imageStore(mixed, p, texelFetch(twice, p, 0) * 0.5 + texelFetch(before, (p + SHIFT) % ivec2(16, 8), 0) * 0.25);
+        }""",
     "source.frag": "uniform float seed; out vec4 color; void main() { color = fract(gl_FragCoord.xyxy * vec4(0.13, 0.37, 0.71, 0.29) * seed); }",
     "narrow.frag": "uniform sampler2D a; out vec2 scratch; void main() { scratch = texelFetch(a, ivec2(gl_FragCoord.xy), 0).xz; }",
     "mix.frag": """uniform sampler2D scratch; uniform sampler2D b; out vec4 mixed;
@@ -51,11 +113,16 @@ SHADERS = {
 }
 
 
-def _graph(parents: list[tuple[int, int, int]], outputs: list[int]) -> str:
+Parents = list[tuple[str, int, int, int]]
+"""Type of each node, its inputs and its neighbour's distance."""
+
+
+def graph(parents: Parents, outputs: list[int]) -> str:
+    """A pipeline of two sources and these."""
     lines = ["nodes:", "  n0: {type: source}", "  n1: {type: source, params: {seed: 2.5}}"]
-    for number, (a, b, shift) in enumerate(parents, start=2):
+    for number, (kind, a, b, shift) in enumerate(parents, start=2):
         lines.append(
-            f"  n{number}: {{type: mix, inputs: {{a: n{a % number}.{_port(a % number)}, b: n{b % number}.{_port(b % number)}}}, "
+            f"  n{number}: {{type: {kind}, inputs: {{a: n{a % number}.{_port(a % number)}, b: n{b % number}.{_port(b % number)}}}, "
             f"params: {{shift: {shift}}}}}"
         )
     last = len(parents) + 1
@@ -74,15 +141,21 @@ def _same(a: Mapping[str, Any], b: Mapping[str, Any]) -> None:
         assert np.array_equal(a[name], b[name], equal_nan=False), name
 
 
+KINDS = st.sampled_from(["mix", "tally", "stamp"])
+
+
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
 @given(
-    parents=st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30), st.integers(0, 5)), min_size=2, max_size=12),
+    parents=st.lists(
+        st.tuples(KINDS, st.integers(0, 30), st.integers(0, 30), st.integers(0, 5)), min_size=2, max_size=12
+    ),
     outputs=st.lists(st.integers(0, 30), max_size=2),
     seed=st.integers(0, 1000),
 )
-def test_random_graphs(bench: Any, parents: list[tuple[int, int, int]], outputs: list[int], seed: int) -> None:
-    pipeline = bench.pipeline(_graph(parents, outputs), Source, Mix, shaders=SHADERS)
+def test_random_graphs(bench: Any, parents: Parents, outputs: list[int], seed: int) -> None:
+    pipeline = bench.pipeline(graph(parents, outputs), Source, Mix, Tally, Stamp, shaders=SHADERS)
     plain = bench.session.render(pipeline, alias=False)
+    _same(plain, bench.session.render(pipeline))
     _same(plain, bench.session.render(pipeline, poison=True))
     _same(plain, bench.session.render(pipeline, poison=True, shuffle=seed))
 
@@ -91,8 +164,11 @@ def test_random_graphs(bench: Any, parents: list[tuple[int, int, int]], outputs:
 @pytest.mark.parametrize("name", sorted(shipped_pipelines()))
 def test_shipped_pipelines(gl: rg.Session, name: str) -> None:
     pipeline = rg.load(name, size=(48, 32))
-    if "sun" in {node.id for node in pipeline.link().graph.nodes}:
-        pipeline = pipeline.set("sun.resolution", 256)  # blurred maps of full size take most of a minute
+    for node in [node.id for node in pipeline.link().graph.nodes]:  # maps of full size take most of a minute
+        if node.rpartition("/")[2] == "sun":
+            pipeline = pipeline.set(f"{node}.resolution", 256)
+        elif node in ("cube", "environment"):
+            pipeline = pipeline.set(f"{node}.{'resolution' if node == 'cube' else 'size'}", 32)
     plain = gl.render(pipeline, alias=False, frames=range(1, 3))
     assert any(array.any() for array in plain.values())
     _same(plain, gl.render(pipeline, poison=True, frames=range(1, 3)))
@@ -106,7 +182,9 @@ def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
     from rendergraph.execute import Runner
     from rendergraph.scene.cameras import view_matrices
 
-    pipeline = bench.pipeline(_graph([(0, 1, 1), (2, 0, 2), (3, 1, 3)], []), Source, Mix, shaders=SHADERS)
+    pipeline = bench.pipeline(
+        graph([("mix", 0, 1, 1), ("mix", 2, 0, 2), ("mix", 3, 1, 3)], []), Source, Mix, shaders=SHADERS
+    )
     session = bench.session
     right = session.render(pipeline, poison=True)["o4"]
     assert np.isfinite(right).all()

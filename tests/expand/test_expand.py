@@ -52,8 +52,20 @@ class Glow(Node):
         steps.fullscreen("glow.frag", out=self.color, state=State(blend=ADD))
 
 
+class Aside(Glow):
+    """Adds to what is there, and makes something else that needs nothing of it."""
+
+    other = Output(Radiance, clear=0.0, doc="Something else.")
+
+    def record(self, steps: Steps) -> None:
+        """What is wanted alone."""
+        if steps.used(self.color):
+            super().record(steps)
+        steps.fullscreen("aside.frag", out=self.other)
+
+
 def expanded(nodes: str, outputs: str, *wanted: Endpoint) -> Expansion:
-    catalog = Catalog.of(Source, Soft, Glow)
+    catalog = Catalog.of(Source, Soft, Glow, Aside)
     text = f"size: [64, 32]\nnodes:\n{nodes}\noutputs: {{{outputs}}}\n"
     graph = link(resolve(read(None, text, keep_going=True), catalog=catalog), catalog, ())
     return expand(graph, {str(end): end for end in wanted} if wanted else None)
@@ -99,6 +111,12 @@ def test_parameters_are_uniforms_and_defines_of_every_step_and_arguments_of_thei
         assert dict(step.defines)["KERNEL"] == "5"
         assert dict(step.shaders)["fragment"] == "soft.frag"
     assert across.reads[0].sampler.filter == "linear"
+
+
+def test_what_is_continued_and_not_touched_need_not_exist() -> None:
+    found = expanded("  s: {type: source}\n  a: {type: aside, inputs: {color: s.color}}", "image: a.other")
+    assert [step.node for step in found.steps] == ["a"]
+    assert "s.color" not in found.resources
 
 
 @pytest.mark.parametrize("also", [False, True])

@@ -23,14 +23,14 @@ RULES = {
     'more = Output(Radiance, format=lambda node, facts: ["rgba16f"], doc="D.")': "RG211 'a.more' (wrong): the rule for its format gives ['rgba16f'], not a format such as 'rgba16f' or None",
     'more = Output(Radiance, kind="texture2d_array", layers=lambda node, facts: 1 / 0, doc="D.")  # here': "'a.more' (wrong): the rule for its layers fails: wrong.py:{line}: ZeroDivisionError: division by zero",
     'more = Output(Radiance, mips=lambda node, facts: "all", doc="D.")': "'a.more' (wrong): the rule for its mips gives 'all', not a whole number from 0 up",
-    'more = Output(Radiance, samples=lambda node, facts: [4], doc="D.")': "'a.more' (wrong): the rule for its samples gives [4], not one of 1, 2, 4, 8, 16",
+    'more = Output(Radiance, samples=lambda node, facts: [4], doc="D.")': "'a.more' (wrong): the rule for its samples gives [4], not one of 1, 2, 4, 8, 16 or None",
     'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 2.5, doc="D.")': "'a.more' (wrong): the rule for its bytes gives 2.5, not a whole number from 1 up",
     'more = Output(Radiance, size=lambda node, facts: ("64", "48"), doc="D.")': "'a.more' (wrong): the rule for its size gives ('64', '48'), not width and height in whole texels",
     'more = Output(Radiance, size=lambda node, facts: (64.7, 48.9), doc="D.")': "'a.more' (wrong): the rule for its size gives (64.7, 48.9), not width and height in whole texels",
     'more = Output(Radiance, mips=lambda node, facts: True, doc="D.")': "'a.more' (wrong): the rule for its mips gives True, not a whole number from 0 up",
     'more = Output(Radiance, layers=lambda node, facts: True, doc="D.")': "'a.more' (wrong): the rule for its layers gives True, not a whole number from 0 up or None",
-    'more = Output(Radiance, samples=lambda node, facts: True, doc="D.")': "'a.more' (wrong): the rule for its samples gives True, not one of 1, 2, 4, 8, 16",
-    'more = Output(Radiance, samples=lambda node, facts: 4.0, doc="D.")': "'a.more' (wrong): the rule for its samples gives 4.0, not one of 1, 2, 4, 8, 16",
+    'more = Output(Radiance, samples=lambda node, facts: True, doc="D.")': "'a.more' (wrong): the rule for its samples gives True, not one of 1, 2, 4, 8, 16 or None",
+    'more = Output(Radiance, samples=lambda node, facts: 4.0, doc="D.")': "'a.more' (wrong): the rule for its samples gives 4.0, not one of 1, 2, 4, 8, 16 or None",
     'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 0, doc="D.")': "'a.more' (wrong): the rule for its bytes gives 0, not a whole number from 1 up",
     'color = Output(Radiance, clear=lambda node, facts: node.dark, doc="D.")  # here': "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
     "attribute 'dark'; there is color",
@@ -169,6 +169,21 @@ def test_an_update_that_fails(author: Any, gl: rg.Session, body: str) -> None:
     code = "RG432" if UPDATES[body].startswith("RG432") else "RG433"
     text = UPDATES[body].removeprefix("RG432 ")
     assert said == f"test.yaml:4:3: {code} node 'a' (wrong) failed in update: {where}: {text}"
+
+
+@pytest.mark.parametrize(
+    ("value", "said_of"),
+    [
+        ("1 / 0, 0.0", "wrong.py:{line}: ZeroDivisionError: division by zero"),
+        ("2.0, 0.0", "what camera_jitter returns is (2.0, 0.0), not x and y in texels, from -1 to 1"),
+        ("0.5", "what camera_jitter returns is 0.5, not x and y in texels, from -1 to 1"),
+    ],
+)
+def test_a_jitter_that_fails(author: Any, gl: rg.Session, value: str, said_of: str) -> None:
+    author.node(f"{COLOR}def camera_jitter(self, frame):\n    return {value}  # here")
+    (said,) = author.said(lambda: gl.render(author.pipeline()))
+    text = said_of.format(line=author.line())
+    assert said.removeprefix("test.yaml:4:3: RG433 node 'a' (wrong) failed in camera_jitter: ").endswith(text)
 
 
 SIGNATURES = {

@@ -323,7 +323,7 @@ class Everything(Node):
 
     color = Output(AnyTexel, format="rgba16f", clear=0.25, doc="What is drawn.")
     bytes8 = Output(AnyTexel, format="rgba8", doc="Bytes.")
-    deep = Internal(Depth, format="depth24_stencil8", clear=1.0)
+    deep = Internal(Depth, format="depth24_stencil8", clear=0.0)
 
     def record(self, steps: Steps) -> None:
         targets = {"color": self.color, "deep": self.deep}
@@ -448,12 +448,12 @@ def test_the_owners_time_query_goes_on(borrowed: tuple[rg.Session, Owner]) -> No
     pipeline = FORWARD
     query = owner.raw.make("glCreateQueries", 0x88BF)
     owner.raw.glBeginQuery(0x88BF, query)
-    frame = session.render(pipeline)
+    frame = session.render(pipeline, timed=True)
     assert {entry["gpu_ms"] for entry in frame.passes} == {None}
     assert owner.raw.current_query(0x88BF) == query
     owner.raw.glEndQuery(0x88BF)
     assert owner.raw.error() is None
-    assert None not in {entry["gpu_ms"] for entry in session.render(pipeline).passes}
+    assert None not in {entry["gpu_ms"] for entry in session.render(pipeline, timed=True).passes}
 
 
 def test_conditional_rendering_is_refused_and_goes_on(borrowed: tuple[rg.Session, Owner]) -> None:

@@ -48,6 +48,23 @@ def test_a_file_is_compiled_once_a_stage(shaders: Path) -> None:
     assert expand(shaders / "a.frag", shaders.parent / "include").text.count("int b;") == 1
 
 
+def test_what_is_not_beside_the_file_is_taken_from_the_extended_nodes_folders(shaders: Path) -> None:
+    base, include = shaders.parent / "base", shaders.parent / "include"
+    write(shaders, a__frag='#include "b.glsl"\n#include "d.glsl"\n', d__glsl="int own;\n")
+    write(base, b__glsl='#include "c.glsl"\n', c__glsl="int c;\n", d__glsl="int hidden;\n")
+    words = expand(shaders / "a.frag", include, inherited=(base,)).text.split()
+    assert words == ["int", "c;", "int", "own;"]
+    with pytest.raises(InputError, match=r"no include 'b\.glsl' beside the file;") as alone:
+        expand(shaders / "a.frag", include)
+    assert problem(alone).code == "RG401"
+    write(shaders, a__frag='#include "lihgt.glsl"\n')
+    write(base, light__glsl="int light;\n", out__frag='#include "../include/x.glsl"\n')
+    with pytest.raises(InputError, match=r"what its node extends; did you mean 'light\.glsl'"):
+        expand(shaders / "a.frag", include, inherited=(base,))
+    with pytest.raises(InputError, match="RG406"):
+        expand(base / "out.frag", include, inherited=(shaders,))  # neither from beside the file nor from the other
+
+
 def test_an_include_that_may_not_be_compiled_does_not_hide_a_later_one(shaders: Path) -> None:
     write(shaders, a__frag='#if X\n#include "b.glsl"\n#endif\n#include "b.glsl"\n', b__glsl="int b;\n")
     text = expand(shaders / "a.frag", shaders.parent / "include").text

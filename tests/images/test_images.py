@@ -348,10 +348,10 @@ def test_a_few_great_values_do_not_leave_the_rest_black() -> None:
 
 
 def test_depths_are_stretched_and_the_background_is_white() -> None:
-    depth = np.array([[0.9, 0.95, 1.0]], np.float32)
-    assert viewable(depth, "depth")[..., 0].tolist() == [[0, 255, 255]]
+    depth = np.array([[0.3, 0.1, 0.2, 0.0]], np.float32)
+    assert viewable(depth, "depth")[..., 0].tolist() == [[0, 255, 128, 255]]
     assert viewable(np.array([[2.0, 4.0, np.inf]], np.float32), "linear_depth")[..., 0].tolist() == [[0, 255, 255]]
-    assert viewable(np.ones((2, 2), np.float32), "depth").min() == 255
+    assert viewable(np.zeros((2, 2), np.float32), "depth").min() == 255
     assert viewable(np.full((2, 2), 0.5, np.float32), "depth").max() == 0
 
 

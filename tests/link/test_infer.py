@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from rendergraph.api import Facts, Input, Node, Output, Radiance, ShadowMap, Views
+from rendergraph.api import Depth, Facts, Input, Node, Output, Radiance, ShadowMap, View, Views
 from rendergraph.catalog import Catalog
 from rendergraph.declare import LightFacts
 from rendergraph.expand import ViewTable, expand
@@ -100,6 +100,57 @@ def test_there_is_a_view_and_a_layer_for_each_light() -> None:
     assert asked == {"lights": 1, "lit": 1}
     found = {end.port: info.desc.layers if info.desc else info.views for end, info in graph.textures.items()}
     assert found == {"views": 2, "maps": 2, "lit": 3, "plain": 1, "single": 1}
+
+
+class Wide(Node):
+    """A view that is larger than the picture."""
+
+    view = Views(size=lambda node, facts: (facts.viewport[0] + 8, facts.viewport[1] + 4), doc="One view.")
+
+    def record(self, steps: Any) -> None:
+        """Nothing."""
+
+
+class Drawn(Node):
+    """What is drawn with a view."""
+
+    view = Input(View, kind="view", optional=True, doc="Seen from.")
+    depth = Output(Depth, format="depth32f", doc="Depth.")
+
+
+class Half(Node):
+    """What is made of it, texel by texel, at half its size, and of the picture's."""
+
+    depth = Input(Depth, doc="Depth.")
+    radiance = Output(Radiance, doc="Radiance.")
+    half = Output(Radiance, size=0.5, doc="Half of it.")
+    fixed = Output(Radiance, size=(3, 2), doc="Its own.")
+
+    def record(self, steps: Any) -> None:
+        """Nothing."""
+
+
+class Small(Node):
+    """The picture again."""
+
+    source = Input(Radiance, size="any", doc="Radiance.")
+    cropped = Output(like="source", size=1.0, doc="Radiance.")
+
+
+def test_what_is_made_of_a_larger_view_is_as_large() -> None:
+    """And knows the view where it is of its size; what takes any size is the picture's again."""
+    catalog = Catalog.of(Wide, Drawn, Half, Small)
+    nodes = "w: {type: wide}, d: {type: drawn, inputs: {view: w.view}}, h: {type: half, inputs: {depth: d.depth}}"
+    text = f"size: [100, 50]\nnodes: {{{nodes}, s: {{type: small, inputs: {{source: h.radiance}}}}}}\noutputs: {{x: s.cropped}}"
+    graph = link(resolve(read(None, text), catalog=catalog), catalog)
+    found = {str(end): (info.desc.size, info.view) for end, info in graph.textures.items() if info.desc is not None}
+    assert found == {
+        "d.depth": ((108, 54), "w.view"),
+        "h.radiance": ((108, 54), "w.view"),
+        "h.half": ((54, 27), None),
+        "h.fixed": ((3, 2), None),
+        "s.cropped": ((100, 50), "w.view"),
+    }
 
 
 def test_a_port_without_a_rule_is_as_it_says() -> None:

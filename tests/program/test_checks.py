@@ -19,7 +19,7 @@ class Maker(Node):
     layered = Output(AnyTexel, kind="texture2d_array", layers=2, clear=0.0, doc="Layers.")
     cube = Output(AnyTexel, kind="texture_cube", size=(8, 8), clear=0.0, doc="Cube.")
     many = Output(AnyTexel, samples=4, clear=0.0, doc="Samples.")
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
     def record(self, steps: Steps) -> None:
         for port in (self.plain, self.whole, self.layered, self.cube, self.many, self.depth):

@@ -174,7 +174,7 @@ def test_a_map_of_no_light_is_culled_and_said_to_be(draw: Draw) -> None:
 class Plane(Node):
     """The scene's depth as the camera sees it."""
 
-    depth = Output(Depth, format="depth32f", clear=1.0, doc="Depth.")
+    depth = Output(Depth, format="depth32f", clear=0.0, doc="Depth.")
 
     def record(self, steps: Steps) -> None:
         steps.geometry("<depth.frag>", vertex="<depth.vert>", out=self.depth, materials="alpha")
@@ -194,7 +194,7 @@ cameras: {main: {eye: [0, 0, 2], target: [0, 0, 0], fov_y_degrees: 90, near: 0.1
     shader = {
         "position.frag": """in vec2 v_uv; uniform sampler2D depth; out vec4 position; void main() {
             float d = texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r;
-            position = vec4(world_position(depth_views[0], v_uv, d), d < 1.0 ? 1.0 : 0.0); }""",
+            position = vec4(world_position(depth_views[0], v_uv, d), is_nothing(d) ? 0.0 : 1.0); }""",
     }
     text = "nodes: {p: {type: plane}, q: {type: position, inputs: {depth: p.depth}}}\noutputs: {image: q.position, d: p.depth}"
     frame = draw(text, Plane, Position, shaders=shader, scene=scene, size=(16, 16))

@@ -170,6 +170,74 @@ def test_the_column_is_the_authors(folder: Path, line: str, said: str, marked: s
     assert marked or found.place.column == len(line) + 1
 
 
+MESA_CASCADE = """0:{0}(15): error: `amuont' undeclared
+0:{0}(11): error: no matching function for call to `mix(error, float, float)'; candidates are:
+0:{0}(11): error:    float mix(float, float, float)
+0:{0}(11): error:    vec2 mix(vec2, vec2, float)
+0:{0}(9): error: operands to arithmetic operators must be numeric
+0:{1}(9): error: `amuont' undeclared
+0:{2}(9): error: cannot construct `vec4' from a non-numeric data type
+"""
+NVIDIA_CASCADE = """0({0}) : error C1503: undefined variable "amuont"
+0({0}) : error C1115: unable to find compatible overloaded function "mix(error, float, float)"
+0({1}) : error C1503: undefined variable "amuont"
+"""
+GLSLANG_CASCADE = """ERROR: 0:{0}: 'amuont' : undeclared identifier
+ERROR: 0:{0}: '+' : wrong operand types
+ERROR: 0:{1}: 'amuont' : undeclared identifier
+"""
+CASCADE = """out vec4 color;
+uniform float amount;
+void main() {
+    float y = mix(amuont, 1.0, 0.5) + 1.0;
+    color = vec4(
+        amuont);
+}
+"""
+
+
+@pytest.mark.parametrize("said", [MESA_CASCADE, NVIDIA_CASCADE, GLSLANG_CASCADE])
+def test_a_misspelt_name_is_one_mistake(folder: Path, said: str) -> None:
+    (folder / "main.frag").write_text(CASCADE)
+    text = texts(folder, "main.frag")["fragment"]
+    lines = text.text.splitlines()
+    numbers = [lines.index(line) + 1 for line in CASCADE.splitlines()]
+    (found,) = compile_problems(said.format(numbers[3], numbers[5], numbers[4]), text)
+    assert found.place is not None
+    assert (found.place.line, found.place.column) == (4, 19)
+    assert found.text.endswith("; did you mean 'amount'?")
+
+
+def test_what_is_wrong_in_each_statement_is_told(folder: Path) -> None:
+    (folder / "main.frag").write_text("out vec4 c;\nvoid main() {\n    vec3 a = 1;\n    vec2 b = a;\n}\n")
+    text = texts(folder, "main.frag")["fragment"]
+    line = text.text.splitlines().index("    vec3 a = 1;") + 1
+    said = "0:{}(10): error: initializer of type int\n0:{}(10): error: initializer of type vec3\n"
+    found = compile_problems(said.format(line, line + 1), text)
+    assert [problem.place and problem.place.line for problem in found] == [3, 4]
+
+
+OVERLOADS = """0:{0}(9): error: no matching function for call to `textureLod(sampler2D, vec3, float)'; candidates are:
+0:{0}(9): error:    vec4 textureLod(sampler1D, float, float)
+0:{0}(9): error:    ivec4 textureLod(isampler2D, vec2, float)
+0:{0}(9): error:    vec4 textureLod(sampler3D, vec3, float)
+0:{0}(9): error:    vec4 textureLod(sampler2D, vec2, float)
+0:{0}(9): error:    vec4 textureLod(sampler2D, vec2)
+"""
+
+
+def test_of_overloads_the_nearest_are_told(folder: Path) -> None:
+    (folder / "main.frag").write_text("out vec4 c;\nvoid main() {\n    c = textureLod(t, vec3(0), 0.0);\n}\n")
+    text = texts(folder, "main.frag")["fragment"]
+    line = next(number for number, row in enumerate(text.text.splitlines(), start=1) if "textureLod" in row)
+    (found,) = compile_problems(OVERLOADS.format(line), text)
+    assert found.text == (
+        "node 'a': fragment shader: no matching function for call to `textureLod(sampler2D, vec3, float)'; the nearest of 5 "
+        "are vec4 textureLod(sampler2D, vec2, float); vec4 textureLod(sampler3D, vec3, float); "
+        "vec4 textureLod(sampler1D, float, float)"
+    )
+
+
 def test_the_vertex_stage_of_the_frameworks_own(folder: Path) -> None:
     vertex = texts(folder, "main.frag")["vertex"]
     found = answer("nvidia", vertex, "gl_Position", "gl_Position")

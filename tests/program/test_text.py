@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -13,7 +15,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.source import Origin, SourceText
-from rendergraph.program import StageText, compile_problems, link_problems, prefix, stage_texts
+from rendergraph.program import StageText, StepTexts, compile_problems, link_problems, prefix, stage_texts
 from rendergraph.resources import folder as folder_of
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
@@ -119,6 +121,42 @@ def folder(shaders: Path) -> Path:
         light__frag="out vec4 made;\nvoid main() { made = vec4(shadow(3, vec3(0.0), vec3(1.0))); }\n",
     )
     return shaders
+
+
+def test_texts_of_equal_steps_are_put_together_once_and_of_others_not(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = "rendergraph.program.text"
+    made: list[Step] = []
+
+    def counted(given: Step, *arguments: Any, **named: Any) -> dict[str, StageText]:
+        made.append(given)
+        return stage_texts(given, *arguments, **named, include_folder=folder.parent / "include")
+
+    monkeypatch.setattr(f"{whole}.stage_texts", counted)
+    resources = RESOURCES | {
+        "same": replace(RESOURCES["vis"], id="same"),
+        "wide": replace(RESOURCES["vis"], id="wide", desc=TextureDesc("texture2d_array", "r16", 8, 8, layers=5)),
+        "lit": replace(RESOURCES["vis"], id="lit", lights=(0, 3)),
+    }
+    texts = StepTexts(types(folder) | {"other": types(folder)["light"]}, resources, VIEWS)
+    base = step("sun-soft", visibility=True)
+    first = texts.of(base, {"A": "1"})
+    again = texts.of(replace(base, node="other", index=3, reads=(Read("visibility_0", "same", 2),)), {"A": "1"})
+    assert len(made) == 1
+    assert again["fragment"].text == first["fragment"].text
+    assert (first["fragment"].node, again["fragment"].node) == ("light", "other")
+    for given, defines in (
+        (base, {"A": "2"}),
+        (replace(base, defines=(("HAS_MASK", "0"),)), {"A": "1"}),
+        (replace(base, reads=(Read("visibility_0", "wide", 1),)), {"A": "1"}),
+        (replace(base, reads=(Read("visibility_0", "lit", 1),)), {"A": "1"}),
+        (step("lamp", visibility=True), {"A": "1"}),
+        (step("sun-soft"), {"A": "1"}),
+    ):
+        before = len(made)
+        texts.of(given, defines)
+        assert len(made) == before + 1
 
 
 def test_every_name_of_a_provider_is_prefixed(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from rendergraph.errors import InputError
-from rendergraph.scene import animate
+from rendergraph.scene import animate, framing
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
@@ -84,22 +85,51 @@ def test_a_still_scene_is_itself(tmp_path: Path) -> None:
     assert animate.at(scene, 3) is scene
 
 
-def test_framing_shows_the_whole_bounding_sphere(tmp_path: Path) -> None:
-    scene = animate.complete(read(tmp_path, "objects: {b: {shape: box, size: [2, 4, 6], at: [5, 5, 5]}}\n"))
+SHAPES = """
+objects:
+  knot: {shape: torus_knot, radius: 1, tube: 0.2, at: [5, 5, 5], rotate_degrees: [40, 0, 10]}
+  long: {shape: box, size: [8, 0.2, 0.3], at: [4, 3, 5], rotate_degrees: [0, 70, 0], scale: [1, 2, 1]}
+  again: {shape: sphere, radius: 0.5, at: [6, 6, 5]}
+"""
+
+
+@pytest.mark.parametrize("aspect", [16 / 9, 1.0, 0.4])
+def test_framing_is_as_near_as_points_allow(tmp_path: Path, aspect: float) -> None:
+    """Every vertex is in the picture, and along one axis both its sides are touched but for the margin."""
+    scene = animate.complete(read(tmp_path, SHAPES), aspect=aspect)
     camera = scene.cameras["default"]
-    center, radius = animate.bounding_sphere(scene)
-    assert center == (5, 5, 5)
-    assert radius == pytest.approx(math.sqrt(14))
-    away = camera.transform[:3, 3] - center
-    assert np.allclose(away / np.linalg.norm(away), np.array([1, 0.6, 1.5]) / np.linalg.norm([1, 0.6, 1.5]))
+    assert np.allclose(camera.transform[:3, 2], np.array([1, 0.6, 1.5]) / np.linalg.norm([1, 0.6, 1.5]))
     assert camera.fov_y == math.radians(45)
-    view = view_matrices(camera, (100, 100))
-    rng = np.random.default_rng(1)
-    points = rng.normal(size=(500, 3))
-    points = center + radius * points / np.linalg.norm(points, axis=1, keepdims=True)
-    clip = np.c_[points, np.ones(500)] @ (view.projection @ view.view).T
-    assert (np.abs(clip[:, :3]) <= clip[:, 3:] * 1.0001).all()
-    assert np.abs(clip[:, 1] / clip[:, 3]).max() > 0.95, "and no smaller than needed"
+    view = view_matrices(camera, (round(1000 * aspect), 1000))
+    points = np.concatenate(
+        [scene.meshes[o.mesh].positions @ o.transform[:3, :3].T + o.transform[:3, 3] for o in scene.objects]
+    )
+    clip = np.c_[points, np.ones(len(points))] @ (view.projection @ view.view).T
+    assert (np.abs(clip[:, 2]) < clip[:, 3]).all(), "between near and far"
+    seen = clip[:, :2] / clip[:, 3:]
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    assert np.allclose(high + low, 0, atol=0.03), "in the middle"
+    assert high.max() == pytest.approx(0.94, abs=1e-4)
+    eye = camera.transform[:3, 3]
+    aimed = np.array(camera.target) - eye
+    assert np.allclose(aimed / np.linalg.norm(aimed), -camera.transform[:3, 2]), "an orbit starts without a jump"
+
+
+def test_many_placed_vertices_are_framed_by_their_boxes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = read(tmp_path, SHAPES)
+    near = framing.framing_camera(scene)
+    monkeypatch.setattr(framing, "_MOST_POINTS", 0)
+    away = framing.framing_camera(scene)
+    distances = [float(np.linalg.norm(c.transform[:3, 3] - np.array([5, 5, 5]))) for c in (near, away)]
+    assert distances[0] < distances[1] < 1.3 * distances[0]
+
+
+def test_a_point_is_framed(tmp_path: Path) -> None:
+    """Something without any size, as large files have it by mistake, still has a camera."""
+    scene = animate.complete(read(tmp_path, "objects: {b: {shape: sphere, radius: 1, scale: 1e-9}}\n"))
+    camera = scene.cameras["default"]
+    assert np.isfinite(camera.transform).all()
+    assert 0 < camera.near < camera.far
 
 
 def test_key_light_comes_over_the_left_shoulder(tmp_path: Path) -> None:
@@ -119,11 +149,25 @@ def test_complete_takes_the_camera_asked_for(tmp_path: Path) -> None:
 
 def test_an_empty_scene_has_bounds(tmp_path: Path) -> None:
     scene = animate.complete(read(tmp_path, ""))
-    assert animate.bounds(scene) == ((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))
+    assert scene.bounds == ((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))
     assert scene.cameras
     assert scene.lights
 
 
+def test_bounds_are_those_of_every_turned_and_scaled_box(tmp_path: Path) -> None:
+    objects = "".join(
+        f"  o{n}: {{shape: {shape}, at: [{n}, {-n}, 2], rotate_degrees: [{17 * n}, {31 * n}, 5], scale: {1 + n / 4}}}\n"
+        for n, shape in enumerate(("box", "sphere", "torus", "plane", "box"))
+    )
+    scene = read(tmp_path, f"objects:\n{objects}")
+    corners = []
+    for entry in scene.objects:
+        low, high = scene.meshes[entry.mesh].box
+        for corner in itertools.product(*zip(low, high, strict=True)):
+            corners.append(entry.transform[:3, :3] @ np.array(corner, np.float64) + entry.transform[:3, 3])
+    np.testing.assert_allclose(scene.bounds, (np.min(corners, axis=0), np.max(corners, axis=0)), atol=1e-6)
+
+
 def test_hidden_objects_do_not_count(tmp_path: Path) -> None:
     scene = read(tmp_path, "objects: {a: {shape: box}, b: {shape: box, at: [9, 0, 0], hidden: true}}\n")
-    assert animate.bounds(scene)[1] == (0.5, 0.5, 0.5)
+    assert scene.bounds[1] == (0.5, 0.5, 0.5)

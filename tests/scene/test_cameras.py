@@ -16,6 +16,7 @@ from rendergraph.scene import pack
 from rendergraph.scene.cameras import projection, view_matrices
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Camera
+from rendergraph.steps import ViewMatrices
 
 EYE = np.eye(4)
 
@@ -85,15 +86,16 @@ def test_view_block() -> None:
     camera = Camera("c", look_at((1, 2, 3), (0, 0, 0)), near=0.1, far=50)
     view = view_matrices(camera, (640, 360))
     data = pack.pack_view(view)
-    assert len(data) == 432
+    assert len(data) == 448
     found = block(data)
     assert np.allclose(found["view"].T, view.view, atol=1e-6)  # columns behind each other
     assert np.allclose(np.frombuffer(data, np.float32)[12:15], view.view[:3, 3], atol=1e-6)
-    assert np.allclose(found["view_projection"].T, view.projection @ view.view, atol=1e-6)
+    reversed_depth = pack.reversed_projection(view)
+    assert np.allclose(found["view_projection"].T, reversed_depth @ view.view, atol=1e-6)
     assert np.allclose(found["inverse_view_projection"].T @ found["view_projection"].T, np.eye(4), atol=1e-4)
     assert np.allclose(found["eye"], (1, 2, 3, 1))
     assert np.allclose(found["viewport"], (640, 360, 1 / 640, 1 / 360))
-    assert np.allclose(found["range"], (0.1, 50, 0, 0))
+    assert np.allclose(found["range"], (0.1, 50, 0, np.inf))
 
 
 def test_eye_of_an_orthographic_view_points_at_the_viewer() -> None:
@@ -104,3 +106,35 @@ def test_eye_of_an_orthographic_view_points_at_the_viewer() -> None:
 def test_inverse_rigid_is_the_inverse() -> None:
     transform = translation((1, 2, 3)) @ look_at((3, 1, 2), (0, 1, 0))
     assert np.allclose(viewing.inverse_rigid(transform) @ transform, np.eye(4), atol=1e-14)
+
+
+DIRECTION = viewing.view_along((0.2, -0.5, -1), eye=(1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("projection", "near", "far"),
+    [
+        (viewing.perspective(0.9, 1.5, 5.6e-5, 100), 5.6e-5, 100.0),
+        (viewing.perspective(0.9, 1.5, 0.1, math.inf), 0.1, math.inf),
+        (viewing.frustum(-0.1, 0.3, -0.2, 0.1, 0.5, 20), 0.5, 20.0),
+        (viewing.orthographic(-1, 3, 2, 4, -2, 7), -2.0, 7.0),
+    ],
+)
+def test_depth_is_reversed(projection: Any, near: float, far: float) -> None:
+    """1 at the near plane, 0 at the far one or at infinity, between them (1 - z) / 2 of the classical z, in float32."""
+    view = ViewMatrices(DIRECTION, projection, (8, 8), near, far)
+    made = block(pack.pack_view(view))["projection"].T.astype(np.float64)
+
+    def depth(matrix: Any, *place: float) -> float:
+        clip = matrix @ place
+        return float(clip[2] / clip[3])
+
+    assert depth(made, 0, 0, -near, 1) == pytest.approx(1, rel=3e-7)
+    end = (0, 0, -far, 1) if far < math.inf else (0, 0, -1, 0)
+    assert depth(made, *end) == pytest.approx(0, abs=0 if far == math.inf else 6e-8)
+    for share in (0.01, 0.3, 0.8):
+        distance = near + share * (min(far, 50) - near)
+        expected = (1 - depth(projection, 0.3, -0.2, -distance, 1)) / 2
+        slack = viewing.INFINITE_EPSILON if far == math.inf else 0.0
+        assert depth(made, 0.3, -0.2, -distance, 1) == pytest.approx(expected, rel=3e-6, abs=slack)
+    np.testing.assert_array_equal(made[[0, 1, 3]], projection[[0, 1, 3]].astype(np.float32))

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from rendergraph.errors import InputError
+from rendergraph.images import write
+from rendergraph.scene.files import SceneLimits
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
 
@@ -413,6 +415,33 @@ def test_nan_in_any_accessor_is_found(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"RG306 accessors\[1\] holds NaN"):
         read(tmp_path, top)
+
+
+def test_a_vertex_too_far_away_and_too_many_nodes_are_errors(tmp_path: Path) -> None:
+    far = with_arrays((TRIANGLE * 3e38, "VEC3", 5126, {}), meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}])
+    with pytest.raises(InputError, match=r"RG306 meshes\[0\].*: a vertex lies beyond 1e\+12 m"):
+        read(tmp_path, far)
+    path = tmp_path / "many.gltf"
+    path.write_text(json.dumps(gltf(nodes=[{"mesh": 0}, {}, {}])))
+    with pytest.raises(InputError, match="RG307 has 3 nodes, the limit is 2; --limit scene-objects=N allows more"):
+        load(path, limits=SceneLimits(objects=2))
+
+
+def test_a_texture_without_its_coordinates_is_said(tmp_path: Path) -> None:
+    write(tmp_path / "a.png", np.zeros((2, 2, 3), np.uint8))
+    uvs = np.zeros((3, 2), np.float32)
+    for attributes, said in (({"POSITION": 0}, 1), ({"POSITION": 0, "TEXCOORD_0": 1}, 0)):
+        top = with_arrays(
+            (TRIANGLE, "VEC3", 5126, {}),
+            (uvs, "VEC2", 5126, {}),
+            meshes=[{"primitives": [{"attributes": attributes, "material": 0}]}],
+            materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+            textures=[{"source": 0}],
+            images=[{"uri": "a.png"}],
+        )
+        warnings = read(tmp_path, top).warnings
+        assert [problem.code for problem in warnings] == ["RG333"] * said
+        assert all("has no coordinates for its base_color texture" in problem.text for problem in warnings)
 
 
 def test_zero_normals_are_computed_and_said(tmp_path: Path) -> None:

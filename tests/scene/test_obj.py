@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import time
 import zlib
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rendergraph as rg
 from rendergraph.errors import InputError, Problem
 from rendergraph.scene import obj_text
 from rendergraph.scene.load import load
@@ -263,7 +265,8 @@ illum 1
     assert (pbr.roughness, pbr.metallic, pbr.emissive) == (0.3, 0.9, (2, 0, 0))
     assert pbr.base_color == (1, 0, 0, 0.75)
     assert matt.specular_phong == (0, 0, 0), "illum 1 has no highlight"
-    assert codes(scene) == ["RG333"], "the height map"
+    assert codes(scene) == ["RG333", "RG333"], "the height map, and no coordinates"
+    assert "has no coordinates for its base_color texture" in str(scene.warnings[1])
 
 
 @pytest.mark.parametrize(
@@ -271,6 +274,7 @@ illum 1
     [
         ("mtllib none.mtl\n", "RG330", "'none.mtl' cannot be read"),
         ("mtllib a.mtl\nusemtl nope\n", "RG330", "'nope' is in no material library"),
+        ("usemtl nope\nf 1 2 3\nusemtl nothing\n", "RG330", "' is in no material library"),
         ("l 1 2\n", "RG333", "lines are left out"),
         ("xyz 1\n", "RG331", "'xyz' is left out"),
         ("f 1 1 2\n", "RG332", "1 triangles with a repeated corner"),
@@ -397,3 +401,37 @@ def test_hostile_text_ends_soon(tmp_path: Path, case: str) -> None:
         problems = error.problems
     assert len(problems) <= 1
     assert time.process_time() - start < 20  # an attack takes minutes; a slow machine does not
+
+
+@pytest.mark.parametrize(
+    ("obj", "mtl", "says"),
+    [
+        ("mtllib gone.mtl", "", "'gone.mtl' cannot be read"),
+        ("mtllib", "", "'' cannot be read"),
+        ("mtllib folder", "", "'folder' cannot be read"),
+        (f"mtllib {'a' * 300}.mtl", "", "…' cannot be read"),
+        ("mtllib a.mtl", "map_Kd gone.png", "map 'gone.png' cannot be read"),
+        ("mtllib a.mtl", "map_Kd", "map '' cannot be read"),
+        ("mtllib a.mtl", "map_Kd folder", "map 'folder' cannot be read"),
+    ],
+)
+@pytest.mark.parametrize("scene", ["a.obj", "a.yaml"])
+def test_what_is_missing_under_the_root_rule_of_a_run_is_said(
+    tmp_path: Path, scene: str, obj: str, mtl: str, says: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "a.obj").write_text(f"{obj}\n{TRIANGLE}f 1 2 3\n")
+    (tmp_path / "a.mtl").write_text(f"newmtl m\n{mtl}\n")
+    (tmp_path / "a.yaml").write_text("scene: 1\nobjects: {o: {file: a.obj}}\n")
+    (warning,) = rg.load("forward", scene=tmp_path / scene).link().warnings
+    assert (warning.code, warning.severity) == ("RG330", "warning")
+    assert says in warning.text
+    (tmp_path / "a.obj").write_text("mtllib ../../secret.mtl\n" + TRIANGLE + "f 1 2 3\n")
+    with pytest.raises(InputError, match="RG012"):
+        rg.load("forward", scene=tmp_path / scene).link()
+
+
+@pytest.mark.parametrize("number", ["3e38", "-2e12", "1e39", "nan"])
+def test_what_single_precision_cannot_multiply_is_an_error(tmp_path: Path, number: str) -> None:
+    with pytest.raises(InputError, match=rf"RG306 '{re.escape(number)} 0 0' is not finite, or beyond 1e\+12"):
+        read(tmp_path, f"v {number} 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")

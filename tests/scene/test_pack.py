@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -101,10 +102,35 @@ def test_update_changes_what_moves_and_shares_the_rest(tmp_path: Path) -> None:
     path.write_text("scene: 1\nobjects: {b: {shape: box}}\nkeyframes: {objects.b.at: {0: [0, 0, 0], 1: [2, 0, 0]}}\n")
     scene = load(path)
     packed = pack.pack(scene)
-    moved = pack.update(packed, animate.at(scene, 0.5))
+    moved = pack.update(packed, scene, animate.at(scene, 0.5))
     assert moved.positions is packed.positions
     assert moved.instances["rows"][0, 0, 3] == 1
     assert packed.instances["rows"][0, 0, 3] == 0
+
+
+def test_what_has_not_moved_is_not_packed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.yaml"
+    objects = "".join(f"  o{n}: {{shape: box, at: [{n}, 0, 0], scale: {1 + n % 3}}}\n" for n in range(40))
+    moving = "  objects.o7.at: {0: [0, 0, 0], 1: [2, 5, 0]}\n  objects.o31.scale: {0: 1, 1: -2}\n"
+    path.write_text(f"scene: 1\nobjects:\n{objects}keyframes:\n{moving}")
+    scene = load(path)
+    later = animate.at(scene, 1.0)
+    whole = pack.pack(later)
+    packed = pack.pack(scene)
+    made: list[int] = []
+    placed = pack._placed
+
+    def counted(some: Scene, meshes: pack.Records) -> dict[str, object]:
+        made.append(len(some.objects))
+        return placed(some, meshes)
+
+    monkeypatch.setattr(pack, "_placed", counted)
+    moved = pack.update(packed, scene, later)
+    assert made == [2]
+    for field in fields(pack.PackedScene):
+        np.testing.assert_array_equal(getattr(moved, field.name), getattr(whole, field.name), err_msg=field.name)
+    assert moved.mirrored[31]
+    assert not packed.mirrored.any()
 
 
 def test_lights() -> None:

@@ -65,7 +65,7 @@ def test_the_example_of_the_design(folder: Path) -> None:
     assert np.allclose(sun.direction, np.array([-1, -2, -1]) / math.sqrt(6))
     assert scene.cameras["main"].fov_y == math.radians(45)
     assert scene.environment is not None
-    assert scene.environment.image.path.name == "sky.hdr"
+    assert str(scene.environment.image.label) == "sky.hdr"
     assert scene.keyframes["cameras.main.eye"][1] == (2.0, (2, 1.5, 3.5))
     assert scene.orbit is not None
     assert scene.orbit.degrees_per_second == 30
@@ -233,7 +233,8 @@ def test_shipped_scene(name: str) -> None:
     path = shipped_scenes()[name]
     lines = path.read_text().splitlines()
     assert lines[0].startswith("# ")
-    assert len(lines) <= 40
+    longer = {"avenue": 120, "many_lights": 120, "courtyard": 60}  # whose columns, bulbs and beams stand in rows
+    assert len(lines) <= longer.get(name, 40)
     scene = load(path)
     assert scene.warnings == ()
     assert scene.lights

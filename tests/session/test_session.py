@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import threading
 from typing import Any
 
 import moderngl
@@ -9,6 +12,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
+from rendergraph.authoring.gl_watch import let_go
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.gl.raw import RawGL
 from rendergraph.resources import shipped_pipelines
@@ -34,13 +38,14 @@ def test_closing_a_session_frees_everything_it_made() -> None:
     ctx = moderngl.create_context(standalone=True, backend="egl", require=450)  # type: ignore[arg-type]  # its stub knows only dicts
     session = rg.Session(ctx=ctx)
     raw = session.device.raw
+    let_go(session.device)
     before = living(raw)
     pipeline = rg.load("forward", size=(64, 36))
     for variant in (pipeline, pipeline.set("shadows.taps", 1), pipeline.with_scene("spheres")):
         session.render(variant)
     assert living(raw) != before
     session.close()
-    ctx.gc()
+    let_go(session.device)
     assert living(raw) == before
     ctx.release()
 
@@ -115,11 +120,112 @@ def test_what_a_notebook_gives_is_understood_or_refused_in_words(gl: rg.Session)
         gl.render(pipeline, fps=0)
 
 
+def test_what_can_be_typed_is_offered() -> None:
+    assert set(rg.__all__) <= set(dir(rg))
+    assert all(name in rg.__all__ or name == "__version__" for name in dir(rg))
+
+
+def test_values_of_python_are_told_in_a_line(gl: rg.Session) -> None:
+    pipeline = rg.load("forward", size=(16, 8)).set("shadows.taps", 2)
+    assert repr(pipeline) == "load('forward', size=(16, 8), sets=('shadows.taps=2',))"
+    assert repr(gl.render(pipeline)) == "<Frame 1 of forward, 16×8: image, radiance>"
+    assert repr(pipeline.link().graph).startswith("<Graph forward, 16×8: sun, ")
+    stages = [
+        pipeline.resolve(),
+        pipeline.link(),
+        pipeline.expand(),
+        pipeline.check(),
+        pipeline.plan(),
+        pipeline.link().scene,
+    ]
+    assert all(len(repr(value)) < 120 for value in stages)
+
+
+@pytest.mark.parametrize(
+    ("size", "means"),
+    [("320x180", r"size=\(320, 180\)"), (320, "a pair"), ((320.5, 180), "a pair"), ((1, 2, 3), "a pair")],
+)
+def test_a_size_that_is_no_pair_is_told_what_one_is(size: Any, means: str) -> None:
+    pipeline = rg.load("forward")
+    with pytest.raises(UsageError, match=means):
+        pipeline.render(size=size)
+    with pytest.raises(UsageError, match=means):
+        rg.load("forward", size=size)
+
+
+def test_who_asks_is_told_how_far_it_is(gl: rg.Session, capsys: pytest.CaptureFixture[str]) -> None:
+    told: list[tuple[int, int]] = []
+    gl.render("forward", (8, 8), frames=range(1, 4), progress=lambda done, total: told.append((done, total)))
+    assert told == [(1, 3), (2, 3), (3, 3)]
+    assert capsys.readouterr().err == ""
+    gl.render("forward", (8, 8), frames=range(1, 4), progress=True)
+    shown = capsys.readouterr().err
+    assert "3 of 3 frames" in shown
+    assert shown.endswith("\r")
+
+
 def test_a_closed_session_says_so_and_may_be_closed_again() -> None:
     with rg.Session() as session:
         session.close()
         with pytest.raises(RenderError, match="RG615 the session is closed; draw before"):
             session.render(rg.load("forward", size=(8, 8)))
+
+
+def test_another_thread_may_not_close_a_session() -> None:
+    said: list[str] = []
+
+    def close() -> None:
+        with pytest.raises(RenderError, match="RG615") as caught:
+            session.close()
+        said.append(str(caught.value))
+
+    with rg.Session() as session:
+        thread = threading.Thread(target=close)
+        thread.start()
+        thread.join()
+        assert said == ["RG615 a session must be closed by the thread that made it; draw and close it there"]
+        assert session.render("shading-unlit", (8, 8))["image"].any()
+
+
+def test_a_context_that_its_owner_has_released_is_said() -> None:
+    ctx = moderngl.create_context(standalone=True, backend="egl", require=450)  # type: ignore[arg-type]  # its stub knows only dicts
+    with rg.Session(ctx=ctx) as session:
+        session.render("shading-unlit", (8, 8))
+        ctx.release()
+        with pytest.raises(RenderError, match="RG615 the session's context has been released; keep it until"):
+            session.render("shading-unlit", (8, 8))
+
+
+FORKED = """
+import os, signal, sys
+import rendergraph as rg
+from rendergraph.errors import RendergraphError
+with rg.Session() as session:
+    session.render("shading-unlit", (8, 8))
+    sys.stdout.flush()
+    child = os.fork()
+    if child:
+        assert os.waitpid(child, 0)[1] == 0
+        assert session.render("shading-unlit", (8, 8))["image"].any()
+        print("parent draws")
+    else:
+        signal.alarm(60)
+        for draw in (lambda: session.render("shading-unlit", (8, 8)), rg.Session):
+            try:
+                draw()
+            except RendergraphError as error:
+                print(error)
+"""
+
+
+def test_a_forked_process_is_told_that_it_cannot_draw() -> None:
+    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=False, timeout=120)
+    assert done.stdout.splitlines() == [
+        "RG615 a session stays in its process; fork before OpenGL is used, or start processes anew ('spawn')",
+        "RG611 OpenGL has been used in the process that this one was forked from, and drivers do not survive that; "
+        "start processes anew, as multiprocessing does with 'spawn'",
+        "parent draws",
+    ], done.stderr
 
 
 def test_a_frame_shows_itself_in_a_notebook(gl: rg.Session) -> None:

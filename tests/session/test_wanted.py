@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any as Anything
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,11 @@ import pytest
 import rendergraph as rg
 from rendergraph.api import Any, Depth, Internal, Node, Output, State, Stencil, StencilFace, Steps
 from rendergraph.errors import InputError
+from rendergraph.session.wanted import figures
 
 NUMBER = "uniform float number; out float r; void main() { r = number; }"
 TRIANGLE = """vec2 corners[3] = vec2[](vec2(-1, -1), vec2(1, -1), vec2(-1, 1));
-void main() { gl_Position = vec4(corners[gl_VertexID % 3], 0.0, 1.0); }"""
+void main() { gl_Position = vec4(corners[gl_VertexID % 3], 0.5, 1.0); }"""
 SHADERS = {"number.frag": NUMBER, "triangle.vert": TRIANGLE}
 
 
@@ -34,11 +36,11 @@ class Marks(Node):
 
     color = Output(Any, format="r32f", clear=0.0, samples=4, doc="Inside 1.")
     count = Output(Any, format="r32ui", clear=0, samples=4, doc="Inside 7.")
-    depth = Output(Depth, format="depth32f_stencil8", clear=1.0, samples=4, doc="Inside 0.5, stencil 5.")
-    alone = Internal(Depth, format="depth24_stencil8", clear=1.0)
+    depth = Output(Depth, format="depth32f_stencil8", clear=0.0, samples=4, doc="Inside 0.5, stencil 165.")
+    alone = Internal(Depth, format="depth24_stencil8", clear=0.0)
 
     def record(self, steps: Steps) -> None:
-        state = State(stencil=Stencil(StencilFace(func="always", reference=5, depth_pass="replace")))
+        state = State(stencil=Stencil(StencilFace(func="always", reference=165, depth_pass="replace")))
         steps.draw(
             "marks.frag",
             vertex="triangle.vert",
@@ -82,9 +84,9 @@ def test_the_stencil_is_read_beside_the_depth(tap: Callable[..., rg.Frame]) -> N
     frame = tap("marks.alone:stencil", "marks.alone")
     stencil, depth = frame["marks.alone:stencil"], frame["marks.alone"]
     assert stencil.dtype == np.uint32
-    assert (stencil[-1, 0, 0], stencil[0, -1, 0]) == (5, 0)
-    np.testing.assert_array_equal(stencil == 5, depth < 1)
-    np.testing.assert_allclose(np.unique(depth), [0.5, 1.0], atol=1e-6)
+    assert (stencil[-1, 0, 0], stencil[0, -1, 0]) == (165, 0)
+    np.testing.assert_array_equal(stencil == 165, depth > 0)
+    np.testing.assert_allclose(np.unique(depth), [0.0, 0.5], atol=1e-6)
     assert (frame.info("marks.alone:stencil").semantic, frame.info("marks.alone").semantic) == ("stencil", "depth")
 
 
@@ -96,9 +98,9 @@ def test_samples_are_resolved(tap: Callable[..., rg.Frame]) -> None:
     assert set(np.unique(color)) - {0.0, 1.0}, "colours are the mean of the samples"
     inside = frame["marks.count"] == 7
     assert set(np.unique(frame["marks.count"])) == {0, 7}, "whole numbers are those of one sample"
-    np.testing.assert_array_equal(np.unique(frame["marks.depth"]), [0.5, 1.0])
+    np.testing.assert_array_equal(np.unique(frame["marks.depth"]), [0.0, 0.5])
     np.testing.assert_array_equal(frame["marks.depth"] == 0.5, inside)
-    np.testing.assert_array_equal(frame["marks.depth:stencil"] == 5, inside)
+    np.testing.assert_array_equal(frame["marks.depth:stencil"] == 165, inside)
 
 
 @pytest.mark.parametrize(
@@ -129,3 +131,25 @@ def test_resolving_between_two_frames_changes_neither(draw: Callable[..., rg.Fra
     later = draw(TEXT, Cube, Marks, shaders=shaders, size=(8, 8), taps=names, frames=range(1, 4))
     for name in ("image", *names):
         np.testing.assert_array_equal(first[name], later[name])
+
+
+class Figures(Node):
+    """One texel of bytes, one of two floats, and two texels."""
+
+    share = Output(Any, format="r8", size=(1, 1), doc="A share.")
+    pair = Output(Any, format="rg32f", size=(1, 1), doc="Two numbers.")
+    texels = Output(Any, format="r32f", size=(2, 1), doc="Two texels.")
+
+    def record(self, steps: Steps) -> None:
+        for port, value in ((self.share, 0.2), (self.pair, (0.5, 3.0)), (self.texels, 1.0)):
+            if steps.used(port):
+                steps.clear(port, value)
+
+
+def test_outputs_of_one_texel_are_figures(bench: Anything) -> None:
+    text = "nodes: {f: {type: figures}}\noutputs: {share: f.share, pair: f.pair, image: f.texels}"
+    pipeline = bench.pipeline(text, Figures)
+    assert figures(pipeline.link().graph) == ("share", "pair")
+    frame = bench.session.render(pipeline)
+    assert frame.figures == {"share": pytest.approx(0.2), "pair": [0.5, 3.0]}
+    assert frame.as_json()["figures"] == frame.figures

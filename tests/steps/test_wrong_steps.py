@@ -44,6 +44,8 @@ CALLS = {
     'steps.fullscreen("wrong.frag", out=self.chain.mip(1.0))': "RG423 a part of 'chain': mip is 1.0, not a whole number from 0 up or None; divide with //",
     'steps.fullscreen("wrong.frag", source=self.chain.mip(9), out=self.color)': "RG423 'chain' has no mip 9; it has 0 to 4",
     'steps.fullscreen("wrong.frag", out=self.numbers.mip(0))': "RG423 'numbers' is a buffer, which has no mips and no layers",
+    'steps.fullscreen("wrong.frag", out=self.color, if_drawn=1)': "RG423 if_drawn is 1, not text",
+    'steps.fullscreen("wrong.frag", out=self.color, if_drawn="a")': "RG423 if_drawn is 'a', but no earlier step has that label",
     # numbers
     'steps.fullscreen("wrong.frag", axis=[])': "RG423 axis=[]: a step takes ports, numbers and lists of numbers",
     'steps.fullscreen("wrong.frag", axis=(1, "0"))': "RG423 axis=(1, '0'): a step takes ports, numbers and lists of numbers",
@@ -122,7 +124,7 @@ CALLS = {
     'steps.fullscreen("wrong.frag", source=self.color, out=self.color)': "RG422 it samples 'a.color' in the step that writes it; blend, sample another mip or layer, or go through an "
     "`Internal`",
     'steps.fullscreen("wrong.frag", out=self.color, state=State(blend=(Blend("dst_color", "zero"),)))': "RG429 it blends onto 'a.color', which holds nothing yet; declare it with `clear=`",
-    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))': "RG429 it tests depth against 'a.nearest', which holds nothing yet; declare it with `clear=1.0`",
+    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))': "RG429 it tests depth against 'a.nearest', which holds nothing yet; declare it with `clear=0.0`",
     # Python's own
     'steps.fulscreen("wrong.frag")': "RG420 AttributeError: 'Steps' object has no attribute 'fulscreen'; did "
     "you mean 'fullscreen'?",
@@ -131,7 +133,7 @@ CALLS = {
     "1 / 0": "RG420 ZeroDivisionError: division by zero",
     "exit(7)": "RG420 SystemExit: 7",
     "raise Exception": "RG420 Exception: ",
-    "self.gain = 2.0": "RG420 ValidationError: 1 validation error for Wrong",
+    "self.gain = 2.0": "RG420 ValidationError: 1 validation error for Wrong gain Instance is frozen [type=frozen_instance, input_value=2.0, input_type=float]",
 }
 
 

@@ -14,11 +14,14 @@ import pytest
 from rendergraph.nodes.display.bloom import Bloom
 from rendergraph.nodes.display.exposure import Exposure
 from rendergraph.nodes.display.gaussian_blur import GaussianBlur
+from rendergraph.nodes.display.one_sample import OneSample
+from rendergraph.nodes.display.resolve import Resolve
+from rendergraph.nodes.display.smaa import SMAA
 from rendergraph.nodes.display.tonemap import Tonemap
 
 import rendergraph as rg
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import DisplayColor, Facts, Frame, Internal, Node, Output, Radiance, Steps
+from rendergraph.api import Depth, DisplayColor, Facts, Frame, Input, Internal, Node, Output, Radiance, Steps, define
 from rendergraph.catalog import Catalog
 from rendergraph.images import read
 from rendergraph.resources import folder
@@ -44,11 +47,22 @@ class Picture(Node):
         frame.write(self.texels, type(self).given(frame.index)[::-1].astype(np.float32))
 
 
+class Sampled(Node):
+    """The picture with four samples a texel, each with a factor of its own; their depths are 0.1 to 0.4."""
+
+    factors: ClassVar = (0.125, 1.0, 7.0, 40.0)
+    source = Input(Radiance, doc="The picture.")
+    radiance = Output(Radiance, format="rgba32f", samples=4, doc="Its samples.")
+    numbers = Output(AnyTexel, format="r32ui", samples=4, doc="Theirs.")
+    depth = Output(Depth, format="depth32f", samples=4, doc="As far.")
+
+
 class FloatTonemap(Tonemap):
     """The same, written as floats."""
 
     shader: ClassVar[str | None] = "tonemap.frag"
     color = Output(DisplayColor, format="rgba32f", doc="Display-referred colour.")
+    dither: bool = define(default=False, doc="Not on floats.")
 
 
 SHOW = """layout(std430) readonly buffer texels { vec4 given[]; };
@@ -56,7 +70,17 @@ uniform int width;
 out vec4 radiance;
 void main() { radiance = given[int(gl_FragCoord.y) * width + int(gl_FragCoord.x)]; }
 """
-NODES = (Picture, FloatTonemap, Tonemap, Exposure, GaussianBlur, Bloom)
+SAMPLED = """uniform sampler2D source;
+out vec4 radiance;
+out uint numbers;
+void main() {
+    float factor = float[](0.125, 1.0, 7.0, 40.0)[gl_SampleID];
+    radiance = texelFetch(source, ivec2(gl_FragCoord.xy), 0) * vec4(vec3(factor), 1.0);
+    numbers = uint(gl_SampleID);
+    gl_FragDepth = 0.1 * float(gl_SampleID + 1);
+}
+"""
+NODES = (Picture, Sampled, OneSample, Resolve, FloatTonemap, Tonemap, Exposure, GaussianBlur, Bloom, SMAA)
 
 
 @pytest.fixture
@@ -73,8 +97,10 @@ def frames(tmp_path: Path, session: rg.Session) -> Callable[..., list[rg.Frame]]
     """
     shutil.copytree(folder("rendergraph.shaders") / "display", tmp_path / "shaders")
     (tmp_path / "shaders/picture.frag").write_text(SHOW)
+    (tmp_path / "shaders/sampled.frag").write_text(SAMPLED)
     catalog = Catalog.of(*NODES, shaders=tmp_path / "shaders")
-    catalog = catalog.with_file("bright_pass", tmp_path / "shaders" / "bright_pass.frag")
+    for name in ("bright_pass", "fxaa"):
+        catalog = catalog.with_file(name, tmp_path / "shaders" / f"{name}.frag")
 
     def run(picture: Floats | Callable[[int], Floats], text: str, **options: Any) -> list[rg.Frame]:
         moving = picture if callable(picture) else lambda _frame: picture

@@ -73,7 +73,7 @@ def srgb(c: Floats) -> Floats:
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("exposure", [0.0, *(pytest.param(stops, marks=pytest.mark.slow) for stops in (-2.0, 3.0))])
 def test_curve(session: rg.Session, curve: str, exposure: float) -> None:
-    sets = [f"display.curve={curve}", f"display.exposure={exposure}", "light.ambient=0.4"]
+    sets = [f"display.curve={curve}", f"display.exposure={exposure}", "light.ambient=0.4", "display.dither=false"]
     frame = rg.load("forward", scene="spheres", size=(64, 48), sets=sets).render(session=session)
     scene = frame["radiance"][..., :3].astype(np.float64)
     expected = srgb(CURVES[curve](np.maximum(scene, 0) * 2.0**exposure)) * 255
@@ -146,3 +146,24 @@ def test_gain_multiplies_beside_the_stops(draw: Callable[..., rg.Frame]) -> None
     for stops in (0, 1, -3):
         image = draw(np.full((5, 9, 1), 37.5), text.format(f"curve: none, exposure: {stops}"))["image"]
         np.testing.assert_allclose(image[..., :3], srgb(np.full((5, 9, 3), 0.2 * 2.0**stops)), rtol=1e-5)
+
+
+def test_eight_bits_are_dithered_about_the_right_value(draw: Any) -> None:
+    """A ramp of 24 steps over 256 columns: its mean follows the line between the steps, and whole steps are left alone."""
+    width, height, low, high = 256, 64, 60, 84
+    display = np.linspace(low, high, width) / 255
+    linear = np.where(display > 0.04045, ((display + 0.055) / 1.055) ** 2.4, display / 12.92)
+    ramp = np.tile(linear[None, :, None], (height, 1, 1)).astype(np.float32)
+    text = "  show: {{type: tonemap, inputs: {{radiance: picture.radiance}}, params: {{curve: none, dither: {}}}}}\n"
+    text += "outputs: {{image: show.color}}"
+    plain, dithered = (draw(ramp, text.format(word))["image"][..., 0].astype(float) for word in ("false", "true"))
+    right = display * 255
+    assert (plain == np.round(right)).all()
+    assert np.abs(dithered - right).max() < 1
+    assert np.abs(plain.mean(axis=0) - right).max() > 0.45
+    assert np.abs(dithered.mean(axis=0) - right).max() < 0.1
+    for level in (0, 1):
+        whole = draw(np.full_like(ramp, level), text.format("true"))["image"][..., :3]
+        assert (whole == 255 * level).all()
+    again = [draw(ramp, text.format("true"))["image"] for _ in range(2)]
+    np.testing.assert_array_equal(*again)

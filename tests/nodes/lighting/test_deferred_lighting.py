@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ SCENES = ["cornell_box", "spheres", "shadow_study", "stairs", "many_lights", "gl
 ASSETS = ["gltf/DamagedHelmet.glb", "sponza/Sponza.gltf", "gltf/UnlitTest.glb", "gltf/AnisotropyStrengthTest.glb"]
 MODELS = ["unlit", "phong", "blinn_phong", "anisotropic", "pbr"]
 
-# Window depth in float32 places a point to about 1e-5 of its distance; only narrow highlights of curved metal show it.
+# Window depth in float32 places a point to about 1e-7 of its distance; only narrow highlights of curved metal show it.
 FEW = 3e-4
 CLOSE = 8.0
 
@@ -75,13 +76,27 @@ def test_the_picture_is_that_of_forward(session: rg.Session, scene: str) -> None
     assert (np.abs(deferred - forward).max(-1) > 1).mean() <= 1e-3
 
 
+@pytest.mark.parametrize("scene", ["shadow_study", "stairs"])
+def test_a_near_plane_of_a_twentieth_of_a_millimetre(session: rg.Session, tmp_path: Path, scene: str) -> None:
+    """Some modellers write it; depth that is not reversed then differs in 6 and 37 % of the pixels."""
+    text = shipped_scenes()[scene].read_text()
+    (tmp_path / "near.yaml").write_text(re.sub(r"near: [\d.]+", "near: 5.6e-5", text))
+    forward, *others = (
+        session.render(rg.load(name, scene=tmp_path / "near.yaml", size=(320, 180)), outputs=["image"])["image"]
+        for name in ("forward", "forward-prepass", "deferred")
+    )
+    for other in others:
+        assert (np.abs(other.astype(int) - forward).max(-1) > 1).mean() <= 1e-3
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ASSETS)
 def test_full_precision_draws_the_forward_picture_of_assets(
     radiance: Any, steps_off: Any, shared: Path, scene: str
 ) -> None:
     file = shared / "assets" / scene
-    same(steps_off(radiance("deferred", file, FULL), radiance("forward-prepass", file)))
+    # Two pixels of the helmet lie in a highlight a few of them wide: there 1e-7 of the distance is 1 % of the light.
+    same(steps_off(radiance("deferred", file, FULL), radiance("forward-prepass", file)), most=24.0)
 
 
 @pytest.mark.slow
@@ -157,20 +172,12 @@ def test_background_and_coverage(radiance: Any) -> None:
 # --- compact: a stated bound -----------------------------------------------------------------------------------------
 
 
-def encode(linear: Floats) -> Floats:
-    return np.asarray(np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055))
-
-
-def decode(encoded: Floats) -> Floats:
-    return np.asarray(np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
-def test_compact_is_off_by_half_a_step_of_eight_bit_base_colour(session: rg.Session, scene: str) -> None:
+def test_compact_is_off_by_half_a_step_of_ten_bits_of_the_root_of_base_colour(session: rg.Session, scene: str) -> None:
     """Radiance without emission is linear in base colour, so no pixel can be off by more than base colour is.
 
-    That is 0.6 step of the sRGB code (half, and what OpenGL allows the conversion). 0.5 % more for all that has 16
+    That is half a step of its root, 0.1 % of what is white and 0.5 % of what is 0.04. 0.5 % more for all that has 16
     bits, where highlights multiply it; emission has 6 bits behind the point in red and green, 5 in blue.
     """
     draw = {
@@ -182,13 +189,15 @@ def test_compact_is_off_by_half_a_step_of_eight_bit_base_colour(session: rg.Sess
         for precision in ("compact", "full")
     }
     full, compact = (np.asarray(draw[name]["radiance"], np.float64)[..., :3] for name in ("full", "compact"))
-    base = np.asarray(draw["full"]["gbuffer.albedo"], np.float64)[..., :3]
+    root = np.asarray(draw["full"]["gbuffer.albedo"], np.float64)[..., :3]
+    base = root**2
     emitted = np.asarray(draw["full"]["gbuffer.emissive"], np.float64)[..., :3]
-    coarser = decode(np.minimum(encode(base) + 0.6 / 255, 1)) - base
+    coarser = (root + 0.5005 / 1023) ** 2 - base
     allowed = full * (coarser / np.maximum(base, 1e-6) + 0.005) + emitted / [64, 64, 32] + 2e-5
     assert np.all(np.abs(compact - full) <= allowed)
     relative = np.abs(compact - full) / np.maximum(full, 0.01 * full.mean())
-    assert np.percentile(relative, 99) <= 0.02
+    assert np.percentile(relative, 99) <= 0.007
+    assert np.median(relative) <= 0.001
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ def test_a_light_is_computed_where_it_reaches(session: rg.Session, tmp_path: Pat
     view = view_matrices(next(iter(pipeline.link().scene.cameras.values())), SIZE)
     x = (np.arange(SIZE[0]) + 0.5) / SIZE[0] * 2 - 1
     y = 1 - (np.arange(SIZE[1]) + 0.5) / SIZE[1] * 2
-    clip = np.stack([*np.meshgrid(x, y), depth * 2 - 1, np.ones_like(depth)], -1)
+    clip = np.stack([*np.meshgrid(x, y), 1 - 2 * depth, np.ones_like(depth)], -1)
     world = clip @ np.linalg.inv(view.projection @ view.view).T
     everywhere, copied, *draws = fragments(session, pipeline)
     assert everywhere == copied == SIZE[0] * SIZE[1]
@@ -129,7 +129,7 @@ def test_a_light_is_computed_where_it_reaches(session: rg.Session, tmp_path: Pat
         towards = world[..., :3] / world[..., 3:] - light.position
         distance = np.linalg.norm(towards, axis=-1)
         assert light.range is not None
-        reached = (distance < light.range) & (depth < 1)
+        reached = (distance < light.range) & (depth > 0)
         if light.type == "spot":
             reached &= towards @ np.asarray(light.direction) > distance * np.cos(light.outer)
         assert 100 < reached.sum() <= shaded <= 1.3 * reached.sum() + 20

@@ -104,8 +104,9 @@ def test_the_terms_sum_to_the_whole(session: rg.Session, shading: str) -> None:
 
 def test_ambient_is_radiance_from_all_sides(session: rg.Session) -> None:
     """It adds ambient × albedo, whatever the surface's direction."""
-    one = render(session, "forward", "spheres", (96, 72), "light.terms=ambient", "light.ambient=[0.5, 0.25, 1]")
-    albedo = render(session, "shading-unlit", "spheres", (96, 72))
+    sets = ("light.terms=ambient", "light.environment=null")
+    one = render(session, "forward", "spheres", (96, 72), "light.ambient=[0.5, 0.25, 1]", *sets)
+    albedo = render(session, "shading-unlit", "spheres", (96, 72), "light.environment=null")
     np.testing.assert_allclose(one[..., :3], albedo[..., :3] * [0.5, 0.25, 1], rtol=2e-3, atol=1e-4)
 
 
@@ -165,7 +166,7 @@ def test_unlit_shows_the_base_colour(session: rg.Session) -> None:
         tuple(np.round(color, 2)) for color in np.unique(picture[..., :3].reshape(-1, 3), axis=0)
     }
     frame = rg.load("shading-unlit", scene="cornell_box", size=(64, 48)).render(session=session)
-    assert set(frame.culled) == {"sun", "shadows"}
+    assert set(frame.culled) == {"sun", "shadows", "environment"}
 
 
 @pytest.mark.slow

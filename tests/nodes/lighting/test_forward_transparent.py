@@ -119,7 +119,9 @@ materials:""",
         )
     )
     (tmp_path / "sheet.yaml").write_text(lines)
-    picture = radiance("ssao-disc", tmp_path / "sheet.yaml", "light.terms=ambient", "gbuffer.precision=full")
+    picture = radiance(
+        "ssao-disc", tmp_path / "sheet.yaml", "light.terms=ambient", "gbuffer.precision=full", "light.environment=null"
+    )
     sheet = np.abs(picture[..., :3] - 0.015).max(-1) < 1e-5
     assert sheet[40:50, 55:65].all()
     assert (picture[..., 0] < 0.7 * 0.03 * 0.72).mean() > 0.01, "there are corners"

@@ -125,6 +125,40 @@ def test_anisotropic_at_zero_is_pbr(evaluate: Any, shading_defines: Callable[...
     np.testing.assert_allclose(with_grain, plain, rtol=1e-2, atol=1e-5)
 
 
+def with_grain(c: dict[str, Floats]) -> Floats:
+    """Specular with the cosine by Heitz' slopes and Lambdas (2014), for the roughnesses of KHR_materials_anisotropy."""
+    across = c["surface"][:, 1:2] ** 2
+    along = across + (1 - across) * c["surface"][:, 2:3] ** 2
+
+    def slopes(w: Floats) -> Floats:
+        return np.asarray((along * dot(c["t"], w)) ** 2 + (across * dot(c["b"], w)) ** 2)
+
+    n_l, n_v, h = dot(c["n"], c["l"]), np.maximum(dot(c["n"], c["v"]), 1e-4), half_way(c)
+    stretched = (dot(c["t"], h) / along) ** 2 + (dot(c["b"], h) / across) ** 2 + dot(c["n"], h) ** 2
+    d = 1 / (np.pi * along * across * stretched**2)
+    hidden = sum((np.sqrt(1 + slopes(w) / cosine**2) - 1) / 2 for w, cosine in ((c["l"], n_l), (c["v"], n_v)))
+    f0 = 0.04 * (1 - c["surface"][:, :1]) + c["base"] * c["surface"][:, :1]
+    f = f0 + (1 - f0) * (1 - dot(c["v"], h)) ** 5
+    return np.asarray(f * d / (1 + hidden) / (4 * n_l * n_v) * n_l)
+
+
+@pytest.mark.parametrize("shading", ["pbr", "anisotropic"])
+def test_a_grain_is_the_formula(evaluate: Any, shading_defines: Callable[..., Any], shading: str) -> None:
+    given = columns(low=0.2)
+    macros = shading_defines(shading, ANISOTROPIC=1)
+    found = evaluate("shading.glsl", given, SPECULAR, macros)[:, :3]
+    np.testing.assert_allclose(found, with_grain(given), rtol=5e-3, atol=1e-5)
+
+
+def test_pbr_without_a_grain_is_pbr_to_the_bit(evaluate: Any, shading_defines: Callable[..., Any]) -> None:
+    given = columns()
+    given["surface"][:, 2] = 0
+    found, plain = (
+        evaluate("shading.glsl", given, SPECULAR, shading_defines("pbr", **more)) for more in ({"ANISOTROPIC": 1}, {})
+    )
+    np.testing.assert_array_equal(found, plain)
+
+
 def test_phong_and_blinn_phong_are_the_formulas(evaluate: Any, shading_defines: Callable[..., Any]) -> None:
     given = columns()
     exponent, n_l = given["surface"][:, 3:4], dot(given["n"], given["l"])

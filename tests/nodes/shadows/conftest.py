@@ -15,7 +15,6 @@ from rendergraph.nodes.shadows._light_views import light_views
 
 import rendergraph as rg
 from rendergraph.resources import folder
-from rendergraph.scene.animate import bounds
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Scene
 
@@ -27,7 +26,7 @@ class Stage:
     """A scene as a node's `update` sees it."""
 
     def __init__(self, scene: Scene) -> None:
-        self.bounds = bounds(scene)
+        self.bounds = scene.bounds
         self.lights, self.objects, self.meshes = scene.lights, scene.objects, scene.meshes
 
 
@@ -37,12 +36,13 @@ class Looked:
 
     Attributes:
         visibility: (height, width), of the first light.
-        depth: the light's map.
+        depth: the light's map, as the documents have it: 0 near to 1 far.
         fraction: the same, linear over the light's range, 1 where nothing is.
         places: (height, width, 3): texture coordinates and window depth in the map.
         receiver: linear depth of every pixel over the light's range.
         position: (height, width, 3) in world space.
         seen: where a surface is.
+        metres: of the light's range.
     """
 
     visibility: Floats
@@ -52,6 +52,7 @@ class Looked:
     receiver: Floats
     position: Floats
     seen: npt.NDArray[np.bool_]
+    metres: float
 
 
 @pytest.fixture
@@ -70,10 +71,12 @@ def look(session: rg.Session) -> Callable[..., Looked]:
         taps = ("sun.shadow_map", "shadows.visibility", "gbuffer.depth")
         frame = session.render(loaded, outputs=(), taps=taps, warm_up=False)
         depth, visibility, seen = (np.asarray(frame[tap], np.float64)[..., ::-1, :, 0] for tap in taps)
+        depth, seen = 1 - depth, 1 - seen
         stage = loaded.link().scene
         camera = view_matrices(next(iter(stage.cameras.values())), size)
         table = [end for end in loaded.link().graph.textures if str(end) == "sun.shadow_map"]
-        view = light_views(loaded.link().graph.textures[table[0]].lights, Stage(stage), camera, resolution)[0]
+        light = stage.lights[loaded.link().graph.textures[table[0]].lights[0]]
+        view = light_views(light, Stage(stage), camera, resolution)[0]
         y, x = np.mgrid[0 : size[1], 0 : size[0]]
         clip = np.stack([(x + 0.5) / size[0], (y + 0.5) / size[1], seen, np.ones_like(seen)], -1)
         clip[..., :3] = clip[..., :3] * 2 - 1
@@ -96,6 +99,7 @@ def look(session: rg.Session) -> Callable[..., Looked]:
             linear(np.minimum(places[..., 2], 1.0)),
             world[..., :3],
             seen < 1,
+            float(view.far - view.near),
         )
 
     return run

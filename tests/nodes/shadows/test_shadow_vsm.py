@@ -11,9 +11,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import rendergraph as rg
-from rendergraph.resources import shipped_pipelines
-
 Floats = npt.NDArray[np.float64]
 
 
@@ -122,12 +119,3 @@ def test_one_flat_caster_is_exact(look: Any, tmp_path: Path) -> None:
     soft = floor & (pcf.visibility > 0.02) & (pcf.visibility < 0.98)
     assert soft.sum() > 30
     np.testing.assert_allclose(vsm.visibility[floor], pcf.visibility[floor], atol=2e-3)
-
-
-@pytest.mark.slow
-def test_the_type_is_the_whole_change(session: rg.Session) -> None:
-    retyped = rg.load("shadow-pcf", size=(96, 64), sets=["shadows.type=shadow_vsm"])
-    shipped = rg.load("shadow-vsm", size=(96, 64))
-    pictures = [session.render(each, warm_up=False)["image"] for each in (retyped, shipped)]
-    np.testing.assert_array_equal(pictures[0], pictures[1])
-    assert len(shipped_pipelines()["shadow-vsm"].read_text().splitlines()) <= 10

@@ -1,0 +1,84 @@
+"""Samples lit one by one where they differ, against all of them lit one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import rendergraph as rg
+
+Floats = npt.NDArray[np.float64]
+UNSHADOWED = {
+    "nodes": {"sun": None, "shadows": None, "light": {"inputs": {"lookup": None, "blended_lookup": None}}},
+    "outputs": {"edges": "light.edges"},
+}
+
+
+def every_sample(pipeline: rg.Pipeline, light: str = "deferred_lighting") -> rg.Pipeline:
+    """The same with every sample lit."""
+    return pipeline.set("light.type", light).patch({"outputs": {"edges": None, "edge_share": None}})
+
+
+def steps_apart(a: rg.Frame, b: rg.Frame) -> npt.NDArray[np.int64]:
+    """Per pixel, by how many 255ths the pictures differ."""
+    return np.asarray(np.abs(a["image"].astype(np.int64) - b["image"].astype(np.int64)).max(axis=-1))
+
+
+@pytest.mark.parametrize("scene", ["cornell_box", "shadow_study", "many_lights", "glass"])
+def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str) -> None:
+    pipeline = rg.load("deferred-msaa", scene=scene, size=(160, 90), patches=[UNSHADOWED])
+    marked, every = session.render(pipeline), session.render(every_sample(pipeline))
+    assert every["image"].mean() > 2
+    assert (steps_apart(marked, every) > 1).mean() <= 0.001
+    blind = session.render(pipeline.set("light.normal_angle", 180).set("light.depth_angle", 90))
+    assert (steps_apart(blind, every) > 1).mean() > 0.003, "edges that are not found would not show"
+    edges = marked["edges"] / 255
+    assert set(np.unique(edges)) == {0, 1}
+    assert 0.005 < edges.mean() < 0.4
+    np.testing.assert_allclose(marked["edge_share"], edges.mean(), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("scene", "taps"), [("shadow_study", 1), ("stairs", 4)])
+def test_edges_of_shadows_within_a_surface_are_lit_sample_by_sample(session: rg.Session, scene: str, taps: int) -> None:
+    """Hard ones, of one lookup, and soft ones, of 4 × 4."""
+    sets = ["light.environment=null", f"shadows.taps={taps}"]
+    pipeline = rg.load("deferred-msaa", scene=scene, size=(240, 135), sets=sets)
+    every = session.render(every_sample(pipeline))
+    assert (steps_apart(session.render(pipeline), every) > 1).mean() <= 0.001
+    blind = session.render(pipeline.set("light.shadow_change", 2))
+    assert (steps_apart(blind, every) > 1).mean() > 0.005, "edges that are not found would not show"
+
+
+@pytest.mark.parametrize("light", ["deferred_lighting", "deferred_multisampled"])
+def test_one_sample_a_pixel_is_plain_deferred_lighting(session: rg.Session, light: str) -> None:
+    nodes = {"light": {"type": light}, "resolve": None, "display": {"inputs": {"radiance": "light.radiance"}}}
+    patch = {"nodes": nodes, "outputs": {"radiance": None, "edge_share": None}}
+    one = rg.load("deferred-msaa", scene="shadow_study", size=(80, 60), sets=["gbuffer.samples=1"], patches=[patch])
+    plain = rg.load(
+        "deferred",
+        scene="shadow_study",
+        size=(80, 60),
+        patches=[{"nodes": {"light": {"inputs": {"visibility": None, "lookup": "shadows.lookup"}}}}],
+    )
+    np.testing.assert_array_equal(session.render(one, outputs=["image"])["image"], session.render(plain)["image"])
+
+
+def test_light_volumes_light_every_sample(session: rg.Session) -> None:
+    pipeline = rg.load("deferred-msaa", scene="many_lights", size=(96, 54), patches=[UNSHADOWED])
+    images = [
+        session.render(every_sample(pipeline, light), outputs=["image"])
+        for light in ("deferred_lighting", "deferred_stencil_lights")
+    ]
+    assert images[0]["image"].mean() > 2
+    assert (steps_apart(*images) > 1).mean() <= 0.001
+
+
+def test_memory_is_shared_poisoned_and_shuffled_without_a_trace(session: rg.Session) -> None:
+    pipeline = rg.load("deferred-msaa", scene="glass", size=(48, 32))
+    plain = session.render(pipeline, alias=False)
+    assert np.isfinite(plain["radiance"]).all()
+    for options in ({}, {"poison": True}, {"poison": True, "shuffle": 5}):
+        again = session.render(pipeline, **options)
+        for name in ("radiance", "edge_share"):
+            np.testing.assert_array_equal(again[name], plain[name])

@@ -1,0 +1,201 @@
+"""Image-based light against float64 integrals of the same pictures, which were not made with this code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import rendergraph as rg
+
+Floats = npt.NDArray[np.float64]
+Asked = Callable[..., Floats]
+NAMES = ["white", "synthetic", "real", "sunsky"]
+FINE = ("environment.size=256",)
+CALLER = '''
+from __future__ import annotations
+
+from rendergraph.api import Any, EnvironmentLight, Input, Node, Output
+
+class Asked(Node):
+    """What the environment answers."""
+
+    environment = Input(EnvironmentLight, kind="function", doc="Light.")
+    answers = Output(Any, format="rgba32f", size=({count}, 1), doc="One texel a question.")
+'''
+PIPELINE = """rendergraph: 1
+nodes:
+  environment: {type: environment_light}
+  asked: {type: asked, inputs: {environment: environment.light}}
+outputs: {answers: asked.answers}
+"""
+PLAIN = """scene: 1
+objects: {ball: {shape: sphere, radius: 1, segments: 64, rings: 32, material: metal}}
+materials: {metal: {base_color: [1, 1, 1], metallic: %s, roughness: %s}}
+cameras: {main: {eye: [0, 0, 4], target: [0, 0, 0], height: 2.2}}
+"""
+
+
+@pytest.fixture
+def references(shared: Path) -> Path:
+    return shared / "reference" / "b5_ibl"
+
+
+@pytest.fixture
+def asked(session: rg.Session, references: Path, tmp_path: Path) -> Asked:
+    """`asked(environment, directions, lobes, *sets)`: what `light_from()` returns, (n, 3)."""
+
+    def ask(name: str | Path, directions: Floats, lobes: Floats, *sets: str) -> Floats:
+        rows = np.concatenate([directions, np.broadcast_to(lobes, len(directions))[:, None]], axis=1)
+        table = ", ".join(f"vec4({', '.join(f'{value:.9f}' for value in row)})" for row in rows)
+        (tmp_path / "asked.py").write_text(CALLER.replace("{count}", str(len(rows))))
+        (tmp_path / "asked.frag").write_text(
+            f"const vec4 questions[{len(rows)}] = vec4[]({table});\nout vec4 answers;\n"
+            "void main() { vec4 asked = questions[int(gl_FragCoord.x)];\n"
+            "answers = vec4(light_from(normalize(asked.xyz), asked.w), 1.0); }\n"
+        )
+        (tmp_path / "asked.yaml").write_text(PIPELINE)
+        file = name if isinstance(name, Path) else references / f"env_{name}.exr"
+        pipeline = rg.load(tmp_path / "asked.yaml", plugins=[tmp_path / "asked.py"], environment=file, sets=sets)
+        return np.asarray(session.render(pipeline)["answers"][0, :, :3], np.float64)
+
+    return ask
+
+
+def oracles(folder: Path, name: str) -> tuple[dict[str, Floats], Floats]:
+    """The integrals of an environment, and its mean radiance."""
+    table = {key: np.asarray(value, np.float64) for key, value in np.load(folder / f"env_{name}_oracles.npz").items()}
+    return table, table["sh"][0] / np.sqrt(4 * np.pi)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_harmonics_are_the_integrals(session: rg.Session, references: Path, tmp_path: Path, name: str) -> None:
+    """Within 1 % of the mean radiance, also around a sun of one texel."""
+    table, mean = oracles(references, name)
+    (tmp_path / "p.yaml").write_text(
+        "rendergraph: 1\nnodes: {environment: {type: environment_light}}\noutputs: {cube: environment.specular}\n"
+    )
+    pipeline = rg.load(tmp_path / "p.yaml", environment=references / f"env_{name}.exr")
+    frame = session.render(pipeline, outputs=[], taps=["environment.harmonics"])
+    bands = frame["environment.harmonics"].view(np.float32).reshape(16, 4)[:9, :3]
+    assert (np.abs(bands - table["sh"]) / mean).max() < 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_irradiance_is_that_of_nine_harmonics(asked: Asked, references: Path, name: str) -> None:
+    table, mean = oracles(references, name)
+    found = np.pi * asked(name, table["normals"], np.array(2.0), "environment.window=false")
+    expected = np.maximum(table["irradiance_sh"], 0)  # light is never less than none
+    assert (np.abs(found - expected) / (np.pi * mean)).max() < 0.01
+
+
+def test_the_window_keeps_light_from_ringing(asked: Asked, references: Path, tmp_path: Path) -> None:
+    """Nine harmonics of one small light fall below 0 behind it, and are cut there; damped they need not be."""
+    from rendergraph.images import write
+
+    sun = np.zeros((32, 64, 3), np.float32)
+    sun[8, 20] = 1000
+    write(tmp_path / "env_sun.exr", sun)
+    directions = np.random.default_rng(3).normal(size=(400, 3))
+    cut, damped = (
+        asked(tmp_path / "env_sun.exr", directions, np.array(2.0), f"environment.window={word}")
+        for word in ("false", "true")
+    )
+    assert (cut == 0).any(axis=1).mean() > 0.1
+    assert (damped == 0).any(axis=1).mean() < 0.01
+    # A light that is everywhere needs none of it.
+    even = [asked("white", directions, np.array(2.0), f"environment.window={word}") for word in ("false", "true")]
+    np.testing.assert_array_equal(even[0], even[1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_prefiltered_light_is_the_integral(asked: Asked, references: Path, name: str) -> None:
+    """Within 2 % from roughness 0.3 on, at levels and between them, also around a sun of one texel.
+
+    But where that sun stands on the horizon of a surface of roughness 0.9: the level's 8 texels a side are too few for
+    the bend there.
+    """
+    table, mean = oracles(references, name)
+    rough = table["pre_roughness"] > 0.29
+    directions, lobes, expected = (table[key][rough] for key in ("pre_dir", "pre_roughness", "pre_nol"))
+    found = asked(name, directions, lobes, *FINE)
+    off = (np.abs(found - expected) / np.maximum(expected, mean)).max(axis=1)
+    bent = (name == "sunsky") & (np.round(lobes, 3) == 0.9)
+    assert off[~bent].max() < 0.02
+    assert off.max() < 0.06
+
+
+@pytest.mark.parametrize("smith", ["exact", "fast"])
+def test_the_table_of_what_is_mirrored(session: rg.Session, references: Path, smith: str) -> None:
+    """Within 1e-3 at most places, and 2e-3 on the steepest slope, where the reference itself is 9e-4 off."""
+    wanted = dict(np.load(references / "brdf_table.npz"))
+    pipeline = rg.load("ibl", size=(8, 8), sets=[f"light.smith={smith}"])
+    frame = session.render(pipeline, outputs=["radiance"], taps=["light.brdf_table"])
+    table = np.asarray(frame["light.brdf_table"], np.float64)[::-1, :, :2]
+    rows = np.clip(wanted["roughness"] * table.shape[0] - 0.5, 0, table.shape[0] - 1)
+    columns = np.clip(np.sqrt(wanted["nov"]) * table.shape[1] - 0.5, 0, table.shape[1] - 1)
+    y, x = np.meshgrid(rows, columns, indexing="ij")
+    y0, x0 = np.minimum(y.astype(int), table.shape[0] - 2), np.minimum(x.astype(int), table.shape[1] - 2)
+    fy, fx = (y - y0)[..., None], (x - x0)[..., None]
+    low = table[y0, x0] * (1 - fx) + table[y0, x0 + 1] * fx
+    found = low * (1 - fy) + (table[y0 + 1, x0] * (1 - fx) + table[y0 + 1, x0 + 1] * fx) * fy
+    off = np.abs(found - np.stack([wanted[f"A_{smith}"], wanted[f"B_{smith}"]], axis=-1)).max(axis=-1)
+    assert np.sort(off.ravel())[-4] < 1e-3
+    assert off.max() < 2e-3
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
+def test_a_white_furnace(session: rg.Session, references: Path, tmp_path: Path, roughness: float) -> None:
+    """In light of 1 from everywhere white metal is 1 if nothing is lost between its facets, and so is white paint."""
+    for metallic, sets in ((1, ()), (0, ("light.environment_part=diffuse",))):
+        (tmp_path / "s.yaml").write_text(PLAIN % (metallic, roughness))
+        pipeline = rg.load("forward", scene=tmp_path / "s.yaml", environment=references / "env_white.exr", sets=sets)
+        picture = session.render(pipeline.with_size((48, 48)), outputs=["radiance"])["radiance"]
+        inside = picture[..., 3] == 1
+        assert inside.mean() > 0.3
+        np.testing.assert_allclose(picture[inside][:, :3], 1, atol=0.005)
+
+
+@pytest.mark.parametrize("smith", ["exact", "fast"])
+def test_the_whole_against_the_unsplit_integral(
+    asked: Asked, references: Path, session: rg.Session, smith: str
+) -> None:
+    """Both factors together: the error of the split itself is what is left, and is the same for ours and an exact one."""
+    table, mean = oracles(references, "synthetic")
+    n, v, roughness, f0 = (table[f"spec_{key}"] for key in ("n", "v", "roughness", "f0"))
+    n_v = (n * v).sum(axis=1)
+    mirrored = 2 * n_v[:, None] * n - v
+    light = asked("synthetic", mirrored, roughness, *FINE)
+    frame = session.render(
+        rg.load("ibl", size=(8, 8), sets=[f"light.smith={smith}"]), outputs=["radiance"], taps=["light.brdf_table"]
+    )
+    brdf = np.asarray(frame["light.brdf_table"], np.float64)[::-1, :, :2]
+    a, b = brdf[(roughness * 64).astype(int).clip(0, 63), (np.sqrt(n_v) * 64).astype(int).clip(0, 63)].T
+    off = np.abs(light * (f0 * a[:, None] + b[:, None]) - table[f"spec_{smith}"]) / mean
+    assert np.median(off) < 0.03
+    assert off.max() < 0.35
+
+
+def test_a_quarter_turn_turns_the_picture(session: rg.Session, references: Path, tmp_path: Path) -> None:
+    """The environment and the eye turned by 90°: the picture of a ball is the same; and intensity is a factor."""
+    text = PLAIN % (0.5, 0.3)
+    pictures = []
+    for turn, eye, factor in ((0, "[0, 0, 4]", 1), (90, "[4, 0, 0]", 1), (90, "[4, 0, 0]", 3)):
+        around = f"environment: {{file: {references / 'env_sunsky.exr'}, rotate_degrees: {turn}, intensity: {factor}}}"
+        (tmp_path / "s.yaml").write_text(text.replace("[0, 0, 4]", eye) + around + "\n")
+        pipeline = rg.load("forward", scene=tmp_path / "s.yaml", asset_roots=[references], size=(48, 48))
+        pictures.append(np.asarray(session.render(pipeline, outputs=["radiance"])["radiance"], np.float64)[..., :3])
+    np.testing.assert_allclose(pictures[1], pictures[0], rtol=5e-3, atol=1e-3)
+    np.testing.assert_allclose(pictures[2], 3 * pictures[1], rtol=2e-3)
+
+
+def test_it_is_made_once(session: rg.Session) -> None:
+    """The second frame runs none of it."""
+    pipeline = rg.load("ibl", size=(8, 8))
+    *_, second = session.frames(pipeline, frames=range(1, 3), outputs=["radiance"], timed=True)
+    assert "environment" not in {step.node for step in second.times[-1].steps}
+    frame = session.render(pipeline, outputs=["radiance"], timed=True)
+    assert [entry["node"] for entry in frame.passes] == ["light"]

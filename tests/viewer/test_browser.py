@@ -1,0 +1,293 @@
+"""The page in a real browser, used as a hand does; skipped where there is no Chromium."""
+
+from __future__ import annotations
+
+import io
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rendergraph as rg
+
+pytestmark = pytest.mark.slow
+SIZE = (64, 36)
+STILL = "#picture[data-still=true]"
+
+
+class Hand:
+    """A page with what it said; every test fails on an error of the page's scripts."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.wrong: list[str] = []
+        page.set_default_timeout(60_000)
+        page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        page.on("console", lambda said: self.wrong.append(said.text) if self.is_wrong(said) else None)
+
+    @staticmethod
+    def is_wrong(said: Any) -> bool:
+        return said.type == "error" and "WebSocket connection" not in said.text  # the server may be gone first
+
+    def open(self, url: str) -> None:
+        self.page.goto(url)
+        self.page.wait_for_selector(STILL)
+        self.page.wait_for_selector("#graph svg .card")
+
+    def pictures(self) -> int:
+        return int(self.page.get_attribute("#picture", "data-count") or 0)
+
+    def after(self, act: Any) -> None:
+        """Do something, and wait for a picture of it that stands still."""
+        before = self.pictures()
+        act()
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            if self.pictures() > before and self.page.get_attribute("#picture", "data-still") == "true":
+                return
+            time.sleep(0.02)
+        raise AssertionError("no picture came")
+
+    def choose(self, node: str) -> None:
+        self.page.select_option("#node", node)
+
+    def text(self, selector: str) -> str:
+        return str(self.page.inner_text(selector))
+
+
+@pytest.fixture
+def hand(browser: Any) -> Iterator[Hand]:
+    context = browser.new_context(viewport={"width": 1300, "height": 1000}, reduced_motion="reduce")
+    found = Hand(context.new_page())
+    yield found
+    context.close()
+    assert found.wrong == []
+
+
+@pytest.fixture
+def page(hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
+    monkeypatch.chdir(tmp_path)
+    with rg.view(rg.load("forward", size=SIZE)) as viewer:
+        hand.open(viewer.url)
+        yield hand
+
+
+def test_a_slider_changes_the_picture_and_undo_takes_all_of_its_way_back(page: Hand) -> None:
+    page.choose("display")
+    before = mean(page)
+    slider = page.page.locator("[aria-label='display.exposure, slider']")
+    box = slider.bounding_box()
+    page.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.page.mouse.down()
+    for step in range(1, 6):
+        page.page.mouse.move(box["x"] + box["width"] * (0.5 + step * 0.05), box["y"] + box["height"] / 2)
+    page.after(page.page.mouse.up)
+    assert mean(page) > before
+    page.after(lambda: page.page.click("#undo"))
+    assert mean(page) == before
+    assert page.page.is_disabled("#undo")
+
+
+def mean(hand: Hand) -> float:
+    """The mean of the red channel, as the page says it."""
+    found = re.search(r"R: .*mean ([\d.]+)", hand.text("#texture"))
+    assert found
+    return float(found[1])
+
+
+def test_a_port_has_the_values_that_python_reads(page: Hand, gl: rg.Session) -> None:
+    page.after(lambda: page.page.click("[aria-label='Show light.radiance']"))
+    expected = gl.render(rg.load("forward", size=SIZE), outputs=(), taps=("light.radiance",))["light.radiance"]
+    assert f"mean {expected[..., 0].mean():.4g}"[:9] in page.text("#texture")
+    box = page.page.locator("#picture").bounding_box()
+    page.page.mouse.move(box["x"] + box["width"] * (40.5 / 64), box["y"] + box["height"] * (30.5 / 36))
+    page.page.wait_for_selector("#pixel:has-text('(40, 30)')")
+    values = [float(word) for word in page.text("#pixel").split(")")[1].split()]
+    assert values == pytest.approx(expected[30, 40].tolist(), rel=1e-4)
+
+
+def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
+    page: Hand, tmp_path: Path, gl: rg.Session
+) -> None:
+    page.choose("shadows")
+    page.after(lambda: page.page.select_option("[id='p-shadows.type']", "shadow_vsm"))
+    page.page.click("#save")
+    page.page.fill("#file", "soft.yaml")
+    page.page.click("dialog button[value=save]")
+    page.page.wait_for_selector("#link:has-text('saved soft.yaml')")
+    saved = gl.render(rg.load(tmp_path / "soft.yaml"), outputs=("image",))["image"]
+    direct = gl.render(rg.load("forward", size=SIZE, sets=["shadows.type=shadow_vsm"]), outputs=("image",))["image"]
+    assert (saved == direct).all()
+    assert mean(page) == pytest.approx(direct[..., 0].mean(), rel=1e-3)
+
+
+def test_an_input_that_takes_many_takes_another_and_lets_go_of_one(
+    hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.yaml").write_text(
+        "extends: forward\nsize: [32, 24]\nnodes:\n  other: {type: shadow_pcf, inputs: {shadow_map: sun.shadow_map}}\n"
+    )
+    with rg.view("two.yaml") as viewer:
+        hand.open(viewer.url)
+        hand.choose("light")
+        hand.after(lambda: hand.page.select_option("[id='p-light.lookup-1']", "other.lookup"))
+        hand.page.wait_for_selector("[id='p-light.lookup-2']")
+        hand.after(lambda: hand.page.select_option("[id='p-light.lookup']", ""))
+        assert hand.page.input_value("[id='p-light.lookup']") == "other.lookup"
+
+
+def test_a_broken_shader_is_said_on_its_node_and_mended(
+    hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shader = tmp_path / "grey.frag"
+    right = (
+        "/*---\ndoc: Grey.\noutputs:\n  color: {semantic: display_color, format: rgba8, doc: Grey.}\n---*/\n"
+        "out vec4 color;\nvoid main() { color = vec4(0.5); }\n"
+    )
+    shader.write_text(right)
+    (tmp_path / "mine.yaml").write_text("size: [16, 16]\nnodes: {g: {type: ./grey.frag}}\noutputs: {image: g.color}\n")
+    with rg.view("mine.yaml") as viewer:
+        hand.open(viewer.url)
+        shader.write_text(right.replace("0.5", "0.5 +"))
+        hand.page.wait_for_selector("#problems:has-text('RG410')")
+        hand.page.wait_for_selector("#graph .card.wrong[aria-label^='g:']")
+        assert "grey.frag:7" in hand.text("#problems")
+        assert "last good picture" in hand.text("#problems")
+        hand.after(lambda: shader.write_text(right.replace("0.5", "0.25")))
+        hand.page.wait_for_selector("#problems", state="hidden")
+        assert mean(hand) == 64
+
+
+def test_names_are_text(hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file's words are shown, and never become elements of the page."""
+    monkeypatch.chdir(tmp_path)
+    name = "<img src=x onerror=document.title=1>"
+    (tmp_path / "mine.yaml").write_text(f'extends: forward\nsize: [16, 16]\ndescription: "{name}"\n')
+    with rg.view("mine.yaml") as viewer:
+        hand.open(viewer.url)
+        assert hand.text("#about") == name
+        hand.choose("light")
+        hand.page.fill("[id='p-light.shading']", "x") if hand.page.query_selector(
+            "input[id='p-light.shading']"
+        ) else None
+        assert hand.page.query_selector("img[src=x]") is None
+        assert hand.page.title().startswith("mine")
+
+
+def test_the_keyboard_alone_is_enough(page: Hand) -> None:
+    page.page.focus("#stage")
+    page.after(lambda: page.page.keyboard.press("ArrowLeft"))
+    page.page.wait_for_selector("#camera option:checked:has-text('moved by hand')", state="attached")
+    page.page.focus("#graph .card[aria-label^='light']")
+    page.page.keyboard.press("Enter")
+    assert page.page.input_value("#node") == "light"
+    page.page.focus("#tab-graph")
+    page.page.keyboard.press("ArrowRight")
+    assert page.page.is_visible("#memory table")
+    page.page.focus("[id='p-light.terms']")
+    page.after(lambda: page.page.keyboard.press("ArrowDown"))
+    page.after(lambda: page.page.keyboard.press("Control+z"))
+
+
+def test_two_tabs_are_one_view(page: Hand) -> None:
+    other = Hand(page.page.context.new_page())
+    other.open(page.page.url)
+    other.choose("display")
+    page.choose("display")
+    page.after(lambda: other.page.fill("[id='p-display.exposure']", "1") or other.page.keyboard.press("Enter"))
+    assert page.page.input_value("[id='p-display.exposure']") == "1"
+    other.page.close()
+    page.after(lambda: page.page.click("#undo"))
+    assert other.wrong == []
+
+
+def test_it_is_compared_under_a_slider(page: Hand) -> None:
+    page.page.select_option("#other", "shading-phong")
+    page.page.wait_for_selector("#slider:visible")
+    page.page.wait_for_selector("#figures:has-text('FLIP')")
+    page.page.locator("#slider input").fill("250")
+    assert "25%" in page.page.locator("#slider .over").evaluate("(image) => image.style.clipPath")
+    page.page.select_option("#map", "flip")
+    page.page.wait_for_selector("#slider .tag.b:has-text('FLIP')")
+    page.page.select_option("#other", "")
+    page.page.wait_for_selector("#picture:visible")
+
+
+def test_it_comes_back_after_a_lost_render_process(page: Hand) -> None:
+    import os
+    import signal
+    import subprocess
+
+    found = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "viewer.child"], capture_output=True, text=True)
+    for pid in found.stdout.split():
+        os.kill(int(pid), signal.SIGKILL)
+    page.page.wait_for_selector("#problems:has-text('RG630')")
+    page.choose("display")
+    page.after(lambda: page.page.fill("[id='p-display.exposure']", "1") or page.page.keyboard.press("Enter"))
+    page.page.wait_for_selector("#problems", state="hidden")
+
+
+def test_an_exported_page_is_whole_and_offline(hand: Hand, tmp_path: Path, gl: rg.Session) -> None:
+    from rendergraph.viewer.desk import Desk
+    from rendergraph.viewer.export import exported
+
+    file = tmp_path / "page.html"
+    file.write_text(exported(Desk(rg.Selection("deferred", size=SIZE), tmp_path), gl), encoding="utf-8")
+    asked: list[str] = []
+    hand.page.on("request", lambda request: asked.append(request.url))
+    hand.page.context.set_offline(True)
+    hand.page.goto(file.as_uri())
+    hand.page.wait_for_selector("#graph svg .card image")
+    assert hand.page.evaluate("document.getElementById('picture').naturalWidth") == SIZE[0]
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    hand.choose("light")
+    assert hand.page.is_disabled("[id='p-light.terms']")
+    hand.page.click("#tab-memory")
+    assert "without reuse" in hand.text("#memory")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read_in_both_schemes(browser: Any, served: Any, scheme: str) -> None:
+    context = browser.new_context(color_scheme=scheme)
+    page = context.new_page()
+    page.goto(served.url)
+    page.wait_for_selector(STILL)
+    ink, ground = (
+        [int(part) for part in re.findall(r"\d+", page.locator("body").evaluate(f"(e) => getComputedStyle(e).{name}"))]
+        for name in ("color", "backgroundColor")
+    )
+    context.close()
+    assert abs(sum(ink[:3]) - sum(ground[:3])) > 450
+
+
+def test_what_fits_an_input_is_offered_and_what_waits_for_the_node_is_not(hand: Hand) -> None:
+    with rg.view(rg.load("deferred", size=SIZE)) as viewer:
+        hand.open(viewer.url)
+        hand.choose("shadows")
+        offered = hand.page.locator("[id='p-shadows.depth'] option").all_inner_texts()
+        assert offered[:2] == ["nothing", "gbuffer.depth"]
+        assert not [end for end in offered if end.startswith(("light.", "shadows.", "display."))]
+        hand.choose("light")
+        assert "gbuffer.albedo" not in hand.page.locator("[id='p-light.normal'] option").all_inner_texts()
+
+
+def test_a_thousand_nodes_are_drawn(hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = io.StringIO()
+    text.write(
+        "size: [8, 8]\nnodes:\n  light: {type: forward_lighting}\n  n0: {type: tonemap, inputs: {radiance: light.radiance}}\n"
+    )
+    for number in range(1, 300):
+        text.write(f"  n{number}: {{type: gaussian_blur, inputs: {{source: n{number - 1}.")
+        text.write("color}}\n" if number == 1 else "blurred}}\n")
+    text.write("outputs: {image: n299.blurred}\nscene: cornell_box\n")
+    (tmp_path / "many.yaml").write_text(text.getvalue())
+    with rg.view("many.yaml") as viewer:
+        hand.open(viewer.url)
+        assert hand.page.locator("#graph .card").count() == 301
+        hand.after(lambda: hand.page.focus("#stage") or hand.page.keyboard.press("ArrowLeft"))
