@@ -23,7 +23,7 @@ copyright = f"2026, {author}"
 version = release = rendergraph.__version__
 
 extensions = ["myst_parser"]
-myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline"]
+myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = [
     "_build",
@@ -53,9 +53,10 @@ html_theme_options = {
 
 
 def _generate(app: Sphinx, config: Config) -> None:
-    generate(HERE / "reference" / "generated")
+    generate(HERE / "reference" / "generated", pictures=config.pictures)
 
 
 def setup(app: Sphinx) -> None:
     """Sphinx's hook."""
+    app.add_config_value("pictures", True, "env", bool, "Draw the pictures of the reference, which takes minutes.")
     app.connect("config-inited", _generate)

@@ -9,12 +9,18 @@ import dataclasses
 import inspect
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 import rendergraph
 import rendergraph.api
 import rendergraph.api.viewing
 import rendergraph.errors
+import rendergraph.ports
+import rendergraph.scene.model
+import rendergraph.steps.frame
+import rendergraph.steps.model
+import rendergraph.steps.state
+import rendergraph.textures
 from rendergraph.textures import Semantic, Signature
 
 from .markdown import block, code, page, prose, table
@@ -35,8 +41,15 @@ FIRST = (
     "Steps",
     "State",
     "Frame",
+    "FrameScene",
+    "Light",
     "Facts",
 )
+
+_GIVEN = {"FrameScene": rendergraph.steps.frame.FrameScene, "Light": rendergraph.scene.model.Light}
+"""What an author meets and does not import."""
+
+_WITH_WORDS = (rendergraph.ports, rendergraph.textures, rendergraph.steps.model, rendergraph.steps.state)
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -53,17 +66,21 @@ def pages() -> Iterator[tuple[str, str]]:
             *(_entry(name, getattr(module, name)) for name, module in names),
         ),
     )
-    members = {name: getattr(rendergraph.api, name) for name in rendergraph.api.__all__}
+    members = {name: getattr(rendergraph.api, name) for name in rendergraph.api.__all__} | _GIVEN
     ordered = sorted(members, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
     documented = [name for name in ordered if callable(members[name]) or inspect.isclass(members[name])]
     meanings = [(code(n), prose(v.doc)) for n, v in members.items() if isinstance(v, Semantic | Signature)]
     constants = [(code(n), code(repr(v))) for n, v in members.items() if n not in documented and not hasattr(v, "doc")]
+    entries = [_entry(name, members[name]) for name in documented]
     yield (
         "node-api.md",
         page(
             "For node authors",
-            "Everything here comes from `rendergraph.api`, the one module that a node imports.",
-            *(_entry(name, members[name]) for name in documented),
+            "Everything here comes from `rendergraph.api`, the one module that a node imports; `FrameScene` and "
+            "`Light` are what `update` is given.",
+            *entries,
+            "## Words\n\nWhat arguments that are one of several words may be.\n\n"
+            + table(("argument's type", "words"), _words("\n".join(entries))),
             "## Meanings of ports\n\n" + table(("name", "texels"), meanings),
             "## Constants\n\n" + table(("name", "value"), constants),
         ),
@@ -81,16 +98,24 @@ def pages() -> Iterator[tuple[str, str]]:
     )
 
 
+def _words(text: str) -> Iterator[tuple[str, str]]:
+    """Every alias of a choice of words that signatures on the page name."""
+    choices = {name: value for module in _WITH_WORDS for name, value in vars(module).items() if name != "FormatName"}
+    for name, value in sorted(choices.items()):
+        if get_origin(value) is Literal and re.search(rf"\b{name}\b", text):
+            yield code(name), ", ".join(code(word) for word in get_args(value))
+
+
 def _entry(name: str, thing: Any) -> str:
     parts = [f"## {name}"]
     if not inspect.isclass(thing):
-        return "\n\n".join([*parts, block(f"{name}{_signature(thing)}", "python"), _doc(thing)])
-    signature = _signature(thing) if dataclasses.is_dataclass(thing) or "__init__" in vars(thing) else ""
-    parts += [block(f"class {name}{signature}" if signature else f"class {name}: ...", "python"), _doc(thing)]
+        return "\n\n".join([*parts, block(f"{name}{signature(thing)}", "python"), _doc(thing)])
+    arguments = signature(thing) if dataclasses.is_dataclass(thing) or "__init__" in vars(thing) else ""
+    parts += [block(f"class {name}{arguments}" if arguments else f"class {name}: ...", "python"), _doc(thing)]
     for member, value in _public_members(thing):
         shown = value.fget if isinstance(value, property) else getattr(value, "func", value)
         shown = getattr(shown, "__func__", shown)
-        kind = "" if isinstance(value, property) or hasattr(value, "func") else _signature(shown, method=True)
+        kind = "" if isinstance(value, property) or hasattr(value, "func") else signature(shown, method=True)
         parts += [f"### {name}.{member}", block(f"{member}{kind}", "python") if kind else "", _doc(shown)]
     return "\n\n".join(part for part in parts if part)
 
@@ -111,7 +136,7 @@ def _public_members(cls: type) -> Iterator[tuple[str, Any]]:
                 yield name, value
 
 
-def _signature(thing: Any, *, method: bool = False) -> str:
+def signature(thing: Any, *, method: bool = False) -> str:
     try:
         found = inspect.signature(thing)
     except (TypeError, ValueError):

@@ -9,20 +9,9 @@ from collections.abc import Iterator
 
 import click
 
-from rendergraph.cli.app import VERBS
+from rendergraph.cli.app import EXIT_CODES, VERBS
 
 from .markdown import block, page, prose, table
-
-CODES = (
-    (0, "done"),
-    (1, "failed while running: disk, memory, GL"),
-    (2, "the command line itself: an unknown verb or option, a malformed value"),
-    (3, "something named there or in a file is missing or wrong: pipeline, scene, mesh, image, shader"),
-    (4, "a comparison beyond its threshold"),
-    (5, "no usable GL device"),
-    (130, "interrupted"),
-    (143, "terminated"),
-)
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -33,11 +22,13 @@ def pages() -> Iterator[tuple[str, str]]:
         "cli.md",
         page(
             "Command line",
-            "Data goes to stdout, everything else to stderr. Every verb has `--json`, which prints one document, and "
-            "`--help`.",
+            "Data goes to stdout, everything else to stderr. Every verb has `--json`, which prints one document, "
+            "`--quiet`, which says nothing but errors, and `--help`. On a terminal errors are marked in colour; "
+            "`NO_COLOR=1` leaves that out.",
             table(("verb", ""), rows),
             *(_verb(verb, command) for verb, command in verbs.items()),
-            f"## Exit codes\n\n{table(('code', 'meaning'), [(f'`{number}`', text) for number, text in CODES])}",
+            "## Exit codes",
+            table(("code", "meaning"), [(f"`{number}`", text) for number, text in EXIT_CODES.items()]),
         ),
     )
 

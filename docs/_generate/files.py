@@ -15,7 +15,7 @@ from rendergraph.compare.axes import MOST_RUNS
 from rendergraph.glsl import expansion, source
 from rendergraph.resolve import flatten
 from rendergraph.scene import files, image_header
-from rendergraph.schedule import MOST_STEPS
+from rendergraph.steps import MOST_STEPS
 from rendergraph.textures import MOST_SIDE
 
 from .markdown import code, prose, table

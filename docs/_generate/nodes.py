@@ -14,6 +14,7 @@ from rendergraph.cli.program_text import program, shown_at_work
 from rendergraph.errors import InputError
 from rendergraph.session import Selection
 
+from .api import signature
 from .markdown import block, code, folded, listing, page, prose, table
 from .pictures import Studio, View, example_and_base, exhibit
 
@@ -32,6 +33,7 @@ def pages(studio: Studio) -> Iterator[tuple[str, str]]:
     for members in families.values():
         for found in members:
             yield f"nodes/{found.name}.md", _page(found, described, studio)
+    yield "nodes/bases.md", _bases_page([found for members in families.values() for found in members])
 
 
 def _index(families: dict[str, list[NodeType]]) -> str:
@@ -44,7 +46,8 @@ def _index(families: dict[str, list[NodeType]]) -> str:
             rows = [(f"[`{found.name}`]({found.name}.md)", prose(summary(found))) for found in members]
             parts.append(f"## {family.capitalize() or 'Others'}\n\n" + table(("type", "what it makes"), rows))
     names = [found.name for members in families.values() for found in members]
-    return page("Nodes", *parts, listing(names))
+    parts.append("Several are made of the same pieces, which nodes of yours may extend: [bases](bases.md).")
+    return page("Nodes", *parts, listing([*names, "bases"]))
 
 
 def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio) -> str:
@@ -86,6 +89,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         f"`{found.name}`",
         f"*{found.family}* — {prose(first)}",
         prose(rest.strip()),
+        _extends(found),
         _pictures(found, node["outputs"], studio),
         f"## In a file\n\n{block(in_a_file(found, Catalog.discover()), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
@@ -95,6 +99,64 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         _in_scope(found),
         "## How it is made\n\n" + "\n\n".join(_sources(found)),
     )
+
+
+def _bases(found: NodeType) -> list[type]:
+    """What its class extends, the nearest first, as far as that is no node type by itself."""
+    own = [cls for cls in found.cls.__mro__[1:] if cls.__module__.startswith("rendergraph.nodes.")]
+    return [cls for cls in own if cls.__module__.rpartition(".")[2].startswith("_")]
+
+
+def _extends(found: NodeType) -> str:
+    """The bases, with the names that a subclass may use."""
+    bases = [f"[`{cls.__name__}`](bases.md#{cls.__name__.lower()})" for cls in _bases(found)]
+    line = f"`from {found.cls.__module__} import {found.cls.__name__}`"
+    return f"To extend it: {line}." + (f" It is made of {' and '.join(bases)}." if bases else "")
+
+
+def _bases_page(types: list[NodeType]) -> str:
+    """Every base, with what a class that extends it has: its doc, ports, parameters, methods and source."""
+    users: dict[type, list[str]] = {}
+    for found in types:
+        for cls in _bases(found):
+            users.setdefault(cls, []).append(found.name)
+    parts = [_base(cls, names) for cls, names in sorted(users.items(), key=lambda entry: entry[0].__name__)]
+    about = (
+        "What several standard nodes are made of. They are no types of their own: a node [extends "
+        "one](../../../guide/write-a-node.md#extend-a-node), has its ports and parameters, calls its methods in "
+        "`record`, and finds its shaders and includes. They change more readily than nodes do."
+    )
+    files = sorted({Path(inspect.getfile(cls)) for cls in users})
+    sources = [folded(f"<code>{file.name}</code>", block(file.read_text(encoding="utf-8"), "python")) for file in files]
+    return page("Bases", about, *parts, "## Their modules", *sources)
+
+
+def _base(cls: Any, users: list[str]) -> str:
+    methods = {
+        name: value
+        for name, value in vars(cls).items()
+        if inspect.isfunction(value) and name[0] != "_" and name not in ("record", "update")
+    }
+    calls = [
+        f"{block(name + signature(value, method=True), 'python')}\n\n{prose(_first(value))}"
+        for name, value in methods.items()
+    ]
+    own = [name for name in vars(cls) if name in cls.ports()]
+    ports = [(code(name), code(type(cls.ports()[name]).__name__), prose(cls.ports()[name].doc)) for name in own]
+    return "\n\n".join(
+        [
+            f"## {cls.__name__}",
+            block(f"from {cls.__module__} import {cls.__name__}", "python"),
+            prose(inspect.getdoc(cls) or ""),
+            "Of " + ", ".join(f"[`{name}`]({name}.md)" for name in users) + ".",
+            table(("port", "is", ""), ports),
+            *calls,
+        ]
+    )
+
+
+def _first(function: Any) -> str:
+    return (inspect.getdoc(function) or "").partition("\n")[0]
 
 
 def _in_scope(found: NodeType) -> str:
