@@ -51,7 +51,7 @@ def test_every_node_can_be_explained(cli: Any, name: str) -> None:
         assert port["name"] in text
         assert port["doc"] in text
     alone = re.fullmatch(r"extends: (.*)\n?", told["example"])
-    whole = (folder("pipelines") / f"{alone[1]}.yaml").read_text() if alone else text
+    whole = (folder("rendergraph.pipelines") / f"{alone[1]}.yaml").read_text() if alone else text
     assert f"type: {name}" in whole
 
 
