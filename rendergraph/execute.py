@@ -184,12 +184,14 @@ class Runner:
         graph: for the nodes that compute something each frame.
         drawn: frames since history began.
         reuse: leave out steps whose values are there and would be the same.
+        cull: leave out objects that lie outside of the views that they would be drawn with.
         ran: how many steps the last frame ran.
     """
 
     executable: Executable
     graph: Graph
     reuse: bool = False
+    cull: bool = True
     ran: int = 0
     _updating: list[GraphNode] = field(default_factory=list)
     _scene: FrameScene | None = None
@@ -275,8 +277,7 @@ class Runner:
             views.advance()  # nothing has moved before the first frame
         self.drawn += 1
         if views.changed or moved:
-            for sort in executable.sorters:
-                sort(views)
+            executable.arrange(moved=moved, cull=self.cull)
             executable.touched |= {source_of_view(table) for table in views.changed}
             views.changed.clear()
         if views.moved_before:

@@ -106,6 +106,7 @@ class Lighting(Node):
         fragment: str = "forward_lighting.frag",
         vertex: str = "<geometry.vert>",
         geometry: str | None = None,
+        in_place: bool | None = None,
     ) -> None:
         """Light surfaces with alpha blending and lay them over the picture, far to near.
 
@@ -115,7 +116,7 @@ class Lighting(Node):
             shadows: an input of functions.
             depth: what they are tested against, where `out` has none.
             view: what carries the view they are seen with; the node's `view` input or the camera by default.
-            fragment, vertex, geometry: shaders.
+            fragment, vertex, geometry, in_place: shaders, and whether these draw objects where they are.
         """
         reads: dict[str, Any] = self.lights_of(steps, shadows) | ({} if depth is None else {"depth": depth})
         reads = reads or {"lookup": shadows}  # a step that names nothing would read everything
@@ -123,6 +124,7 @@ class Lighting(Node):
             fragment,
             vertex=vertex,
             geometry=geometry,
+            in_place=in_place,
             out=out,
             objects="transparent",
             order="back_to_front",

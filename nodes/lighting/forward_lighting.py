@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from rendergraph.api import State, Steps, define
 
@@ -26,7 +26,7 @@ class ForwardLighting(GeometryLighting):
     def record(self, steps: Steps) -> None:
         """One pass over what is opaque, one over what is blended."""
         super().record(steps)
-        shaders = {
+        shaders: dict[str, Any] = {
             "fragment": {"fragment": "forward_lighting.frag"},
             "vertex": {"fragment": "forward_interpolated.frag", "vertex": "forward_lighting.vert"},
             "face": {
@@ -37,5 +37,5 @@ class ForwardLighting(GeometryLighting):
         }[self.evaluate]
         # Triangles that pass a geometry shader may come out a few steps of depth beside the pre-pass's.
         nearer = (0.0, 8.0) if self.evaluate == "face" and steps.connected(self.depth) else None
-        self.light_opaque(steps, **shaders, **self.around(steps), state=State(polygon_offset=nearer))
-        self.blend_after(steps, **shaders)
+        self.light_opaque(steps, **shaders, **self.around(steps), in_place=True, state=State(polygon_offset=nearer))
+        self.blend_after(steps, **shaders, in_place=True)

@@ -24,6 +24,7 @@ class ShadowCube(ShadowMapNode):
                 out=self.shadow_map,
                 view=self.views,
                 view_index=None,
+                in_place=True,
                 objects="casters",
                 materials="alpha",
                 state=State(cull="none", polygon_offset=(-self.slope_bias, 0.0) if self.slope_bias else None),

@@ -81,6 +81,7 @@ class ShadowCubeMap(MapTechnique):
                 out=self.cube,
                 view=self.views,
                 view_index=None,
+                in_place=True,
                 objects="casters",
                 materials="alpha",
                 state=State(cull="none"),

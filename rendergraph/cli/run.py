@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     default=None,
     help="Leave out steps whose values are still there from the frame before.  [default: unless --json measures them]",
 )
+@click.option("--no-cull", is_flag=True, help="Draw objects outside of the view, too.")
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
 @click.option("--poison", is_flag=True, help="Overwrite textures that are dead, to show who still reads them.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
@@ -64,6 +65,7 @@ def command(
     device: int | None,
     watch: bool,
     reuse: bool | None,
+    no_cull: bool,
     no_alias: bool,
     poison: bool,
     shuffle: int | None,
@@ -90,7 +92,7 @@ def command(
     def modes(linked: Linked) -> RenderOptions:
         shown = frames or linked.frames
         plain = RenderOptions(shown, fps or linked.fps, timed=as_json, reuse=reuse)
-        return replace(plain, alias=not no_alias, poison=poison, shuffle=shuffle)
+        return replace(plain, cull=not no_cull, alias=not no_alias, poison=poison, shuffle=shuffle)
 
     warnings = Warnings()
     read = partial(_read, selection, modes, outputs, taps, tap_all, warnings)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import moderngl
 
     from rendergraph.allocate import ResourcePlan
+    from rendergraph.compile.culling import SceneView
     from rendergraph.compile.gpu_scene import GpuScene
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.views import ViewBuffers
@@ -139,7 +140,7 @@ class Executable:
         lists: what the next frame runs, a list a parity; filled by `assemble`.
         due: kept steps that the next frame runs.
         statics: uniform writes that hold for the whole frame.
-        sorters: called with the view tables when a view has changed: objects front to back.
+        scene_views: which objects are drawn, and in what order; asked when a view or an object has moved.
         scene: what it draws, which counts its changes.
         reuse: which steps have to run.
         filled: what the CPU wrote into buffers last.
@@ -162,7 +163,7 @@ class Executable:
     lists: list[list[FrameStep]] = field(default_factory=list)
     due: set[StepKey] = field(default_factory=set)
     statics: list[Call] = field(default_factory=list)
-    sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
+    scene_views: list[SceneView] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
     passed: list[Passed] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
@@ -191,6 +192,12 @@ class Executable:
         self.due = set(self.kept)
         self.reuse.forget()
         self.assemble()
+
+    def arrange(self, *, moved: bool, cull: bool) -> None:
+        """Let geometry steps draw what their views see now; `moved` says that objects have."""
+        for each in self.scene_views:
+            if moved or each.table in self.views.changed:
+                each.arrange(self.scene.packed, self.views, cull=cull)
 
     def done(self) -> None:
         """A frame has run: go on without the kept steps that were due."""

@@ -8,33 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import moderngl
 import numpy as np
-import numpy.typing as npt
 
+from rendergraph.compile.culling import COMMAND, DrawList, Objects, SceneView
 from rendergraph.compile.executable import Draw, SortedDraws
-from rendergraph.compile.gpu_scene import GpuScene, MeshIndices
+from rendergraph.compile.gpu_scene import GpuScene
 from rendergraph.compile.memory import Call
-from rendergraph.compile.views import ViewBuffers
 from rendergraph.expand import CAMERA
 from rendergraph.program.variants import features, select
 from rendergraph.scene.model import Texture
-from rendergraph.steps import Step, ViewMatrices
-
-COMMAND = np.dtype(
-    [
-        ("count", np.uint32),
-        ("instances", np.uint32),
-        ("first_index", np.uint32),
-        ("base_vertex", np.int32),
-        ("base_instance", np.uint32),
-    ]
-)
-"""DrawElementsIndirectCommand."""
+from rendergraph.steps import Step
 
 
 @dataclass(frozen=True)
@@ -56,30 +43,34 @@ class MultiDraw:
         textures: sampler name to GL texture and sampler.
         cull: `back`, `front` or `none`.
         clockwise: whether front faces are clockwise.
-        objects: object indices in the order they are drawn.
-        commands: the buffer of draw commands.
-        indices: what the commands count through.
+        list: what is drawn.
+        mode: the primitive, moderngl's.
     """
 
     defines: Mapping[str, str]
     textures: Mapping[str, tuple[int, int]]
     cull: str
     clockwise: bool
-    objects: npt.NDArray[np.int64]
-    commands: moderngl.Buffer
-    indices: MeshIndices
+    list: DrawList
+    mode: int
 
     def call(self, vertex_array: Any) -> Call:
         """The draw."""
-        return partial(vertex_array.render_indirect, self.commands, self.indices.mode, len(self.objects))
+        drawn, mode = self.list, self.mode
+
+        def call() -> None:
+            if len(drawn.drawn):
+                vertex_array.render_indirect(drawn.buffer, mode, len(drawn.drawn))
+
+        return call
 
 
 @dataclass(eq=False)
 class GeometryCompiler:
-    """Multi-draws of a scene's objects, and what keeps them front to back."""
+    """Multi-draws of a scene's objects, and the views that decide what they draw."""
 
     scene: GpuScene
-    sorters: list[Callable[[ViewBuffers], None]] = field(default_factory=list)
+    views: dict[tuple[Any, ...], SceneView] = field(default_factory=dict)
     _multi_draws: dict[tuple[Any, ...], list[MultiDraw]] = field(default_factory=dict)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
 
@@ -97,7 +88,6 @@ class GeometryCompiler:
             return [make(multi_draw) for multi_draw in self._grouped(step, objects)]
         if step.order == "back_to_front":
             return self._sorted(step, objects, make)
-        indices = self.scene.indices(step.topology)
         runs: list[tuple[MultiDrawKey, list[int]]] = []
         for index in objects:
             key = self._key(step, index)
@@ -105,79 +95,62 @@ class GeometryCompiler:
                 runs[-1][1].append(index)
             else:
                 runs.append((key, [index]))
-        return [make(self._multi_draw(key, members, indices)) for key, members in runs]
+        return [make(self._multi_draw(step, key, members)) for key, members in runs]
 
     def _grouped(self, step: Step, objects: list[int]) -> list[MultiDraw]:
-        view = (step.view or CAMERA, step.view_index or 0)
-        key = (view, tuple(objects), step.materials, step.topology, step.state.cull, step.state.front)
+        state = step.state.cull, step.state.front
+        key = (*self._view_key(step), tuple(objects), step.materials, step.topology, *state)
         if key not in self._multi_draws:
-            indices = self.scene.indices(step.topology)
             groups: dict[MultiDrawKey, list[int]] = {}
             for index in objects:
                 groups.setdefault(self._key(step, index), []).append(index)
-            self._multi_draws[key] = [self._multi_draw(alike, members, indices) for alike, members in groups.items()]
-            for multi_draw in self._multi_draws[key]:
-                if len(multi_draw.objects) > 1:
-                    self.sorters.append(partial(self._sort, multi_draw, *view))
+            self._multi_draws[key] = [self._multi_draw(step, alike, members) for alike, members in groups.items()]
         return self._multi_draws[key]
 
     def _sorted(self, step: Step, objects: list[int], make: Callable[[MultiDraw], Draw]) -> SortedDraws:
         """A part for each kind of object over one list of commands, which is sorted far to near as the view moves."""
         keys = [self._key(step, index) for index in objects]
         parts = {key: number for number, key in enumerate(dict.fromkeys(keys))}
-        members = np.array(objects, np.int64)
-        part_of = np.array([parts[key] for key in keys], np.int64)
-        indices = self.scene.indices(step.topology)
-        commands = self._command_buffer(members, indices)
-        draws = [make(self._multi_draw(key, objects[:1], indices)) for key in parts]
+        part_of = np.zeros(max(objects) + 1, np.int64)
+        part_of[objects] = [parts[key] for key in keys]
+        whole = self._list(step, objects)
+        mode = self.scene.indices(step.topology).mode
+        draws = [make(self._with_textures(key, whole, mode)) for key in parts]
 
         def render(part: int, first: int, count: int) -> None:
-            draws[part].vertex_array.render_indirect(commands, indices.mode, count, first)
+            draws[part].vertex_array.render_indirect(whole.buffer, mode, count, first)
 
         made = SortedDraws(draws, render)
 
-        def sort(views: ViewBuffers) -> None:
-            view = views.current[step.view or CAMERA][step.view_index or 0]
-            order = np.argsort(-self._depths(members, view), kind="stable")
-            commands.write(self._commands(members[order], indices).tobytes())
-            kinds = part_of[order]
-            starts = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(kinds)]
-            made.runs = [(int(kinds[a]), a, b - a) for a, b in pairwise(starts)]
+        def changed(drawn: Objects) -> None:
+            kinds = part_of[drawn]
+            ends = [0, *(np.flatnonzero(np.diff(kinds)) + 1).tolist(), len(kinds)]
+            made.runs = [(int(kinds[a]), a, b - a) for a, b in pairwise(ends) if b > a]
 
-        self.sorters.append(sort)
+        whole.changed = changed
         return made
 
-    def _multi_draw(self, key: MultiDrawKey, members: list[int], indices: MeshIndices) -> MultiDraw:
+    def _multi_draw(self, step: Step, key: MultiDrawKey, members: list[int]) -> MultiDraw:
+        return self._with_textures(key, self._list(step, members), self.scene.indices(step.topology).mode)
+
+    def _with_textures(self, key: MultiDrawKey, drawn: DrawList, mode: int) -> MultiDraw:
         self.scene.load_images([texture for _, texture in key.textures])
-        objects = np.array(members, np.int64)
         found = {name: self.scene.texture(texture) for name, texture in key.textures}
-        commands = self._command_buffer(objects, indices)
-        return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, objects, commands, indices)
+        return MultiDraw(dict(key.defines), found, key.cull, key.clockwise, drawn, mode)
 
-    def _command_buffer(self, objects: npt.NDArray[np.int64], indices: MeshIndices) -> moderngl.Buffer:
-        buffer = self.scene.device.ctx.buffer(self._commands(objects, indices).tobytes() or bytes(COMMAND.itemsize))
+    def _list(self, step: Step, members: list[int]) -> DrawList:
+        """Commands of objects, filled whenever the step's view or an object has moved."""
+        buffer = self.scene.device.ctx.buffer(reserve=len(members) * COMMAND.itemsize)
         self.buffers.append(buffer)
-        return buffer
+        commands = self.scene.indices(step.topology).commands
+        made = DrawList(buffer, commands, np.array(members, np.int64), step.order)
+        key = self._view_key(step)
+        self.views.setdefault(key, SceneView(*key)).lists.append(made)
+        return made
 
-    def _depths(self, objects: npt.NDArray[np.int64], view: ViewMatrices) -> npt.NDArray[np.float64]:
-        """Distance along the view axis of objects' centres."""
-        depths: npt.NDArray[np.float64] = -(self.scene.packed.centers[objects] @ view.view[2, :3] + view.view[2, 3])
-        return depths
-
-    def _commands(self, objects: npt.NDArray[np.int64], indices: MeshIndices) -> npt.NDArray[np.void]:
-        meshes = indices.meshes[self.scene.packed.object_mesh[objects]]
-        commands = np.zeros(len(objects), COMMAND)
-        commands["count"] = meshes["count"]
-        commands["instances"] = 1
-        commands["first_index"] = meshes["first_index"]
-        commands["base_vertex"] = meshes["base_vertex"]
-        commands["base_instance"] = objects
-        return commands
-
-    def _sort(self, multi_draw: MultiDraw, table: str, index: int, views: ViewBuffers) -> None:
-        depths = self._depths(multi_draw.objects, views.current[table][index])
-        multi_draw.objects = multi_draw.objects[np.argsort(depths, kind="stable")]
-        multi_draw.commands.write(self._commands(multi_draw.objects, multi_draw.indices).tobytes())
+    def _view_key(self, step: Step) -> tuple[str, int | None, bool, bool]:
+        """What a `SceneView` is made of."""
+        return step.view or CAMERA, step.view_index, step.in_place, step.state.depth_clamp
 
     def _key(self, step: Step, index: int) -> MultiDrawKey:
         scene = self.scene.scene

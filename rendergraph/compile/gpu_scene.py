@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.views import FIXED_BLOCKS
 from rendergraph.gl import textures
@@ -72,12 +73,12 @@ class MeshIndices:
 
     Attributes:
         buffer: the indices.
-        meshes: `MESH` records that say where each mesh's lie.
+        commands: what draws each object of the scene with them.
         mode: the primitive, moderngl's.
     """
 
     buffer: moderngl.Buffer
-    meshes: Records
+    commands: Records
     mode: int
 
 
@@ -119,7 +120,7 @@ class GpuScene:
             if array is not None and array.size:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
         buffer = ctx.buffer(packed.indices.tobytes() or bytes(4))
-        self._indices = {"triangles": MeshIndices(buffer, packed.meshes, moderngl.TRIANGLES)}
+        self._indices = {"triangles": MeshIndices(buffer, commands(packed, packed.meshes), moderngl.TRIANGLES)}
         self._instances = ctx.buffer(packed.instances.tobytes() or bytes(64))
         stored = storage_blocks(packed, self.device.limits["uniform_block"])
         for block, records in pack.blocks(packed).items():
@@ -178,7 +179,7 @@ class GpuScene:
         if topology not in self._indices:
             indices, meshes = pack.with_adjacency(self.packed)
             buffer = self.device.ctx.buffer(indices.tobytes() or bytes(4))
-            self._indices[topology] = MeshIndices(buffer, meshes, moderngl.TRIANGLES_ADJACENCY)
+            self._indices[topology] = MeshIndices(buffer, commands(self.packed, meshes), moderngl.TRIANGLES_ADJACENCY)
         return self._indices[topology]
 
     def vertex_array(self, programs: ProgramCache, program: Program, topology: str) -> Any:

@@ -125,7 +125,7 @@ class _Compiler:
         self._keep_units(steps)
         binds: list[list[Call]] = [[*calls, self.views.bind, self.scene.bind] for calls in self.units.binds()]
         made = Executable(self.device, self.plan, self.memory, self.views, self.scene, binds, steps)
-        made.sorters = list(self.geometry.sorters)
+        made.scene_views = list(self.geometry.views.values())
         made.buffers = list(self.geometry.buffers)
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
         made.looks_back = self.looks_back or self.views.looks_back

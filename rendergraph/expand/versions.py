@@ -170,6 +170,7 @@ class _Versions:
             "objects",
             "materials",
             "order",
+            "in_place",
             "per_light",
             "topology",
             "command",

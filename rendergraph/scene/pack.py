@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress, count
+from operator import is_not
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -23,6 +25,7 @@ from rendergraph.steps import ViewMatrices
 Records: TypeAlias = npt.NDArray[np.void]
 Bools: TypeAlias = npt.NDArray[np.bool_]
 Ints: TypeAlias = npt.NDArray[np.int32]
+Doubles: TypeAlias = npt.NDArray[np.float64]
 
 SLOTS = (
     "base_color",
@@ -81,6 +84,7 @@ VIEW = np.dtype(
     ]
     + [(name, *_VEC4) for name in ("eye", "viewport", "range", "jitter")]
 )
+_ROUNDING = 4 * 2.0**-23  # of a sum of four products in float32, relative to their sizes
 _FARTHEST_EYE = 1e9  # metres; one that is farther off is a direction, whatever rounding says
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
@@ -106,7 +110,8 @@ class PackedScene:
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
         casts_shadow, hidden, double_sided: bool (n,).
         alpha_mode: `opaque`, `mask` or `blend` for each object.
-        centers: float32 (n, 3), of world-space bounding boxes, for sorting by depth.
+        centers, extents: float64 (n, 3), middles and half sides of world-space bounding boxes.
+        slack: float64 (n, 1), metres that rounding may move an object's vertices by on the GPU.
         names: of the objects.
     """
 
@@ -130,7 +135,9 @@ class PackedScene:
     hidden: Bools
     double_sided: Bools
     alpha_mode: tuple[str, ...]
-    centers: Floats
+    centers: Doubles
+    extents: Doubles
+    slack: Doubles
     names: tuple[str, ...]
 
 
@@ -226,16 +233,21 @@ def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:
     return replace(packed, **changed)
 
 
+def changed_objects(before: Scene, scene: Scene) -> list[int]:
+    """The objects that are not the very same in two scenes that share their meshes."""
+    return list(compress(count(), map(is_not, before.objects, scene.objects)))
+
+
 def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
     """What objects are packed to of which some have moved: their records are made anew, those of the others copied."""
     was, now = before.objects, scene.objects
-    moved = [number for number, (one, other) in enumerate(zip(was, now, strict=True)) if one is not other]
+    moved = changed_objects(before, scene)
     if any(vars(was[number]) | {"transform": 0} != vars(now[number]) | {"transform": 0} for number in moved):
         return _placed(scene, packed.meshes)
     made = _placed(replace(scene, objects=tuple(now[number] for number in moved)), packed.meshes)
     made["instances"]["ids"][:, 1] = moved
     changed = {}
-    for name in ("instances", "mirrored", "centers"):
+    for name in ("instances", "mirrored", "centers", "extents", "slack"):
         changed[name] = getattr(packed, name).copy()
         changed[name][moved] = made[name]
     return changed
@@ -256,7 +268,8 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
     instances["rows"] = transforms[:, :3, :]
     instances["ids"] = np.stack([material, np.arange(len(objects), dtype=np.int32)], axis=1)
     low, high = meshes["low"][mesh].astype(np.float64), meshes["high"][mesh].astype(np.float64)
-    center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
+    linear, place = transforms[:, :3, :3], transforms[:, :3, 3]
+    sizes = np.einsum("nij,nj->ni", np.abs(linear), np.maximum(np.abs(low), np.abs(high))) + np.abs(place)
     return {
         "instances": instances,
         "object_mesh": mesh,
@@ -265,7 +278,9 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
         "hidden": np.array([entry.hidden for entry in objects], bool),
         "double_sided": np.array([scene.materials[entry.material].double_sided for entry in objects], bool),
         "alpha_mode": tuple(scene.materials[entry.material].alpha_mode for entry in objects),
-        "centers": center.astype(np.float32),
+        "centers": np.einsum("nij,nj->ni", linear, (low + high) / 2) + place,
+        "extents": np.einsum("nij,nj->ni", np.abs(linear), (high - low) / 2),
+        "slack": _ROUNDING * sizes.max(axis=1, keepdims=True),
         "names": tuple(entry.name for entry in objects),
     }
 

@@ -46,7 +46,8 @@ class Drawing:
     camera: Camera | None = None
 
     def __post_init__(self) -> None:
-        self.runner = Runner(self.executable, self.expanded.linked.graph, self.expanded.options.reuses)
+        options = self.expanded.options
+        self.runner = Runner(self.executable, self.expanded.linked.graph, options.reuses, options.cull)
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
         self._remembers = history or self.executable.looks_back
 

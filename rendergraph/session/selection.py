@@ -105,6 +105,7 @@ class RenderKeywords(TypedDict, total=False):
     warm_up: bool
     timed: bool
     reuse: bool | None
+    cull: bool
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,8 @@ class RenderOptions:
         timed: measure each step, which takes longer than many small ones do.
         reuse: leave out the steps whose values are still there from the frame before and would be the same; no bit of a
             picture depends on it. By default that is done unless steps are timed, as those left out take no time.
+        cull: leave out objects that lie outside of the view that they would be drawn with; no bit of a picture depends
+            on it.
 
     Raises:
         UsageError: frames or frames a second that there cannot be.
@@ -137,6 +140,7 @@ class RenderOptions:
     warm_up: bool = True
     timed: bool = False
     reuse: bool | None = None
+    cull: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.frames, range) or not self.frames or min(self.frames[0], self.frames[-1]) < 1:

@@ -118,6 +118,7 @@ class Step:
         objects: which objects a geometry step draws: `all`, `opaque`, `transparent`, `casters`, or names.
         materials: what of the material its shader looks at: `full`, `alpha` (only what an alpha mask needs) or `none`.
         order: `front_to_back` (free to regroup), `back_to_front` or `scene` (kept as given).
+        in_place: whether a geometry step's triangles end up where the objects are: those outside the view are left out.
         region: the number of the node's rectangle that it is drawn in, as `update` sets it; None for the whole target.
         if_drawn: the number of the node's step without which, where that drew nothing, the device leaves this one out.
         per_light: a light's index where the step draws for one light alone.
@@ -152,6 +153,7 @@ class Step:
     objects: str | tuple[str, ...] = "all"
     materials: MaterialLevel = "full"
     order: DrawOrder = "front_to_back"
+    in_place: bool = False
     region: int | None = None
     if_drawn: int | None = None
     per_light: int | None = None

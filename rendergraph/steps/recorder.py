@@ -61,6 +61,8 @@ class StepRequest:
 
 Target: TypeAlias = Port | Part
 Defines: TypeAlias = Annotated[Mapping[str, Macro], "a mapping from macros to values"]
+IN_PLACE = ("<geometry.vert>", "<depth.vert>")
+"""The vertex shaders that are known to draw objects where they are."""
 Objects: TypeAlias = Annotated[str | Sequence[str], "all, opaque, transparent, casters or a list of objects' names"]
 
 
@@ -173,6 +175,7 @@ class Steps:
         objects: Objects = "all",
         materials: MaterialLevel = "full",
         order: DrawOrder = "front_to_back",
+        in_place: bool | None = None,
         per_light: Count | None = None,
         topology: Literal["triangles", "triangles_adjacency"] = "triangles",
         **bindings: Target | UniformValue,
@@ -189,6 +192,9 @@ class Steps:
             objects: `all`, `opaque`, `transparent`, `casters`, an object's name or several.
             materials: what of the material the shader looks at.
             order: `front_to_back`, `back_to_front` or `scene`.
+            in_place: whether triangles end up where the objects are, so that objects outside of the view (with
+                `view_index=None` of all of them) need not be drawn. By default that is taken of `<geometry.vert>` and
+                `<depth.vert>` without a geometry shader; say so of your own shaders where it is true of them.
             per_light: one light's index, for a pass a light.
             topology: `triangles_adjacency` gives a geometry shader six vertices a triangle: behind each corner the one
                 across the edge from there to the next, vertices with equal positions taken for one. The objects have to
@@ -197,6 +203,8 @@ class Steps:
         if per_light is not None and per_light >= len(self.lights):
             raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
+        if in_place is None:
+            in_place = vertex in IN_PLACE and geometry is None
         self._add(
             "geometry",
             shaders,
@@ -212,6 +220,7 @@ class Steps:
             objects=checks.objects(objects),
             materials=materials,
             order=order,
+            in_place=in_place,
             per_light=per_light,
             topology=topology,
         )
