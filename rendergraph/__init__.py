@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rendergraph.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from rendergraph.compare import sweep
     from rendergraph.errors import RendergraphError
     from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load
     from rendergraph.viewer import view
@@ -21,7 +22,7 @@ _around = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.path.join(_around, "nodes")):
     __path__.append(_around)  # a checkout has its own nodes, shaders and pipelines, wherever another one is installed
 
-__all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load", "view"]
+__all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load", "sweep", "view"]
 
 
 def __dir__() -> list[str]:
@@ -33,6 +34,10 @@ def __getattr__(name: str) -> Any:
         from rendergraph.errors import RendergraphError  # `rendergraph --help` needs none of it
 
         return RendergraphError
+    if name == "sweep":
+        from rendergraph.compare import sweep  # nor of this
+
+        return sweep
     if name == "view":
         from rendergraph.viewer import view  # pages are another matter
 

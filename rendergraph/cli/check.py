@@ -28,7 +28,7 @@ def command(selection: Selection, as_json: bool) -> None:
       rendergraph check forward
       rendergraph check forward --scene spheres -s light.ambient=0.1 --json
     """
-    from rendergraph.compare.axes import is_sweep
+    from rendergraph.compare.sweepfile import is_sweep
     from rendergraph.schema import outdated
     from rendergraph.session import stages
     from rendergraph.session.made import is_picture

@@ -166,7 +166,7 @@ def table_of(kind: str) -> Table:
     elif kind == "scene":
         from rendergraph.scene.scene_keys import SCENE as found
     elif kind == "sweep":
-        from rendergraph.compare.axes import SWEEP as found
+        from rendergraph.compare.sweepfile import SWEEP as found
     elif kind == "settings":
         from rendergraph.settings import SETTINGS as found
     else:

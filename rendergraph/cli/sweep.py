@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,12 +12,14 @@ from rendergraph.cli import compare as shared
 from rendergraph.cli import options
 from rendergraph.cli.output import amount, emit, emit_json, on_terminal, say, table, warn
 from rendergraph.cli.words import click
-from rendergraph.errors import InputError, RenderError
+from rendergraph.errors import InputError, Problem, RenderError, UsageError
 
 if TYPE_CHECKING:
-    from rendergraph.compare.axes import Axis, SweepFile
+    from rendergraph.compare.axes import Axis, Space
+    from rendergraph.compare.listing import Listing
     from rendergraph.compare.product import Sweep
-    from rendergraph.errors import Problem
+    from rendergraph.compare.sampling import Sampling
+    from rendergraph.compare.sweepfile import SweepFile
     from rendergraph.session import Selection
 
 
@@ -25,7 +29,15 @@ def _axis(text: str) -> Axis:
     return parse_axis(text)
 
 
+def _group(text: str) -> tuple[str, ...]:
+    paths = tuple(part.strip() for part in text.split(","))
+    if len(paths) < 2 or "" in paths:
+        raise ValueError(f"'{text}' is not PATH,PATH, two axes or more that go together")
+    return paths
+
+
 AXIS = options.Parsed("PATH=V,V,…", _axis)
+GROUP = options.Parsed("PATH,PATH", _group)
 
 
 @click.command("sweep", no_args_is_help=True)
@@ -37,7 +49,15 @@ AXIS = options.Parsed("PATH=V,V,…", _axis)
     multiple=True,
     type=AXIS,
     shell_complete=options.offered("settings"),
-    help="Go through these values of a path that -s takes.",
+    help="Go through these values of a path that -s takes: 8,16, or 8:64:8, log:0.1:10:5; 0.1:2 for --samples.",
+)
+@click.option("--zip", "zipped", multiple=True, type=GROUP, help="Let these axes go through their values together.")
+@click.option("--samples", type=click.IntRange(1, 10_000), metavar="N", help="Draw N samples, not all combinations.")
+@click.option(
+    "--sampling", type=click.Choice(["latin", "random"]), help="A sample in each part of every axis, or anywhere."
+)
+@click.option(
+    "--seed", type=click.IntRange(0), metavar="N", help="Of the samples: the same gives the same.  [default: 0]"
 )
 @click.option(
     "-o",
@@ -45,10 +65,10 @@ AXIS = options.Parsed("PATH=V,V,…", _axis)
     "out",
     type=options.NamedPath(file_okay=False),
     metavar="DIR",
-    required=True,
     help="A folder for the runs, results.jsonl and report.html.",
 )
 @click.option("--resume", is_flag=True, help="Keep the runs that DIR has already.")
+@click.option("--list", "listing", is_flag=True, help="Say what would be drawn, and what is shared; draw nothing.")
 @click.option("--csv", "as_csv", is_flag=True, help="Write results.csv, too: a row a run, for spreadsheets.")
 @shared.reference_option
 @shared.metric_option
@@ -65,8 +85,13 @@ AXIS = options.Parsed("PATH=V,V,…", _axis)
 def command(
     pipeline: str,
     axes: tuple[Axis, ...],
-    out: Path,
+    zipped: tuple[tuple[str, ...], ...],
+    samples: int | None,
+    sampling: Sampling | None,
+    seed: int | None,
+    out: Path | None,
     resume: bool,
+    listing: bool,
     as_csv: bool,
     reference: str | None,
     metric: str | None,
@@ -81,58 +106,69 @@ def command(
 ) -> None:
     """Draw and measure every combination of parameters.
 
-    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline` and `axes`, and `reference`, `scene`, `size`, `set`,
-    `frames` where these differ from the defaults; options win. A path is what -s takes: a parameter, an input, a node's
-    type. Commas inside brackets belong to a value. What several runs have in common is drawn once.
+    PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline`, `axes`, and what else `explain sweep` lists; options
+    win. A path is what -s takes: a parameter, an input, a node's type. Commas inside brackets belong to a value; ranges
+    include both ends. What several runs have in common is drawn once.
 
     \b
     Examples:
       rendergraph sweep forward -x shadows.taps=1,2,4 -x light.ambient=0,[0.1,0.1,0.2] --size 320x180 -o out
       rendergraph sweep ssao-hemisphere -x ao.samples=8,16 --metric ao.occlusion --size 96x54 --csv -o ao
+      rendergraph sweep ssao-hemisphere -x ao.samples=8:64:8 -x ao.radius=log:0.1:10:5 --list
+      rendergraph sweep ssao-hemisphere -x ao.samples=8:64 -x ao.radius=log:0.1:10 --samples 4 --size 64x36 -o lhs
       rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr -o lit --size 160x90 --json
       rendergraph sweep forward -x light.shading=phong,pbr,unlit --reference shading-pbr -o lit --size 160x90 --resume
     """
     from rendergraph.compare import sweep
-    from rendergraph.compare.axes import is_sweep, read_sweep
+    from rendergraph.compare.listing import listed
+    from rendergraph.compare.prepare import prepare
     from rendergraph.compare.report import quality_svg, sweep_page
     from rendergraph.compare.study import kept_runs
     from rendergraph.compare.table import csv_text
     from rendergraph.session import Pipeline
 
-    words = ["sweep", pipeline, *(w for a in axes for w in ("-x", f"{a.path}={','.join(a.values)}"))]
+    words = ["sweep", pipeline, *(word for axis in axes for word in ("-x", f"{axis.path}={axis.text}"))]
+    words += [word for group in zipped for word in ("--zip", ",".join(group))]
+    words += ["--samples", str(samples)] if samples else []
+    words += ["--sampling", sampling] if sampling else []
+    words += ["--seed", str(seed)] if seed is not None else []
     words += options.words(select(pipeline)) + ([] if reference is None else ["--reference", reference])
     words += ["--metric", metric] if metric else []
     words += ["--csv"] if as_csv else []
     words += [*(["--title", title] if title else []), *(["--note", note] if note else [])]
     words += ["-n", str(frames)] if frames else []
     words += ["--at", str(frame)] if frame != 1 else []
-    file: SweepFile | None = None
-    if is_sweep(Path(pipeline)):
-        file = read_sweep(Path(pipeline))
-        named = {axis.path for axis in axes}
-        axes = (*(axis for axis in file.axes if axis.path not in named), *axes)
+    file = _file(pipeline)
+    space = _space(file, axes, zipped, samples, sampling, seed)
+    if file is not None:
         reference, frames, metric = reference or file.reference, frames or file.frames, metric or file.metric
         pipeline, select = file.pipeline, _with_file(file, select)
     base = Pipeline(select(pipeline))
     extensions = base.resolve().catalog.extensions
     shared.check_thresholds(thresholds, extensions)
-    again = shared.typed([*words, "-o", str(out)])
     against = shared.load_reference(reference, select)
+    if listing:
+        with _at_its_lines(file):
+            planned = prepare(base, space, out or Path(), against, metric=metric, frame=frame)
+            _show(listed(planned, out, frames=frames or 5, resume=resume), as_json=as_json)
+        return
+    if out is None:
+        raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
+    again = shared.typed([*words, "-o", str(out)])
     try:
-        found = sweep(
-            base,
-            axes,
-            out,
-            against,
-            metric=metric,
-            frames=frames or 5,
-            frame=frame,
-            resume=resume,
-            device=device,
-            progress=on_terminal(),
-        )
-    except InputError as error:
-        raise error if file is None else file.placed(error) from None
+        with _at_its_lines(file):
+            found = sweep(
+                base,
+                space,
+                out,
+                against,
+                metric=metric,
+                frames=frames or 5,
+                frame=frame,
+                resume=resume,
+                device=device,
+                progress=on_terminal(),
+            )
     except KeyboardInterrupt:
         kept = kept_runs(out)
         say(f"{amount(kept, 'run')} kept in {out}" + (f"; go on with: {again} --resume" if kept else ""))
@@ -177,6 +213,43 @@ def command(
         raise click.exceptions.Exit(shared.BEYOND)
 
 
+def _file(name: str) -> SweepFile | None:
+    from rendergraph.compare.sweepfile import is_sweep, read_sweep
+
+    return read_sweep(Path(name)) if is_sweep(Path(name)) else None
+
+
+@contextmanager
+def _at_its_lines(file: SweepFile | None) -> Iterator[None]:
+    """Mistakes in what a file says of paths are told at its lines."""
+    try:
+        yield
+    except InputError as error:
+        raise error if file is None else file.placed(error) from None
+
+
+def _space(
+    file: SweepFile | None,
+    axes: tuple[Axis, ...],
+    zipped: tuple[tuple[str, ...], ...],
+    samples: int | None,
+    sampling: Sampling | None,
+    seed: int | None,
+) -> Space:
+    """The axes of a file and of the options; of two with one path that of the options."""
+    from rendergraph.compare.axes import Space
+
+    said = Space(()) if file is None else file.space
+    named = {axis.path for axis in axes}
+    return Space(
+        (*(axis for axis in said.axes if axis.path not in named), *axes),
+        zipped or said.zipped,
+        samples or said.samples,
+        sampling or said.sampling,
+        said.seed if seed is None else seed,
+    )
+
+
 def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, ...]]:
     """Find every mistake in a sweep's file and in its runs, and say how many those are and what was noticed.
 
@@ -184,16 +257,14 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
         InputError: with all mistakes.
     """
     from rendergraph.compare import check_sweep
-    from rendergraph.compare.axes import read_sweep
+    from rendergraph.compare.sweepfile import read_sweep
     from rendergraph.session import Pipeline
 
     file = read_sweep(path)
     select = _with_file(file, select)
-    try:
+    with _at_its_lines(file):
         against = shared.load_reference(file.reference, select)
-        runs = check_sweep(Pipeline(select(file.pipeline)), file.axes, against, file.metric)
-    except InputError as error:
-        raise file.placed(error) from None
+        runs = check_sweep(Pipeline(select(file.pipeline)), file.space, against, file.metric)
     return len(runs), tuple(dict.fromkeys(problem for run in runs for problem in run.link().warnings))
 
 
@@ -225,3 +296,20 @@ def _text(found: Sweep) -> str:
     if comparison.software:
         lines.append(shared.SOFTWARE)
     return "\n".join(lines)
+
+
+def _show(found: Listing, *, as_json: bool) -> None:
+    if as_json:
+        emit_json(found.as_json())
+        return
+    told, runs = found.as_json(), found.prepared.runs
+    emit(
+        f"{amount(len(runs), 'run')} against {told['reference']}: {amount(found.executed, 'pass', 'passes')} to draw, "
+        f"{told['passes_one_by_one']} one by one" + (f"; {amount(len(found.kept), 'run')} kept" if found.kept else "")
+    )
+    if found.groups:
+        rows = [(name, str(drawn), str(alone)) for name, (drawn, alone) in found.shared().items()]
+        emit(table(rows, ("pass", "drawn", "one by one"), right=(1, 2)))
+    paths, group_of = [axis.path for axis in found.prepared.space.axes], found.group_of()
+    values = [[run.settings[path] for path in paths] for run in runs]
+    emit(table([(group_of.get(number, "kept"), *row) for number, row in enumerate(values)], ("group", *paths)))

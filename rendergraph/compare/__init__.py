@@ -8,20 +8,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rendergraph.compare.axes import Axis
+    from rendergraph.compare.axes import Axis, Space
     from rendergraph.compare.files import compare_pictures
     from rendergraph.compare.pictures import compare
-    from rendergraph.compare.product import Sweep, check_sweep, sweep
+    from rendergraph.compare.prepare import check_sweep
+    from rendergraph.compare.product import Sweep, sweep
     from rendergraph.compare.values import Comparison, Result
 
-__all__ = ["Axis", "Comparison", "Result", "Sweep", "check_sweep", "compare", "compare_pictures", "sweep"]
+__all__ = ["Axis", "Comparison", "Result", "Space", "Sweep", "check_sweep", "compare", "compare_pictures", "sweep"]
 
 _WHERE = {
     "Axis": "axes",
+    "Space": "axes",
     "compare": "pictures",
     "compare_pictures": "files",
     "Sweep": "product",
-    "check_sweep": "product",
+    "check_sweep": "prepare",
     "sweep": "product",
 }
 

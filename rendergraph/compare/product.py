@@ -10,22 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph import metrics
-from rendergraph.compare.axes import Axis, check_axes, combinations, pipelines, run_name, typed
+from rendergraph.compare.axes import Axes, Space, typed
 from rendergraph.compare.batches import MOST_BYTES, Batch, Drawn, batches, draw, measure
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import light_error
-from rendergraph.compare.reference import (
-    compared_output,
-    measured_at,
-    on_one_stage,
-    read_picture,
-    scene_name,
-    unique_names,
-)
-from rendergraph.compare.runs import RUN, Failure, Run, found_again, give_up, keep, key_of, restored, settle
-from rendergraph.compare.sources import file_digest
-from rendergraph.compare.study import begin, claimed, open_folder, study_of
+from rendergraph.compare.prepare import prepare
+from rendergraph.compare.reference import scene_name
+from rendergraph.compare.runs import RUN, Failure, Run, found_again, give_up, keep, restored, settle
+from rendergraph.compare.study import begin, claimed, open_folder
 from rendergraph.compare.timing import NO_TIMES
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result, not_finite_pixels
 from rendergraph.errors import InputError, RenderError
@@ -46,7 +39,7 @@ class Sweep:
 
     Attributes:
         comparison: every run as a variant, in the order of the product.
-        axes: what was swept.
+        space: what was swept.
         executed: passes that were drawn for the runs of this time.
         alone: passes those runs would have drawn one by one.
         resumed: runs that were there already.
@@ -57,7 +50,7 @@ class Sweep:
     """
 
     comparison: Comparison
-    axes: tuple[Axis, ...]
+    space: Space
     executed: int
     alone: int
     resumed: int
@@ -67,7 +60,7 @@ class Sweep:
     failures: tuple[Failure, ...]
 
     def __repr__(self) -> str:
-        return f"<Sweep of {', '.join(axis.path for axis in self.axes)}: {len(self.comparison.results)} runs>"
+        return f"<Sweep of {', '.join(axis.path for axis in self.space.axes)}: {len(self.comparison.results)} runs>"
 
     def _repr_html_(self) -> str:
         return self.comparison._repr_html_()
@@ -78,7 +71,7 @@ class Sweep:
         runs = found.pop("variants")
         front = {result.name for result in pareto(self.comparison.results)}
         return found | {
-            "axes": {axis.path: list(map(typed, axis.values)) for axis in self.axes},
+            "axes": {axis.path: axis.text if axis.span else list(map(typed, axis.values)) for axis in self.space.axes},
             "executed_passes": self.executed,
             "passes_one_by_one": self.alone,
             "resumed": self.resumed,
@@ -133,7 +126,7 @@ class _Work:
 
 def sweep(
     base: Pipeline,
-    axes: Sequence[Axis],
+    axes: Axes,
     out: Path,
     reference: Path | Pipeline | None = None,
     *,
@@ -153,7 +146,8 @@ def sweep(
 
     Args:
         base: what the axes change.
-        axes: paths with values.
+        axes: paths with values or ranges: `{"ao.samples": [8, 16], "ao.radius": "log:0.1:1:5"}`; a `Space` of them for
+            samples, or axes that go together.
         out: the folder; `results.jsonl` in it grows by a line a run that has been measured.
         reference: a picture or a pipeline that runs are measured against; the first run by default.
         metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
@@ -173,93 +167,42 @@ def sweep(
     """
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
-    base, reference = _measured(base, reference, metric)
-    staged, notes, picture, output, encoding = _looked_at(base, axes, reference, metric)
-    settings, planned = combinations(axes), [pipeline.check() for pipeline in staged]
-    variants, other = planned[: len(settings)], planned[-1] if len(staged) > len(settings) else None
-    names = unique_names([run_name(run) for run in settings])
-    against = key_of(other or variants[0], frame, "") if picture is None else file_digest(Path(str(reference)))
-    study = study_of(base, frame, str(reference) if picture else other.linked.graph.name if other else names[0])
-    runs = [
-        Run(name, run, variant, output, frame, key_of(variant, frame, against), out / name)
-        for name, run, variant in zip(names, settings, variants, strict=True)
-    ]
+    planned = prepare(base, axes, out, reference, metric=metric, frame=frame)
+    runs, other, picture = planned.runs, planned.other, planned.picture
     with claimed(out):
-        ledger, lines, torn = open_folder(out, study, resume=resume)
-        work = _Work(runs, encoding, other, ledger, lines, frames)
-        if picture:
-            work.reference = Reference(str(reference), "file", picture[0], encoding, output)
+        ledger, lines, torn = open_folder(out, planned.study, resume=resume)
+        work = _Work(list(runs), planned.encoding, other, ledger, lines, frames, reference=picture)
         _take_kept(work)
         resumed = sum(map(work.is_done, range(len(runs))))
         timed = len(work.results) - resumed
         redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))
         if work.missing or other:
             with opened(session, device) as gpu, shown(progress, "runs") as tell:
-                begin(out, study)
+                begin(out, planned.study)
                 _draw_missing(work, gpu, frame, most_bytes, tell)
     results = tuple(work.results[number] for number in sorted(work.results))
     failures = tuple(work.failures[number] for number in sorted(work.failures))
-    first = variants[0].linked
+    first = runs[0].planned.linked
     comparison = Comparison(
         results=results,
-        reference=work.reference or Reference(names[0], "variant", results[0].pixels, encoding, output),
-        base=(names[0], first.graph),
+        reference=work.reference
+        or Reference(runs[0].name, "variant", results[0].pixels, planned.encoding, runs[0].output),
+        base=(runs[0].name, first.graph),
         scene=scene_name(first),
         camera=first.selection.camera,
         size=first.graph.size,
         frame=frame,
         metric=metric,
         device=work.device,
-        notes=tuple(notes),
+        notes=planned.notes,
         warnings=tuple(
             dict.fromkeys(
-                [problem for variant in variants for problem in variant.linked.warnings]
+                [problem for run in runs for problem in run.planned.linked.warnings]
                 + [problem for result in results for problem in result.warnings]
             )
         ),
     )
-    return Sweep(comparison, tuple(axes), work.executed, work.alone, resumed, timed, redrawn, torn, failures)
-
-
-def check_sweep(
-    base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None = None, metric: str | None = None
-) -> list[Pipeline]:
-    """The pipelines that `sweep` would draw; everything that can be wrong without GL is found.
-
-    Raises:
-        InputError: as from `sweep`.
-    """
-    base, reference = _measured(base, reference, metric)
-    staged, *_ = _looked_at(base, axes, reference, metric)
-    for pipeline in staged:
-        pipeline.check()
-    return staged[: len(combinations(axes))]
-
-
-def _measured(
-    base: Pipeline, reference: Path | Pipeline | None, metric: str | None
-) -> tuple[Pipeline, Path | Pipeline | None]:
-    """Both with the port that is measured."""
-    own = reference if reference is None or isinstance(reference, Path) else measured_at(reference, metric)
-    return measured_at(base, metric), own
-
-
-def _looked_at(
-    base: Pipeline, axes: Sequence[Axis], reference: Path | Pipeline | None, metric: str | None
-) -> tuple[list[Pipeline], list[str], tuple[Pixels, Encoding] | None, str, Encoding]:
-    """Runs on one stage and what was changed for that, a reference picture, and the compared output's name and kind."""
-    check_axes(axes)
-    variants = pipelines(base, combinations(axes))
-    own = [] if reference is None or isinstance(reference, Path) else [reference]
-    staged, notes = on_one_stage([*variants, *own])
-    name = run_name(combinations(axes)[0])
-    picture = read_picture(reference, staged[0].link().graph.size, name) if isinstance(reference, Path) else None
-    return (
-        staged,
-        notes,
-        picture,
-        *compared_output(staged, picture[1] if picture else None, measured=metric is not None),
-    )
+    return Sweep(comparison, planned.space, work.executed, work.alone, resumed, timed, redrawn, torn, failures)
 
 
 def pareto(results: Sequence[Result]) -> list[Result]:

@@ -76,8 +76,21 @@ def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[L
     Raises:
         InputError: there are results already, or those of another study.
     """
+    check_folder(out, study, resume=resume)
     ledger = Ledger(out / RESULTS)
-    if (ledger.path.exists() or (out / STUDY).exists()) and not resume:
+    for part in (*out.glob(".*.part"), *out.glob("*/.*.part")):
+        part.unlink(missing_ok=True)
+    records, torn = ledger.read()
+    return ledger, {record["key"]: record for record in records if "key" in record}, torn
+
+
+def check_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> None:
+    """Whether a sweep may go into a folder.
+
+    Raises:
+        InputError: there are results already, or those of another study.
+    """
+    if ((out / RESULTS).exists() or (out / STUDY).exists()) and not resume:
         raise _refused(out, "it has results of a sweep; --resume adds what is missing, or name another folder")
     before = _study_in(out)
     if before is not None and (differing := [key for key in study if before.get(key) != study[key]]):
@@ -86,10 +99,6 @@ def open_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> tuple[L
             "; ".join(named) or f"other values (-s, -p or the file): {_first_change(before[_VALUES], study[_VALUES])}"
         )
         raise _refused(out, f"it has results of another study: {what}; name another folder: -o {out}-2")
-    for part in (*out.glob(".*.part"), *out.glob("*/.*.part")):
-        part.unlink(missing_ok=True)
-    records, torn = ledger.read()
-    return ledger, {record["key"]: record for record in records if "key" in record}, torn
 
 
 def begin(out: Path, study: Mapping[str, Any]) -> None:

@@ -121,7 +121,10 @@ def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> N
             "-s holds for all pipelines; for one alone: rendergraph compare deferred --reference forward -s …",
         ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
-        (("sweep", "forward", "-x", "shadows.taps=1"), 2, "Missing option".lower()),
+        (("sweep", "forward", "-x", "shadows.taps=1"), 2, "RG500 a sweep needs a folder for its runs: -o DIR"),
+        (("sweep", "forward", "-x", "shadows.taps=1:4:0", "-o", "out"), 2, "steps of 0 do not lead from 1 to 4"),
+        (("sweep", "forward", "-x", "shadows.taps=1:4", "--list"), 3, "1:4:STEP, or take --samples of it"),
+        (("sweep", "forward", "-x", "a.b=1,2", "--zip", "a.b", "--list"), 2, "is not PATH,PATH"),
         (("sweep", "forward", "-x", "shadows.taps=", "-o", "out"), 2, "axis 'shadows.taps' has no values"),
         (("sweep", "forward", "-x", "shadows.tap=1", "-o", "out"), 3, "did you mean 'taps'?"),
     ],
@@ -168,6 +171,22 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
     assert told["axes"] == {"shadows.taps": [1, 3], "display.curve": ["aces", "none"]}
     assert told["size"] == [48, 27]
     assert len((tmp_path / "out" / "results.jsonl").read_text().splitlines()) == 4
+
+
+def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
+    words = ("-x", "shadows.taps=1:3:1", "-x", "display.curve=aces,none", "--size", "48x27", "--list")
+    told = cli("sweep", "forward", *words).out.splitlines()
+    assert told[0] == "6 runs against shadows.taps=1,display.curve=aces: 10 passes to draw, 18 one by one"
+    assert [line.split() for line in told[2:6]] == [
+        ["sun", "1", "6"],
+        ["light", "3", "6"],
+        ["display", "6", "6"],
+        ["group", "shadows.taps", "display.curve"],
+    ]
+    assert [line.split() for line in told[6:8]] == [["1", "1", "aces"], ["1", "1", "none"]]
+    found = cli("sweep", "forward", *words, "--samples", "4", "--seed", "1", "--json").json
+    assert (len(found["runs"]), found["passes"][0]) == (4, {"node": "sun", "drawn": 1, "one_by_one": 4})
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import time
 from pathlib import Path
 from typing import Any
 
@@ -15,19 +14,11 @@ import pytest
 import rendergraph as rg
 from rendergraph.cli.compare import summary
 from rendergraph.compare import product
-from rendergraph.compare.axes import (
-    Axis,
-    check_axes,
-    combinations,
-    is_sweep,
-    parse_axis,
-    pipelines,
-    read_sweep,
-    run_name,
-    typed,
-)
+from rendergraph.compare.axes import Axis, Space, parse_axis, pipelines, typed
 from rendergraph.compare.batches import batches
 from rendergraph.compare.ledger import Ledger, checksum
+from rendergraph.compare.listing import listed
+from rendergraph.compare.prepare import prepare
 from rendergraph.compare.product import pareto, sweep
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.study import RESULTS, kept_runs
@@ -47,8 +38,10 @@ def base() -> rg.Pipeline:
 def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:
+    told = listed(prepare(base, AXES, tmp_path / "out"), tmp_path / "out")
     found = sweep(base, AXES, tmp_path / "out", frames=1, session=gl)
     assert (found.executed, found.alone) == (1 + 2 * 2 + 2 * 2 * 3, 3 * 12)
+    assert (told.executed, told.shared()) == (17, {"sun": (1, 12), "light": (4, 12), "display": (12, 12)})
     assert len(found.comparison.results) == 12
     for result in found.comparison.results:
         alone = base
@@ -173,7 +166,7 @@ def test_runs_are_kept_before_they_are_measured(
 
 @pytest.mark.slow
 def test_what_is_drawn_together_is_few_enough_to_lose(base: rg.Pipeline) -> None:
-    many = pipelines(base, combinations([Axis("display.exposure", tuple(map(str, range(20))))]))
+    many = pipelines(base, Space((Axis("display.exposure", tuple(map(str, range(20)))),)).runs())
     assert [len(batch.numbers) for batch in batches([each.check() for each in many], range(20))] == [16, 4]
 
 
@@ -200,6 +193,23 @@ def bad(folder: Path) -> rg.Pipeline:
     file = folder / "p.yaml"
     file.write_text("rendergraph: 1\nsize: [8, 8]\nnodes: {a: {type: fx}}\noutputs: {radiance: a.color}\n")
     return rg.load(file, plugins=[folder / "fx.frag"])
+
+
+def test_what_would_be_drawn_is_listed_and_nothing_is(gl: rg.Session, tmp_path: Path) -> None:
+    out, base = tmp_path / "out", bad(tmp_path)
+
+    def told(values: str, **options: Any) -> tuple[list[Any], int, set[str]]:
+        found = listed(prepare(base, [f"a.mode={values}"], out), out, frames=1, **options).as_json()
+        return [run["group"] for run in found["runs"]], found["kept"], {run["name"] for run in found["runs"]}
+
+    assert told("1,2") == ([1, 1], 0, {"a.mode=1", "a.mode=2"})
+    assert not out.exists()
+    sweep(base, ["a.mode=1,2"], out, frames=1, session=gl)
+    before = {file: file.stat().st_mtime_ns for file in out.rglob("*")}
+    assert told("1,2,4", resume=True)[:2] == ([None, None, 1], 2)
+    with pytest.raises(InputError, match="it has results of a sweep; --resume adds"):
+        told("1,2")
+    assert {file: file.stat().st_mtime_ns for file in out.rglob("*")} == before
 
 
 def lines(folder: Path) -> list[dict[str, Any]]:
@@ -372,130 +382,6 @@ def test_a_pipeline_or_a_picture_is_the_reference(base: rg.Pipeline, gl: rg.Sess
     for number, reference in enumerate(references):
         found = sweep(base, AXES[:1], tmp_path / str(number), reference, frames=1, session=gl)
         assert [result.metrics.flip == 0 for result in found.comparison.results] == [False, True]
-
-
-def test_types_are_an_axis(base: rg.Pipeline) -> None:
-    axes = [parse_axis("display.type=tonemap"), parse_axis("display.exposure=0,1")]
-    assert len(pipelines(base, combinations(axes))) == 2
-
-
-@pytest.mark.parametrize(
-    ("text", "axis"),
-    [
-        ("ao.samples=8,16, 32", Axis("ao.samples", ("8", "16", "32"))),
-        ("light.ambient=[0, 0, 0],0.1", Axis("light.ambient", ("[0, 0, 0]", "0.1"))),
-        ("a.b='x,y',\"z]\"", Axis("a.b", ("'x,y'", '"z]"'))),
-        ("samples=4", Axis("samples", ("4",))),
-        ("light.lookup=null,shadows.lookup", Axis("light.lookup", ("null", "shadows.lookup"))),
-    ],
-)
-def test_axes_are_read(text: str, axis: Axis) -> None:
-    assert parse_axis(text) == axis
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("ao.samples", "is not PATH=VALUE,VALUE"),
-        ("=3", "is not PATH=VALUE,VALUE"),
-        ("ao.samples=", "axis 'ao.samples' has no values"),
-        ("ao.samples=1,,2", "has an empty value in '1,,2'"),
-        ("ao.samples=1,2,1", "has the value 1 twice"),
-    ],
-)
-def test_malformed_axes_are_told(text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        parse_axis(text)
-
-
-def test_many_values_are_read_in_no_time() -> None:
-    start = time.monotonic()
-    assert len(parse_axis("a.b=" + ",".join(map(str, range(100_000)))).values) == 100_000
-    with pytest.raises(ValueError, match="has the value 7 twice"):
-        parse_axis("a.b=" + ",".join(map(str, [*range(100_000), 7])))
-    assert time.monotonic() - start < 20  # comparing each with each takes minutes
-
-
-def test_axes_as_a_whole_are_checked() -> None:
-    with pytest.raises(InputError, match="RG524 the sweep has no axis"):
-        check_axes([])
-    with pytest.raises(InputError, match=r"two axes are called 'a.b'"):
-        check_axes([Axis("a.b", ("1",)), Axis("a.b", ("2",))])
-    with pytest.raises(InputError, match="make 12000 runs, more than 10000"):
-        check_axes([Axis("a", tuple(map(str, range(120)))), Axis("b", tuple(map(str, range(100))))])
-
-
-def test_an_axis_that_names_nothing_is_told_once_with_the_right_name(base: rg.Pipeline) -> None:
-    axes = [parse_axis("shadows.tap=1,2,3"), parse_axis("dispaly.curve=aces"), parse_axis("light.shading=pbr,phnog")]
-    with pytest.raises(InputError) as caught:
-        pipelines(base, combinations(axes))
-    assert [str(problem) for problem in caught.value.problems] == [
-        "-x dispaly.curve=aces: RG109 there is no node 'dispaly'; did you mean 'display'?",
-        "-x shadows.tap=1: RG103 node 'shadows' (shadow_pcf) has no param or input 'tap'; did you mean 'taps'?",
-        "-x light.shading=phnog: RG104 'light.shading' takes one of unlit, phong, blinn_phong, anisotropic, pbr, "
-        "this is 'phnog'; did you mean 'phong'?",
-    ]
-
-
-def test_folders_have_names_that_every_system_takes() -> None:
-    assert run_name({"ao.samples": "8", "shadows.type": "shadow_vsm"}) == "ao.samples=8,shadows.type=shadow_vsm"
-    assert run_name({"a.b": "../../x y"}) == "a.b=.._.._x_y"
-    assert run_name({"": "//"}) == "="
-
-
-def test_a_sweep_is_a_file_too(tmp_path: Path) -> None:
-    path = tmp_path / "study.yaml"
-    path.write_text(
-        "sweep: 1\npipeline: forward\nscene: spheres\nsize: [48, 27]\nframes: 2\nreference: ./truth.png\n"
-        "set: {light.ambient: 0.1}\naxes:\n  shadows.taps: [1, 3]\n  light.shading: [pbr, phong]\n"
-    )
-    found = read_sweep(path)
-    assert is_sweep(path)
-    assert (found.pipeline, found.scene, found.size, found.frames) == ("forward", "spheres", (48, 27), 2)
-    assert found.reference == str(tmp_path / "truth.png")
-    assert found.sets == ("light.ambient=0.1",)
-    assert found.axes == (Axis("shadows.taps", ("1", "3")), Axis("light.shading", ("pbr", "phong")))
-
-
-def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
-    path = tmp_path / "study.yaml"
-    path.write_text(
-        "sweep: 2\naxis: {a.b: [1]}\nsize: [48]\naxes: {a.b: [], c.d: 3, e.f: [1, 1]}\nframes: 1000000000000\n"
-    )
-    with pytest.raises(InputError) as caught:
-        read_sweep(path)
-    told = [f"{p.place.line if p.place else 0} {p.text}" for p in caught.value.problems]
-    assert told == [
-        "1 'sweep' takes 1, the version of the format that this program reads, as in sweep: 1, this is 2",
-        "2 a sweep has no key 'axis'; did you mean 'axes'?",
-        "3 'size' takes width and height in pixels, 1 to 16384, as in size: [1280, 720], this is [48]",
-        "4 'a.b' takes a list of values, as in axes: {NODE.PARAM: [VALUE, VALUE]}, this is []",
-        "4 'c.d' takes a list of values, as in axes: {NODE.PARAM: [VALUE, VALUE]}, this is 3",
-        "5 'frames' takes a whole number from 1 to 10000, this is 1000000000000",
-        "1 a sweep needs 'pipeline'; add pipeline: NAME",
-        "4 axis 'e.f' has the value 1 twice",
-    ]
-
-
-def test_the_page_of_the_error_tells_the_truth(tmp_path: Path) -> None:
-    import yaml
-
-    from rendergraph.resources import folder
-
-    page = yaml.safe_load((folder("rendergraph.errors") / "RG030-sweep-file.yaml").read_text())
-    (tmp_path / "wrong.yaml").write_text(page["wrong"])
-    (tmp_path / "right.yaml").write_text(page["right"])
-    with pytest.raises(InputError) as caught:
-        read_sweep(tmp_path / "wrong.yaml")
-    (problem,) = caught.value.problems
-    assert str(problem).splitlines()[0].removeprefix(f"{tmp_path / 'wrong.yaml'}:") == page["message"]
-    assert read_sweep(tmp_path / "right.yaml").axes == (Axis("shadows.taps", ("1", "2")),)
-
-
-def test_what_is_no_sweep_is_none(tmp_path: Path) -> None:
-    (tmp_path / "p.yaml").write_text("rendergraph: 1\n")
-    (tmp_path / "bad.yaml").write_text("{")
-    assert not any(is_sweep(tmp_path / name) for name in ("p.yaml", "bad.yaml", "missing.yaml"))
 
 
 def fake(ms: float, flip: float, not_finite: int = 0) -> Any:

@@ -78,7 +78,7 @@ def sweep_page(found: Sweep, command: str, *, title: str = "", note: str = "") -
     comparison = found.comparison
     front = pareto(comparison.results)
     best = front[:MOST_COLUMNS]
-    axes = card((axis.path, ", ".join(axis.values)) for axis in found.axes)
+    axes = card((axis.path, axis.text.replace(",", ", ")) for axis in found.space.axes)
     failed = card((f"{failure.name} failed", failure.text) for failure in found.failures)
     saved = (
         f"<p>{found.executed} passes were drawn for {len(comparison.results) - found.resumed} runs that one by one "
