@@ -25,7 +25,8 @@ from rendergraph.gl.saved_state import settle
 from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.ports import Count
-from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3
+from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.model import Scene
 from rendergraph.steps import Step, ViewMatrices
 from rendergraph.steps.checks import argument, own_port
 from rendergraph.steps.checks import buffer as buffer_of
@@ -60,47 +61,6 @@ class FrameTimes:
     frame_ms: float
     steps: tuple[StepTime, ...]
     ran: int = 0
-
-
-@dataclass(eq=False)
-class FrameScene:
-    """The scene as `update` sees it, the same for as long as no object moves; see `steps.FrameScene`.
-
-    Attributes:
-        scene: of this frame.
-        placed: of the frame in which the objects came to where they are; it knows their bounds.
-    """
-
-    scene: Scene
-    placed: Scene = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.placed = self.scene
-
-    @property
-    def lights(self) -> tuple[Light, ...]:
-        """The scene's lights, in its order."""
-        return self.scene.lights
-
-    @property
-    def objects(self) -> tuple[Object, ...]:
-        """Placed objects."""
-        return self.scene.objects
-
-    @property
-    def materials(self) -> tuple[Material, ...]:
-        """What `Object.material` counts through."""
-        return self.scene.materials
-
-    @property
-    def meshes(self) -> tuple[Mesh, ...]:
-        """What `Object.mesh` counts through."""
-        return self.scene.meshes
-
-    @property
-    def bounds(self) -> tuple[Vec3, Vec3]:
-        """Least and greatest corner of what is drawn, found once."""
-        return self.placed.bounds
 
 
 @dataclass(eq=False)
@@ -264,7 +224,7 @@ class Runner:
         views.set(CAMERA, (camera,))
         moved = False
         if self._scene is None or self._scene.placed.objects is not scene.objects:
-            self._scene, moved = FrameScene(scene), True
+            self._scene, moved = FrameScene(scene, self._scene), True
         self._scene.scene = scene
         updates: dict[str, float] = {}
         for node in self._updating:

@@ -41,7 +41,7 @@ def light_views(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -
 
     Args:
         light: a light of the scene.
-        scene: its `lights`, `bounds`, `objects` and `meshes` in this frame.
+        scene: its `lights`, `bounds`, `corners`, `shown` and `casting` in this frame.
         camera: what the picture is seen with.
         resolution: texels along a side.
     """
@@ -69,8 +69,8 @@ def directional_view(
     for points in (viewing.visible_part(camera, box), casting, corners):
         if not len(points):
             continue
-        across = points @ rotation[:2, :3].T
-        lower, higher = np.maximum(low, across.min(axis=0)), np.minimum(high, across.max(axis=0))
+        across = rotation[:2, :3] @ points.T
+        lower, higher = np.maximum(low, across.min(axis=1)), np.minimum(high, across.max(axis=1))
         if np.any(lower > higher):  # nothing that casts is near what is seen
             break
         low, high = lower, higher
@@ -158,7 +158,8 @@ def _grain(direction: Sequence[float] | Matrix, camera: ViewMatrices) -> Matrix:
 
 # --- what casts -------------------------------------------------------------------------------------------------------
 
-_corners_of: WeakKeyDictionary[Any, tuple[Points, npt.NDArray[np.bool_], npt.NDArray[np.int64]]] = WeakKeyDictionary()
+_found_in: WeakKeyDictionary[Any, tuple[npt.NDArray[np.int64], dict[Any, Points]]] = WeakKeyDictionary()
+_MOST_LIGHTS = 8  # whose casters are remembered
 _MOST_FLAT = 16  # flat objects that are looked at: floors and walls are few, and large
 
 
@@ -169,15 +170,26 @@ def casting_points(scene: Any, direction: Sequence[float], place: Sequence[float
     map need not cover all of it.
 
     Args:
-        scene: its `objects` and `meshes` in this frame.
+        scene: its `corners`, `shown` and `casting` in this frame.
         direction: that light comes along,
         place: or from where.
     """
-    if scene not in _corners_of:
-        _corners_of[scene] = _object_corners(scene)
-    corners, casts, flat = _corners_of[scene]
-    casts = casts.copy()
-    everything = corners.reshape(-1, 3)
+    if scene not in _found_in:
+        _found_in[scene] = _large_flat(scene), {}
+    flat, found = _found_in[scene]
+    key = tuple(direction), None if place is None else tuple(place)
+    if key not in found:
+        if len(found) > _MOST_LIGHTS:
+            found.clear()
+        found[key] = _casting(scene, flat, direction, place)
+    return found[key]
+
+
+def _casting(
+    scene: Any, flat: npt.NDArray[np.int64], direction: Sequence[float], place: Sequence[float] | None
+) -> Points:
+    corners, casts = scene.corners, scene.casting.copy()
+    everything = (corners if scene.shown.all() else corners[scene.shown]).reshape(-1, 3)
     for index in flat:
         a, b, c = corners[index][_spanning(corners[index])]
         normal = np.cross(b - a, c - a)
@@ -185,23 +197,16 @@ def casting_points(scene: Any, direction: Sequence[float], place: Sequence[float
         normal /= np.linalg.norm(normal) * (-1.0 if normal @ along < 0 else 1.0)
         beyond = (everything - a) @ normal
         casts[index] = beyond.max() > 1e-6 * np.abs(everything).max()
-    return corners[casts].reshape(-1, 3)
+    return np.asarray(corners[casts]).reshape(-1, 3)
 
 
-def _object_corners(scene: Any) -> tuple[Points, npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
-    """World-space corners of each object's box, shape (n, 8, 3), which cast, and the largest flat ones' indices."""
-    placed = [entry for entry in scene.objects if not entry.hidden]
-    casts = np.array([entry.casts_shadow for entry in placed], bool)
-    if not placed:
-        return np.empty((0, 8, 3)), casts, np.empty(0, np.int64)
-    boxes = np.array([viewing.box_corners(mesh.box) for mesh in scene.meshes])
-    local = boxes[[entry.mesh for entry in placed]]
-    transforms = np.array([entry.transform for entry in placed])
-    corners = np.einsum("nij,nkj->nki", transforms[:, :3, :3], local) + transforms[:, None, :3, 3]
-    extent = np.sort(np.ptp(local, axis=1), axis=1)
-    flat = np.nonzero(casts & (extent[:, 0] < 1e-5 * extent[:, 2]) & (extent[:, 1] > 1e-5 * extent[:, 2]))[0]
+def _large_flat(scene: Any) -> npt.NDArray[np.int64]:
+    """The largest flat objects that cast, largest first."""
+    corners = scene.corners
+    sides = np.sort(np.linalg.norm(corners[:, [1, 2, 4]] - corners[:, [0]], axis=2), axis=1)
+    flat = np.nonzero(scene.casting & (sides[:, 0] < 1e-5 * sides[:, 2]) & (sides[:, 1] > 1e-5 * sides[:, 2]))[0]
     size = np.linalg.norm(np.ptp(corners[flat], axis=1), axis=1)
-    return corners, casts, flat[np.argsort(-size, kind="stable")][:_MOST_FLAT]
+    return flat[np.argsort(-size, kind="stable")][:_MOST_FLAT]
 
 
 def _spanning(corners: Points) -> list[int]:

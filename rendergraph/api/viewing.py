@@ -321,18 +321,19 @@ def clip_polygon(polygon: Points, planes: Points) -> Points:
 
     It may be empty; a corner in a plane may stand in it twice.
     """
-    for plane in planes:
-        if not len(polygon):
-            break
-        distance = polygon @ plane[:3] + plane[3]
-        kept: list[Matrix] = []
-        for a, b, da, db in zip(polygon, np.roll(polygon, -1, axis=0), distance, np.roll(distance, -1), strict=True):
+    corners = np.asarray(polygon, np.float64).reshape(-1, 3).tolist()
+    for x, y, z, w in np.asarray(planes, np.float64).tolist():  # of so few numbers Python is faster than NumPy
+        kept: list[list[float]] = []
+        distances = [x * corner[0] + y * corner[1] + z * corner[2] + w for corner in corners]
+        for number, (a, da) in enumerate(zip(corners, distances, strict=True)):
+            b, db = corners[number + 1 - len(corners)], distances[number + 1 - len(corners)]
             if da >= 0:
                 kept.append(a)
             if (da >= 0) != (db >= 0):
-                kept.append(a + (b - a) * (da / (da - db)))
-        polygon = np.array(kept).reshape(-1, 3)
-    return polygon
+                along = da / (da - db)
+                kept.append([p + (q - p) * along for p, q in zip(a, b, strict=True)])
+        corners = kept
+    return np.array(corners, np.float64).reshape(-1, 3)
 
 
 def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
@@ -351,30 +352,31 @@ def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
 
 def _frustum_edges_inside(planes: Points, box: Points) -> list[Points]:
     """Where the frustum's edges lie inside the box: their ends, cut to it."""
-    points: list[Points] = []
     axes = np.eye(3)
-    sides = [np.append(axis, -axis @ box[0]) for axis in axes] + [np.append(-axis, axis @ box[1]) for axis in axes]
+    sides = np.concatenate([np.column_stack([axes, -box[0]]), np.column_stack([-axes, box[1]])])
     middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9
-    for i in range(len(planes)):
-        for j in range(i):
-            along = np.cross(planes[i, :3], planes[j, :3])
-            length = np.linalg.norm(along)
-            if length < 1e-9:
-                continue
-            along /= length
-            system = np.stack([planes[i, :3], planes[j, :3], along])
-            origin = np.linalg.solve(system, [-planes[i, 3], -planes[j, 3], along @ middle])
-            low, high = -span, span
-            others = [plane for k, plane in enumerate(planes) if k not in (i, j)]
-            for plane in (*others, *sides):
-                rate, start = float(plane[:3] @ along), float(plane[:3] @ origin + plane[3])
-                if abs(rate) < 1e-12:
-                    if start < -1e-9:
-                        low, high = 1.0, 0.0
-                elif rate > 0:
-                    low = max(low, -start / rate)
-                else:
-                    high = min(high, -start / rate)
-            if low <= high:
-                points.append(np.stack([origin + along * low, origin + along * high]))
-    return points
+    first, second = np.triu_indices(len(planes), 1)
+    along = np.cross(planes[first, :3], planes[second, :3])
+    length = np.linalg.norm(along, axis=1)
+    first, second, along = (each[length >= 1e-9] for each in (first, second, along))
+    along /= length[length >= 1e-9, None]
+    systems = np.stack([planes[first, :3], planes[second, :3], along], axis=1)
+    origins = np.linalg.solve(
+        systems, np.column_stack([-planes[first, 3], -planes[second, 3], along @ middle])[..., None]
+    )
+    origins = origins[..., 0]
+    cutting = np.concatenate([planes, sides])
+    rates, starts = along @ cutting[:, :3].T, origins @ cutting[:, :3].T + cutting[:, 3]
+    own = np.arange(len(cutting)) == np.stack([first, second])[..., None]
+    beside = own.any(axis=0)
+    flat = (np.abs(rates) < 1e-12) | beside
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = -starts / rates
+    low = np.where((rates > 0) & ~flat, ends, -span).max(axis=1, initial=-span)
+    high = np.where((rates < 0) & ~flat, ends, span).min(axis=1, initial=span)
+    missed = (flat & ~beside & (starts < -1e-9)).any(axis=1)
+    inside = (low <= high) & ~missed
+    return [
+        np.stack([origin + way * begin, origin + way * end])
+        for origin, way, begin, end in zip(origins[inside], along[inside], low[inside], high[inside], strict=True)
+    ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import moderngl
@@ -64,6 +65,7 @@ _INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "
 PREVIOUS_ATTRIBUTES = ("in_previous0", "in_previous1", "in_previous2")
 """The same rows in the frame before."""
 _PREVIOUS_FORMAT = (*((name, "4f") for name in PREVIOUS_ATTRIBUTES), ("", "2i"))
+_MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what lies between them goes along beyond
 _PADDING = {"4f": "16x", "2i": "8x"}
 
 
@@ -105,7 +107,7 @@ class GpuScene:
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = field(default_factory=dict)
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
-    _instances_before: Records | None = None
+    _behind: set[int] = field(default_factory=set)  # objects that have moved since the frame before was kept
 
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed
@@ -161,18 +163,20 @@ class GpuScene:
                 self._blocks[block][0].write(now.tobytes())
                 self.changes[block] += 1
         if packed.instances is not self.packed.instances:
-            placed = packed.instances.tobytes()
-            if placed != self.packed.instances.tobytes():
-                self._instances.write(placed)
+            moved = np.array(pack.changed_objects(self.scene, scene), np.int64)
+            moved = moved[packed.instances[moved] != self.packed.instances[moved]]
+            if len(moved):
+                write_records(self._instances, packed.instances, moved)
+                self._behind.update(moved.tolist())
                 self.changes["instances"] += 1
         self.scene, self.packed = scene, packed
 
     def advance(self) -> None:
         """From now on where the objects are is where they were in the frame before; asked of what looks back."""
-        if self._before is not None and self._instances_before is not self.packed.instances:
-            self._instances_before = self.packed.instances
-            self._before.write(self.packed.instances.tobytes())
+        if self._before is not None and self._behind:
+            write_records(self._before, self.packed.instances, np.array(sorted(self._behind), np.int64))
             self.changes["instances before"] += 1
+        self._behind.clear()
 
     def indices(self, topology: str) -> MeshIndices:
         """The indices of `triangles`, or of `triangles_adjacency`, which are found when somebody first draws them."""
@@ -200,7 +204,7 @@ class GpuScene:
     def _previous(self) -> moderngl.Buffer:
         """Where objects were in the frame before, kept as soon as a program looks at it."""
         if self._before is None:
-            self._instances_before = self.packed.instances
+            self._behind.clear()
             self._before = self.device.ctx.buffer(self.packed.instances.tobytes() or bytes(64))
         return self._before
 
@@ -272,3 +276,15 @@ class GpuScene:
             textures.delete(self.device, image)
         for sampler in self._samplers.values():
             self.device.raw.delete("glDeleteSamplers", sampler)
+
+
+def write_records(buffer: moderngl.Buffer, records: Records, numbers: npt.NDArray[np.int64]) -> None:
+    """Upload some of a table's records, by ascending number: neighbours at once, and all between them if many."""
+    ends = np.flatnonzero(np.diff(numbers, prepend=-2, append=-2) != 1)
+    if len(ends) > _MOST_RUNS:
+        first = int(numbers[0])
+        buffer.write(records[first : int(numbers[-1]) + 1].tobytes(), offset=first * records.itemsize)
+        return
+    for begin, end in pairwise(ends.tolist()):
+        first = int(numbers[begin])
+        buffer.write(records[first : first + end - begin].tobytes(), offset=first * records.itemsize)

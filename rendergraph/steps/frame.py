@@ -54,6 +54,21 @@ class FrameScene(Protocol):
         ...
 
     @property
+    def corners(self) -> npt.NDArray[np.float64]:
+        """World-space corners of the box of each object, (n, 8, 3); do not write into it."""
+        ...
+
+    @property
+    def casting(self) -> npt.NDArray[np.bool_]:
+        """Which objects are drawn and cast a shadow, (n,)."""
+        ...
+
+    @property
+    def shown(self) -> npt.NDArray[np.bool_]:
+        """Which objects are not hidden, (n,)."""
+        ...
+
+    @property
     def objects(self) -> Sequence[Any]:
         """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`."""
         ...

@@ -16,18 +16,10 @@ from rendergraph.nodes.shadows._light_views import light_views
 import rendergraph as rg
 from rendergraph.resources import folder
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.scene.model import Scene
+from rendergraph.scene.frame_scene import FrameScene
 
 Floats = npt.NDArray[np.float64]
 SHADERS = folder("rendergraph.shaders") / "shadows"
-
-
-class Stage:
-    """A scene as a node's `update` sees it."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.bounds = scene.bounds
-        self.lights, self.objects, self.meshes = scene.lights, scene.objects, scene.meshes
 
 
 @dataclass(frozen=True)
@@ -76,7 +68,7 @@ def look(session: rg.Session) -> Callable[..., Looked]:
         camera = view_matrices(next(iter(stage.cameras.values())), size)
         table = [end for end in loaded.link().graph.textures if str(end) == "sun.shadow_map"]
         light = stage.lights[loaded.link().graph.textures[table[0]].lights[0]]
-        view = light_views(light, Stage(stage), camera, resolution)[0]
+        view = light_views(light, FrameScene(stage), camera, resolution)[0]
         y, x = np.mgrid[0 : size[1], 0 : size[0]]
         clip = np.stack([(x + 0.5) / size[0], (y + 0.5) / size[1], seen, np.ones_like(seen)], -1)
         clip[..., :3] = clip[..., :3] * 2 - 1

@@ -14,7 +14,8 @@ from rendergraph.nodes.shadows.shadow_map import ShadowMapNode
 from rendergraph.api import SceneError
 from rendergraph.api.viewing import box_corners, look_at, visible_part
 from rendergraph.scene.cameras import projection
-from rendergraph.scene.model import Camera, Light, Mesh, Object
+from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.model import Camera, Light, Mesh, Object, Scene
 from rendergraph.steps import ViewMatrices
 
 
@@ -47,6 +48,10 @@ class Stage:
     objects: tuple[Object, ...] = ()
     meshes: tuple[Mesh, ...] = field(default_factory=lambda: (quad(), cube()))
     bounds: Any = ((-20.0, -1.0, -20.0), (20.0, 3.0, 20.0))
+
+    def __post_init__(self) -> None:
+        scene = FrameScene(Scene("stage", objects=self.objects, meshes=self.meshes))
+        self.corners, self.shown, self.casting = scene.corners, scene.shown, scene.casting
 
 
 def placed(mesh: int, scale: float, at: Any = (0, 0, 0), **more: Any) -> Object:
