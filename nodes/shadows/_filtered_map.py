@@ -4,24 +4,36 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from rendergraph.api import Function, Internal, Part, Port, ShadowLookup, Steps, param
+from rendergraph.api import Facts, Function, Internal, Node, Part, Port, ShadowLookup, State, Steps, param
 
 from ._map_technique import MapTechnique, map_layers
+
+BANDS = 4
+"""What a map is filtered in, one after the other."""
+
+
+def band_size(node: Node, facts: Facts) -> tuple[int, int]:
+    """Width and height of a band of a connected shadow map."""
+    desc = facts.input("shadow_map").desc if facts.connected("shadow_map") else None
+    return (desc.width, -(-desc.height // BANDS)) if desc is not None else (1, 1)
 
 
 class FilteredMap(MapTechnique):
     """Base of the techniques that make something of depth that can be averaged.
 
     Each layer is averaged over a square of `2 radius + 1` texels a side, one axis after the other, so that 15×15 texels
-    cost 30 taps. `across` names the fragment shader of the first axis, which reads depth and writes `filtered`, what
-    the technique keeps of it, and `covered`, the share of texels where anything is; `up` the second's, a mean. Nothing
+    cost 30 taps. `down` names the fragment shader of the first axis, which reads depth and writes `filtered`, what the
+    technique keeps of it, and `covered`, the share of texels where anything is; `across` the second's, a mean. Nothing
     is kept of an empty texel: what lies there is the receiver itself, at a depth only the lookup knows, or further away
     and of no matter. What takes several layers of `filtered` makes `at_once` of them from one look at the depth, in
     `filtered`, `filtered_1` and so on.
+
+    Columns come first, for then a band of rows needs nothing of its neighbours: what lies between the two axes is held
+    for a quarter of the map at a time.
     """
 
-    across: ClassVar[str]
-    up: ClassVar[str] = "filtered_map_up.frag"
+    down: ClassVar[str]
+    across: ClassVar[str] = "filtered_map_across.frag"
     texel: ClassVar[str] = "rg32f"
     at_once: ClassVar[int] = 1
 
@@ -39,13 +51,13 @@ class FilteredMap(MapTechnique):
         view="shadow_map",
         lights="shadow_map",
     )
-    rows = Internal(
+    columns = Internal(
         kind="texture2d_array",
         format=lambda node, facts: node.texel,
-        size="shadow_map",
+        size=band_size,
         layers=lambda node, facts: min(node.at_once, node.parts()),
     )
-    covered_rows = Internal(format="r16", size="shadow_map")
+    covered_columns = Internal(format="r16", size=band_size)
 
     radius: int = param(
         default=2,
@@ -60,29 +72,35 @@ class FilteredMap(MapTechnique):
         return 1
 
     def record(self, steps: Steps) -> None:
-        """Rows, then columns, a few parts of a layer after the other; they share the textures between."""
-        for layer in range(steps.desc(self.covered).layers):
-            shadow_map = self.shadow_map.layer(layer).sampled()
+        """Columns, then rows, of a band and a few parts of a layer after the other; they share what is between."""
+        covered, band = steps.desc(self.covered), steps.desc(self.covered_columns)
+        for layer in range(covered.layers):
             for first in range(0, self.parts(), self.at_once):
-                count = min(self.at_once, self.parts() - first)
-                across: dict[str, Port | Part] = {
-                    f"filtered_{i}" if i else "filtered": self.rows.layer(i) for i in range(count)
-                }
-                if first == 0:
-                    across["covered"] = self.covered_rows
-                steps.fullscreen(
-                    self.across,
-                    out=across,
-                    shadow_map=shadow_map,
-                    defines={"LAYER": layer, "FIRST_PART": first, "PARTS": count},
-                )
-                for i in range(count):
-                    rows: dict[str, Any] = {"rows": self.rows.layer(i).sampled()}
-                    up: dict[str, Port | Part] = {"filtered": self.filtered.layer(layer * self.parts() + first + i)}
-                    if first + i == 0:
-                        rows["covered_rows"], up["covered"] = self.covered_rows, self.covered.layer(layer)
-                    steps.fullscreen(self.up, out=up, **rows)
+                for row in range(0, covered.height, band.height):
+                    self._band(steps, layer, range(first, min(first + self.at_once, self.parts())), row)
         super().record(steps)
+
+    def _band(self, steps: Steps, layer: int, parts: range, first_row: int) -> None:
+        band = steps.desc(self.covered_columns)
+        down: dict[str, Port | Part] = {
+            f"filtered_{i}" if i else "filtered": self.columns.layer(i) for i in range(len(parts))
+        }
+        if parts[0] == 0:
+            down["covered"] = self.covered_columns
+        steps.fullscreen(
+            self.down,
+            out=down,
+            shadow_map=self.shadow_map.layer(layer).sampled(),
+            first_row=first_row,
+            defines={"LAYER": layer, "FIRST_PART": parts[0], "PARTS": len(parts)},
+        )
+        for i, part in enumerate(parts):
+            columns: dict[str, Any] = {"columns": self.columns.layer(i).sampled()}
+            across: dict[str, Port | Part] = {"filtered": self.filtered.layer(layer * self.parts() + part)}
+            if part == 0:
+                columns["covered_columns"], across["covered"] = self.covered_columns, self.covered.layer(layer)
+            state = State(scissor=(0, first_row, band.width, band.height))
+            steps.fullscreen(self.across, out=across, state=state, first_row=first_row, **columns)
 
 
 def filtered_lookup(shader: str) -> Function:

@@ -18,7 +18,7 @@ class ShadowConvolution(FilteredMap):
     of four channels.
     """
 
-    across: ClassVar[str] = "shadow_convolution_across.frag"
+    down: ClassVar[str] = "shadow_convolution_down.frag"
     texel: ClassVar[str] = "rgba16_snorm"
     at_once: ClassVar[int] = 4
 

@@ -19,8 +19,8 @@ class ShadowESM(FilteredMap):
     receiver the shadow's edge is eaten away, the more the larger the exponent.
     """
 
+    down: ClassVar[str] = "shadow_esm_down.frag"
     across: ClassVar[str] = "shadow_esm_across.frag"
-    up: ClassVar[str] = "shadow_esm_up.frag"
     texel: ClassVar[str] = "r32f"
 
     lookup = filtered_lookup("shadow_esm.glsl")

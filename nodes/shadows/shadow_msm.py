@@ -17,7 +17,7 @@ class ShadowMSM(FilteredMap):
     are never darker than right, and never shadow themselves.
     """
 
-    across: ClassVar[str] = "shadow_msm_across.frag"
+    down: ClassVar[str] = "shadow_msm_down.frag"
     texel: ClassVar[str] = "rgba32f"
 
     lookup = filtered_lookup("shadow_msm.glsl")

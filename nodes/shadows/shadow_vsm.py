@@ -19,7 +19,7 @@ class ShadowVSM(FilteredMap):
     `light_bleeding` cuts that off, and darkens all penumbrae a little.
     """
 
-    across: ClassVar[str] = "shadow_vsm_across.frag"
+    down: ClassVar[str] = "shadow_vsm_down.frag"
 
     lookup = filtered_lookup("shadow_vsm.glsl")
 

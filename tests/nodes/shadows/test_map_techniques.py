@@ -193,13 +193,14 @@ def test_the_type_is_the_whole_change(session: rg.Session, name: str) -> None:
 
 
 def test_layers_share_what_they_are_filtered_through(tmp_path: Path) -> None:
-    """One texture of rows for nine layers: a step a layer writes it, the next reads it."""
+    """One band of columns for nine layers, a quarter of a map: a step writes it, the next reads it."""
     sets = ("shadows.type=shadow_vsm", "sun.light=[sun, lamp, bulb, far]", "sun.resolution=256")
     loaded = rg.load("forward", scene=stage(tmp_path, *LIGHTS), size=(160, 120), sets=sets)
     resources = loaded.expand().expansion.resources
-    layers = {name: each.desc.layers for name, each in resources.items() if isinstance(each.desc, TextureDesc)}
-    assert layers["shadows.filtered"] == 9
-    assert layers["shadows.rows"] == 1
+    descs = {name: each.desc for name, each in resources.items() if isinstance(each.desc, TextureDesc)}
+    assert descs["shadows.filtered"].layers == 9
+    assert descs["shadows.columns"].layers == 1
+    assert (descs["shadows.columns"].width, descs["shadows.columns"].height) == (256, 64)
     assert resources["shadows.covered"].lights == (0, 1, 2, 2, 2, 2, 2, 2, 3)
 
 

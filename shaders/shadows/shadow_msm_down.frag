@@ -1,20 +1,21 @@
-// Moments of the depth z in one layer of a shadow map, averaged along rows: z to z^4, and the share of texels where
+// Moments of the depth z in one layer of a shadow map, averaged along columns: z to z^4, and the share of texels where
 // something is.
 #include "range_fraction.glsl"
 
 uniform sampler2D shadow_map;
-uniform int radius;  // texels
+uniform int first_row;  // of the band that is drawn, in the map
+uniform int radius;     // texels
 out vec4 filtered;
 out float covered;
 
 void main() {
-    ivec2 texel = ivec2(gl_FragCoord.xy);
-    int last = textureSize(shadow_map, 0).x - 1;
+    ivec2 texel = ivec2(gl_FragCoord.xy) + ivec2(0, first_row);
+    int last = textureSize(shadow_map, 0).y - 1;
     vec4 sum = vec4(0.0);
     covered = 0.0;
     View view = shadow_map_views[LAYER];
     for (int i = -radius; i <= radius; ++i) {
-        ivec2 other = ivec2(clamp(texel.x + i, 0, last), texel.y);
+        ivec2 other = ivec2(texel.x, clamp(texel.y + i, 0, last));
         float depth = texelFetch(shadow_map, other, 0).r;
         if (is_nothing(depth)) continue;
         float z = range_fraction(view, vec3((vec2(other) + 0.5) * view.viewport.zw, depth));

@@ -1,10 +1,11 @@
-// Terms of the Fourier series of the depth z in one layer of a shadow map, averaged along rows: sin and cos of c z,
+// Terms of the Fourier series of the depth z in one layer of a shadow map, averaged along columns: sin and cos of c z,
 // c = pi (2 k - 1), two of them a texture; with the first two the share of texels where something is.
 #include "range_fraction.glsl"
 #include <math.glsl>
 
 uniform sampler2D shadow_map;
-uniform int radius;  // texels
+uniform int first_row;  // of the band that is drawn, in the map
+uniform int radius;     // texels
 out vec4 filtered;
 #if PARTS > 1
 out vec4 filtered_1;
@@ -25,15 +26,15 @@ vec2 turned(vec2 by, vec2 from) {
 }
 
 void main() {
-    ivec2 texel = ivec2(gl_FragCoord.xy);
-    int last = textureSize(shadow_map, 0).x - 1;
+    ivec2 texel = ivec2(gl_FragCoord.xy) + ivec2(0, first_row);
+    int last = textureSize(shadow_map, 0).y - 1;
     View view = shadow_map_views[LAYER];
     float taps = float(2 * radius + 1);
     float some = 0.0;
     vec4 sums[PARTS];
     for (int part = 0; part < PARTS; ++part) sums[part] = vec4(0.0);
     for (int i = -radius; i <= radius; ++i) {
-        ivec2 other = ivec2(clamp(texel.x + i, 0, last), texel.y);
+        ivec2 other = ivec2(texel.x, clamp(texel.y + i, 0, last));
         float depth = texelFetch(shadow_map, other, 0).r;
         if (is_nothing(depth)) continue;
         float angle = PI * range_fraction(view, vec3((vec2(other) + 0.5) * view.viewport.zw, depth));
