@@ -1,5 +1,5 @@
-// The logarithm of the mean of exponentials of depth along columns of one layer of a shadow map, and the share of texels
-// where something is. Sums of exponentials overflow; their logarithms, taken from the largest on, do not.
+// The logarithm of the mean of exponentials of depth along columns of one layer of a shadow map, and the share of
+// texels where something is. Sums of exponentials overflow; their logarithms, taken from the largest on, do not.
 #include "view_depth.glsl"
 
 uniform sampler2D shadow_map;
