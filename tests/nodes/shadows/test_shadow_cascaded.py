@@ -16,6 +16,8 @@ from rendergraph.nodes.shadows.shadow_cascaded import ShadowCascaded
 
 import rendergraph as rg
 from rendergraph.api import ViewMatrices, viewing
+from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.model import Scene
 
 Floats = npt.NDArray[np.float64]
 SUN = (-0.6, -0.65, 0.3)
@@ -77,6 +79,8 @@ class Field:
             return Post(transform)
 
         self.objects = [post(x, z) for x in range(-99, 100, 11) for z in range(-149, 150, 11)]
+        scene = FrameScene(Scene("field", objects=tuple(self.objects), meshes=self.meshes))  # type: ignore[arg-type]
+        self.corners, self.shown, self.casting = scene.corners, scene.shown, scene.casting
 
 
 @dataclass(frozen=True)
