@@ -40,7 +40,7 @@ def side_by_side(comparison: Comparison) -> npt.NDArray[np.uint8]:
     """Both pictures and the map, uint8 of shape (height, 3 width and what is between, 3)."""
     one, other = comparison.results
     assert other.flip_map is not None
-    parts = [np.asarray(result.pixels[..., :3], np.uint8) for result in (one, other)]
+    parts = [np.asarray(result.pixels, np.uint8)[..., :3] for result in (one, other)]
     gap = np.full((parts[0].shape[0], BETWEEN, 3), 255, np.uint8)
     return np.concatenate([parts[0], gap, parts[1], gap, heat(other.flip_map)], axis=1)
 

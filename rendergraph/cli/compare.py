@@ -324,8 +324,9 @@ def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[obje
         rows.append((result.name, *errors, *(_told(result.columns.get(name)) for name in more)))
     if not all(result.memory for result in results):
         return heads, rows
-    costs = [_costs(result) for result in results]
-    return (*heads, "GPU ms", "10–90 %", "CPU ms", "passes", "textures"), [
+    again = ("repeats",) if any(result.times.repeated for result in results) else ()
+    costs = [_costs(result, repeated=bool(again)) for result in results]
+    return (*heads, "GPU ms", "10–90 %", *again, "CPU ms", "passes", "textures"), [
         (*row, *cost) for row, cost in zip(rows, costs, strict=True)
     ]
 
@@ -334,12 +335,14 @@ def _told(value: float | None) -> str:
     return "–" if value is None else f"{value:.4g}"
 
 
-def _costs(result: Result) -> tuple[object, ...]:
+def _costs(result: Result, *, repeated: bool) -> tuple[object, ...]:
     times = result.times
+    among = times.repeated
+    again = (f"{among.min:.2f}–{among.max:.2f}" if among else "",) if repeated else ()
     gpu = f"{times.gpu_ms.median:.2f}" if times.gpu_ms else "–"
     spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
     size = megabytes(int(str(result.memory["allocated_bytes"])))
-    return gpu, spread, f"{times.cpu_ms.median:.2f}", result.pass_count, size
+    return gpu, spread, *again, f"{times.cpu_ms.median:.2f}", result.pass_count, size
 
 
 def _text(found: Comparison) -> str:

@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     from rendergraph.keys import Schema
 
 
+_KINDS = ("pipeline", "scene", "sweep", "results", "results-csv")
+
+
 @click.command("schema")
-@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|FILE]")
+@click.argument("what", default="pipeline", metavar="[pipeline|scene|sweep|results|results-csv|FILE]")
 @options.plugin_option
 @click.option("-o", "--output", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Write a file.")
 @options.json_option
@@ -26,15 +29,22 @@ def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: 
 
     That of pipeline files, the usual one, knows all installed nodes, and what shipped pipelines are made of, for files
     that extend them. FILE is a pipeline: its schema knows what that extends, and its shader files, too. Of a type that
-    fails it has the name alone, and says so.
+    fails it has the name alone, and says so. `results` are the lines of a sweep's results.jsonl; of its results.csv,
+    `results-csv`, it is a Table Schema.
 
     \b
     Examples:
       rendergraph schema -o rendergraph.schema.json
       rendergraph schema scene -o scene.schema.json
+      rendergraph schema results
       rendergraph schema my.yaml -o rendergraph.schema.json
     """
-    found = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
+    if what in ("results", "results-csv"):
+        from rendergraph.compare.columns import csv_schema, line_schema  # slower to import than the rest
+
+        found = line_schema() if what == "results" else csv_schema()
+    else:
+        found = _of_pipelines(what, plugins) if what not in ("scene", "sweep") else _of_table(what)
     options.put(json.dumps(found, indent=2, ensure_ascii=False), output, as_json=as_json)
 
 
@@ -52,7 +62,7 @@ def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
     from rendergraph.schema import base_of, schema, shipped_bases
 
     if what != "pipeline" and not Path(what).suffix:
-        text = f"there is no schema of '{what}'{suggestion(what, ('pipeline', 'scene', 'sweep'))}"
+        text = f"there is no schema of '{what}'{suggestion(what, _KINDS)}"
         raise InputError(Problem("RG511", text))
     catalog = Catalog.discover(plugins)
     warn(catalog.notes)

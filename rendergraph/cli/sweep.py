@@ -17,7 +17,7 @@ from rendergraph.errors import InputError, Problem, RenderError, UsageError
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis, Space
     from rendergraph.compare.listing import Listing
-    from rendergraph.compare.product import Sweep
+    from rendergraph.compare.product import Pictures, Sweep
     from rendergraph.compare.sampling import Sampling
     from rendergraph.compare.sweepfile import SweepFile
     from rendergraph.session import Selection
@@ -69,11 +69,17 @@ GROUP = options.Parsed("PATH,PATH", _group)
 )
 @click.option("--resume", is_flag=True, help="Keep the runs that DIR has already.")
 @click.option("--list", "listing", is_flag=True, help="Say what would be drawn, and what is shared; draw nothing.")
+@click.option(
+    "--keep", "kept", type=click.Choice(["all", "best"]), help="Which pictures stay: the front's alone are the best."
+)
 @click.option("--csv", "as_csv", is_flag=True, help="Write results.csv, too: a row a run, for spreadsheets.")
 @shared.reference_option
 @shared.metric_option
 @options.selection_options
 @click.option("-n", "--frames", type=click.IntRange(1, 10_000), help="Measured frames.  [default: 5]")
+@click.option(
+    "--repeats", type=click.IntRange(1, 1000), metavar="N", help="Measure N times, and tell the spread.  [default: 1]"
+)
 @shared.at_option
 @click.option(
     "--fail-above", "thresholds", multiple=True, type=shared.THRESHOLD, help="Exit 4 where a metric is above."
@@ -92,10 +98,12 @@ def command(
     out: Path | None,
     resume: bool,
     listing: bool,
+    kept: Pictures | None,
     as_csv: bool,
     reference: str | None,
     metric: str | None,
     frames: int | None,
+    repeats: int | None,
     frame: int,
     thresholds: tuple[shared.Threshold, ...],
     title: str,
@@ -134,14 +142,17 @@ def command(
     words += ["--seed", str(seed)] if seed is not None else []
     words += options.words(select(pipeline)) + ([] if reference is None else ["--reference", reference])
     words += ["--metric", metric] if metric else []
+    words += ["--keep", kept] if kept else []
     words += ["--csv"] if as_csv else []
     words += [*(["--title", title] if title else []), *(["--note", note] if note else [])]
     words += ["-n", str(frames)] if frames else []
+    words += ["--repeats", str(repeats)] if repeats else []
     words += ["--at", str(frame)] if frame != 1 else []
     file = _file(pipeline)
     space = _space(file, axes, zipped, samples, sampling, seed)
     if file is not None:
         reference, frames, metric = reference or file.reference, frames or file.frames, metric or file.metric
+        repeats, kept = repeats or file.repeats, kept or file.kept
         pipeline, select = file.pipeline, _with_file(file, select)
     base = Pipeline(select(pipeline))
     extensions = base.resolve().catalog.extensions
@@ -150,7 +161,10 @@ def command(
     if listing:
         with _at_its_lines(file):
             planned = prepare(base, space, out or Path(), against, metric=metric, frame=frame)
-            _show(listed(planned, out, frames=frames or 5, resume=resume), as_json=as_json)
+            _show(
+                listed(planned, out, frames=frames or 5, repeats=repeats or 1, resume=resume, pictures=kept != "best"),
+                as_json=as_json,
+            )
         return
     if out is None:
         raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
@@ -164,14 +178,16 @@ def command(
                 against,
                 metric=metric,
                 frames=frames or 5,
+                repeats=repeats or 1,
+                kept=kept or "all",
                 frame=frame,
                 resume=resume,
                 device=device,
                 progress=on_terminal(),
             )
     except KeyboardInterrupt:
-        kept = kept_runs(out)
-        say(f"{amount(kept, 'run')} kept in {out}" + (f"; go on with: {again} --resume" if kept else ""))
+        there = kept_runs(out)
+        say(f"{amount(there, 'run')} kept in {out}" + (f"; go on with: {again} --resume" if there else ""))
         raise
     warn([*found.comparison.warnings, *extensions.warnings])
     page = out / "report.html"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rendergraph.compare.divergence import passes
 from rendergraph.compare.merge import Merged, kinship, merge
-from rendergraph.compare.timing import Times, times_within
+from rendergraph.compare.timing import Times, times_repeated
 from rendergraph.compare.values import Pixels
 from rendergraph.errors import InputError
 from rendergraph.session import stages
@@ -123,7 +123,7 @@ def draw(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Ite
 
 
 def measure(
-    gpu: Gpu, variants: Sequence[Planned], batch: Batch, frames: int, *, warm: bool
+    gpu: Gpu, variants: Sequence[Planned], batch: Batch, frames: int, *, warm: bool, repeats: int = 1
 ) -> Iterator[tuple[int, Times]]:
     """The times of a batch's variants, each the sum of the passes it needs.
 
@@ -131,12 +131,16 @@ def measure(
         gpu: where.
         variants: all of them.
         batch: which ones.
-        frames: how many frames are measured.
+        frames: how many frames are measured, each time.
         warm: whether the batch has just been drawn.
+        repeats: how often, each time from the first frame on, with a frame to warm up.
     """
-    timed = batch.planned.for_frames(range(1, frames + 1), warm_up=not warm, timed=True)
-    times = stages.draw_last(timed, gpu).times
+    times = []
+    for number in range(repeats):
+        warm_up = not warm or number > 0
+        timed = batch.planned.for_frames(range(1, frames + 1), warm_up=warm_up, timed=True)
+        times.append(stages.draw_last(timed, gpu).times)
     for place, number in enumerate(batch.numbers):
         variant = variants[number]
         own = {name: batch.merged.names[place][name] for name in passes(variant.plan)}
-        yield number, times_within(times, own, {node.id: node.type.name for node in variant.linked.graph.nodes})
+        yield number, times_repeated(times, own, {node.id: node.type.name for node in variant.linked.graph.nodes})

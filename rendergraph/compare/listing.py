@@ -13,6 +13,7 @@ from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.prepare import Prepared
 from rendergraph.compare.runs import Run, found_again
 from rendergraph.compare.study import RESULTS, check_folder
+from rendergraph.compare.timing import Times, enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +83,22 @@ class Listing:
 
 
 def listed(
-    prepared: Prepared, out: Path | None = None, *, frames: int = 5, resume: bool = False, most_bytes: int = MOST_BYTES
+    prepared: Prepared,
+    out: Path | None = None,
+    *,
+    frames: int = 5,
+    repeats: int = 1,
+    resume: bool = False,
+    pictures: bool = True,
+    most_bytes: int = MOST_BYTES,
 ) -> Listing:
     """What `sweep` would draw.
 
     Args:
         prepared: the sweep.
         out: its folder; without one nothing is there yet.
-        frames, resume, most_bytes: as for `sweep`.
+        frames, repeats, resume, most_bytes: as for `sweep`.
+        pictures: runs that are there have to have theirs.
 
     Raises:
         InputError: the folder has results already, or those of another study.
@@ -99,12 +108,12 @@ def listed(
         check_folder(out, prepared.study, resume=resume)
         records, _ = Ledger(out / RESULTS).read()
         lines = {record["key"]: record for record in records if "key" in record}
-        kept = {number for number, run in enumerate(prepared.runs) if _is_done(run, lines, frames)}
+        kept = {number for number, run in enumerate(prepared.runs) if _is_done(run, lines, frames, repeats, pictures)}
     waiting = [number for number in range(len(prepared.runs)) if number not in kept]
     groups = batches([run.planned for run in prepared.runs], waiting, most_bytes)
     return Listing(prepared, frozenset(kept), tuple(groups))
 
 
-def _is_done(run: Run, lines: dict[str, dict[str, Any]], frames: int) -> bool:
-    record = found_again(run, lines)
-    return record is not None and record["frames"] >= frames
+def _is_done(run: Run, lines: dict[str, dict[str, Any]], frames: int, repeats: int, pictures: bool) -> bool:
+    record = found_again(run, lines, pictures=pictures)
+    return record is not None and bool(record["frames"]) and enough(Times.from_json(record), frames, repeats)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from rendergraph import metrics
 from rendergraph.compare.axes import Axes, Space, typed
@@ -17,15 +17,29 @@ from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import light_error
 from rendergraph.compare.prepare import prepare
 from rendergraph.compare.reference import scene_name
-from rendergraph.compare.runs import RUN, Failure, Run, found_again, give_up, keep, restored, settle
+from rendergraph.compare.runs import (
+    RUN,
+    Failure,
+    Run,
+    drop,
+    found_again,
+    give_up,
+    keep,
+    restored,
+    settle,
+    without_picture,
+)
 from rendergraph.compare.study import begin, claimed, open_folder
-from rendergraph.compare.timing import NO_TIMES
+from rendergraph.compare.timing import NO_TIMES, enough
 from rendergraph.compare.values import Comparison, Pixels, Reference, Result, not_finite_pixels
 from rendergraph.errors import InputError, RenderError
 from rendergraph.metrics import Encoding
 from rendergraph.session import stages
 from rendergraph.session.frame import figures_of
 from rendergraph.session.progress import Progress, shown
+
+Pictures: TypeAlias = Literal["all", "best"]
+"""Which pictures of a sweep stay."""
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
@@ -94,7 +108,8 @@ class _Work:
         lines: those that it had, by key.
         results, records: what is there, by the run's number; results may lack times.
         failures: what cannot be drawn, likewise.
-        frames: how many are to be measured.
+        frames, repeats: how many are to be measured, and how often.
+        pictures: which stay.
         device: what drew.
         reference, light: what is measured against, once it is there.
     """
@@ -105,6 +120,8 @@ class _Work:
     ledger: Ledger
     lines: Mapping[str, dict[str, Any]]
     frames: int
+    repeats: int = 1
+    pictures: Pictures = "all"
     results: dict[int, Result] = field(default_factory=dict)
     records: dict[int, Mapping[str, Any]] = field(default_factory=dict)
     failures: dict[int, Failure] = field(default_factory=dict)
@@ -121,7 +138,7 @@ class _Work:
 
     def is_done(self, number: int) -> bool:
         """Whether a run is drawn and measured."""
-        return number in self.results and self.results[number].times.frames >= self.frames
+        return number in self.results and enough(self.results[number].times, self.frames, self.repeats)
 
 
 def sweep(
@@ -132,7 +149,9 @@ def sweep(
     *,
     metric: str | None = None,
     frames: int = 5,
+    repeats: int = 1,
     frame: int = 1,
+    kept: Pictures = "all",
     resume: bool = False,
     most_bytes: int = MOST_BYTES,
     session: Gpu | None = None,
@@ -152,7 +171,10 @@ def sweep(
         reference: a picture or a pipeline that runs are measured against; the first run by default.
         metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
         frames: how many frames are measured, at least; runs that are there and have fewer are measured again.
+        repeats: how often they are measured, each time anew: the spread of the medians says what a time is worth.
         frame: number of the frame whose pictures are kept.
+        kept: which pictures stay: `all`, or `best`, those of the Pareto front of what is drawn so far, and of the run
+            that others are measured against.
         resume: keep runs that the folder has already.
         most_bytes: of textures that variants drawn together may take.
         session: where to draw; a private one by default.
@@ -171,7 +193,7 @@ def sweep(
     runs, other, picture = planned.runs, planned.other, planned.picture
     with claimed(out):
         ledger, lines, torn = open_folder(out, planned.study, resume=resume)
-        work = _Work(list(runs), planned.encoding, other, ledger, lines, frames, reference=picture)
+        work = _Work(list(runs), planned.encoding, other, ledger, lines, frames, repeats, kept, reference=picture)
         _take_kept(work)
         resumed = sum(map(work.is_done, range(len(runs))))
         timed = len(work.results) - resumed
@@ -182,11 +204,14 @@ def sweep(
                 _draw_missing(work, gpu, frame, most_bytes, tell)
     results = tuple(work.results[number] for number in sorted(work.results))
     failures = tuple(work.failures[number] for number in sorted(work.failures))
-    first = runs[0].planned.linked
+    first, measured = runs[0].planned.linked, work.reference
+    if measured is None:
+        pixels = results[0].pixels
+        assert pixels is not None  # the first run's stays
+        measured = Reference(runs[0].name, "variant", pixels, planned.encoding, runs[0].output)
     comparison = Comparison(
         results=results,
-        reference=work.reference
-        or Reference(runs[0].name, "variant", results[0].pixels, planned.encoding, runs[0].output),
+        reference=measured,
         base=(runs[0].name, first.graph),
         scene=scene_name(first),
         camera=first.selection.camera,
@@ -277,23 +302,46 @@ def _draw_batch(work: _Work, gpu: Gpu, batch: Batch, variants: Sequence[Planned]
         for each in drawn:
             _keep(work, each)
     with _drawing():
-        taken = list(measure(gpu, variants, batch, work.frames, warm=bool(undrawn)))
+        taken = list(measure(gpu, variants, batch, work.frames, warm=bool(undrawn), repeats=work.repeats))
     for number, times in taken:
-        run, result = work.runs[number], replace(work.results[number], times=times)
-        work.records[number] = settle(run, work.records[number], times, work.device, work.ledger)
-        work.results[number] = result
-        work.alone += result.pass_count
+        work.results[number] = replace(work.results[number], times=times)
+    beaten = _beaten(work)
+    for number, times in taken:
+        record = without_picture(work.records[number]) if number in beaten else work.records[number]
+        work.records[number] = settle(work.runs[number], record, times, work.device, work.ledger)
+        work.alone += work.results[number].pass_count
+    _drop(work, beaten)
     return batch.pass_count
+
+
+def _beaten(work: _Work) -> set[int]:
+    """Runs whose pictures go: another is both quicker and better."""
+    if work.pictures == "all":
+        return set()
+    measured = {number: result for number, result in work.results.items() if result.times.frames}
+    best = {result.name for result in pareto(list(measured.values()))}
+    if work.other is None and (work.reference is None or work.reference.kind == "variant"):
+        best.add(work.runs[0].name)
+    return {number for number, result in measured.items() if result.name not in best}
+
+
+def _drop(work: _Work, beaten: set[int]) -> None:
+    """Let pictures go, from the folder and from memory."""
+    for number in beaten:
+        if work.records[number]["picture"] is not None:
+            work.records[number] = drop(work.runs[number], work.records[number], work.ledger)
+        work.results[number] = replace(work.results[number], pixels=None, flip_map=None)
 
 
 def _take_kept(work: _Work) -> None:
     """What is there already; a run whose line was lost gets it again."""
     for number, run in enumerate(work.runs):
-        if record := found_again(run, work.lines):
+        if record := found_again(run, work.lines, pictures=work.pictures == "all"):
             if record["frames"] and run.key not in work.lines:
                 work.ledger.append(record)
             work.results[number], work.records[number] = restored(run, record, work.encoding), record
             work.device = record["device"]
+    _drop(work, _beaten(work))
 
 
 def _keep(work: _Work, drawn: Drawn) -> None:

@@ -29,7 +29,14 @@ if TYPE_CHECKING:
 RUN = "run.json"
 ERROR = "error"
 """What a line has in place of figures where the run cannot be drawn or compared."""
-UNTIMED: Mapping[str, Any] = {"frames": 0, "frame_ms": None, "gpu_ms": None, "cpu_ms": None, "passes": []}
+UNTIMED: Mapping[str, Any] = {
+    "frames": 0,
+    "frame_ms": None,
+    "gpu_ms": None,
+    "cpu_ms": None,
+    "passes": [],
+    "repeats": [],
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,14 +142,43 @@ def settle(
 ) -> dict[str, Any]:
     """Add the times to a run that was kept, then its line to the results, and return the new record.
 
+    Where the record is without its picture, that goes now.
+
     Raises:
         RenderError: the disk does not take it.
     """
     timed = {key: value for key, value in record.items() if key != CHECKSUM}
     timed |= {**jsonable(times.as_json()), "device": dict(device), "machine": machine()}
-    _describe(run, timed)
-    ledger.append(timed)
+    _write_down(run, timed, ledger)
     return timed
+
+
+def drop(run: Run, record: Mapping[str, Any], ledger: Ledger) -> dict[str, Any]:
+    """Remove a run's picture and keep its figures, in a new line of the results, and return the new record.
+
+    Raises:
+        RenderError: the disk does not take it.
+    """
+    found = without_picture(record)
+    _write_down(run, found, ledger)
+    return found
+
+
+def without_picture(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A record of which the picture is not kept."""
+    rest = {key: value for key, value in record.items() if key != CHECKSUM}
+    return rest | {"picture": None, "picture_sha256": None}
+
+
+def _write_down(run: Run, record: Mapping[str, Any], ledger: Ledger) -> None:
+    _describe(run, record)
+    ledger.append(record)
+    if record["picture"] is None:
+        try:
+            run.picture.unlink(missing_ok=True)
+        except OSError as error:
+            text = f"the picture cannot be removed: {error.strerror}"
+            raise RenderError(Problem("RG507", text, Place(str(run.picture)))) from error
 
 
 def give_up(run: Run, problems: Sequence[Problem], ledger: Ledger, lines: Mapping[str, dict[str, Any]]) -> Failure:
@@ -170,15 +206,18 @@ def _describe(run: Run, record: Mapping[str, Any]) -> None:
         )
 
 
-def found_again(run: Run, lines: Mapping[str, dict[str, Any]]) -> dict[str, Any] | None:
+def found_again(run: Run, lines: Mapping[str, dict[str, Any]], *, pictures: bool = True) -> dict[str, Any] | None:
     """The record of a run that is there already, None where it is not or its picture is another.
 
     Args:
         run: which.
         lines: of the results, by key. A run that was drawn and not yet timed has none, only its `run.json`.
+        pictures: whether it has to have a picture, which may have been dropped.
     """
     line = lines.get(run.key)
     record = line if line is not None and ERROR not in line else _drawn_before(run)
+    if record is not None and record["picture"] is None:
+        return None if pictures else record
     return record if record is not None and is_kept(run, record) else None
 
 
@@ -210,7 +249,7 @@ def restored(run: Run, record: Mapping[str, Any], encoding: Encoding) -> Result:
     return Result(
         name=run.name,
         source=linked.selection.source,
-        pixels=read(run.picture),
+        pixels=read(run.picture) if record["picture"] else None,
         encoding=encoding,
         metrics=_metrics(record),
         times=Times.from_json(record) if record["frames"] else NO_TIMES,

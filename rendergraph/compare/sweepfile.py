@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 from rendergraph.compare.axes import MOST_RUNS, Axis, Space, axis_of, repeated
 from rendergraph.compare.ranges import RANGE
@@ -21,6 +21,7 @@ from rendergraph.resources import shipped_pipelines, shipped_scenes
 
 MOST_MEASURED = 10_000
 """Frames of a run."""
+MOST_REPEATS = 1000
 _CODES = Codes(unknown="RG030", wrong="RG030", name="RG030", file="RG030")
 _VALUES = either(
     listed(ANYTHING, "values", least=1),
@@ -62,6 +63,8 @@ SWEEP = Table(
         SIZE,
         Key("set", Names(ANYTHING, what="path"), "Paths to values that hold for all runs."),
         Key("frames", whole(1, MOST_MEASURED), "How many frames are measured."),
+        Key("repeats", whole(1, MOST_REPEATS), "How often they are measured, each time anew."),
+        Key("keep", choice("all", "best"), "Which pictures stay; `best` are those of the Pareto front."),
     ),
 )
 """What a sweep's file holds."""
@@ -78,7 +81,8 @@ class SweepFile:
         metric: the port that is measured.
         size: width and height.
         sets: `PATH=VALUE` texts.
-        frames: how many are measured.
+        frames, repeats: how many are measured, and how often.
+        kept: which pictures stay.
         places: what stands under each path, of axes and of `set`, and the groups of `zip`.
     """
 
@@ -90,6 +94,8 @@ class SweepFile:
     size: tuple[int, int] | None = None
     sets: tuple[str, ...] = ()
     frames: int | None = None
+    repeats: int | None = None
+    kept: Literal["all", "best"] | None = None
     places: Mapping[str, Value] = field(default_factory=dict)
 
     def placed(self, error: InputError) -> InputError:
@@ -144,6 +150,8 @@ def read_sweep(path: Path) -> SweepFile:
         said.get("size"),
         tuple(f"{name}={value_text(value)}" for name, value in (given.items() if given else ())),
         said.get("frames"),
+        said.get("repeats"),
+        said.get("keep"),
         entries(root, "set") | groups | entries(root, "axes"),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class Times:
         gpu_ms: the passes' time on the device, summed.
         cpu_ms: the passes' time in Python and the driver, summed.
         passes: each in order of execution.
+        repeats: the headline's median, in milliseconds, of each time that it was measured anew; empty where once.
     """
 
     frames: int
@@ -58,11 +59,17 @@ class Times:
     gpu_ms: Spread | None
     cpu_ms: Spread
     passes: tuple[PassTime, ...]
+    repeats: tuple[float, ...] = ()
 
     @property
     def headline(self) -> Spread:
         """The figure that stands for all of it: time on the GPU, or of the whole frame where that is unknown."""
         return self.gpu_ms or self.frame_ms or self.cpu_ms
+
+    @property
+    def repeated(self) -> Spread | None:
+        """The spread of the repeats; None of less than two."""
+        return Spread.of(self.repeats) if len(self.repeats) > 1 else None
 
     def as_json(self) -> dict[str, Any]:
         """The fields as plain JSON values."""
@@ -80,7 +87,13 @@ class Times:
                 PassTime(entry["node"], entry["type"], _spread(entry["gpu_ms"]), Spread(**entry["cpu_ms"]))
                 for entry in found["passes"]
             ),
+            repeats=tuple(found.get("repeats", ())),
         )
+
+
+def enough(times: Times, frames: int, repeats: int = 1) -> bool:
+    """Whether as many frames were measured as are asked for, as often."""
+    return times.frames >= frames * repeats and max(1, len(times.repeats)) >= repeats
 
 
 def _spread(found: Mapping[str, float] | None) -> Spread | None:
@@ -121,6 +134,21 @@ def step_times(frames: Sequence[FrameTimes]) -> list[dict[str, Any]]:
         }
         for (node, index, label), values in own.items()
     ]
+
+
+def times_repeated(
+    repeats: Sequence[Sequence[FrameTimes]], names: Mapping[str, str], types: Mapping[str, str]
+) -> Times:
+    """Times over all frames of several measurements, and the median of each measurement.
+
+    Args:
+        repeats: what each frame of each took.
+        names, types: as for `times_within`.
+    """
+    found = times_within([frame for frames in repeats for frame in frames], names, types)
+    if len(repeats) < 2:
+        return found
+    return replace(found, repeats=tuple(times_within(frames, names, types).headline.median for frames in repeats))
 
 
 def times_within(frames: Sequence[FrameTimes], names: Mapping[str, str], types: Mapping[str, str]) -> Times:

@@ -108,7 +108,7 @@ class Result:
         name: unique among the variants.
         source: what was typed to name its pipeline.
         settings: what a sweep set, by path.
-        pixels: the output that was compared, and its encoding.
+        pixels: the output that was compared, and its encoding; None where the picture was not kept.
         metrics: against the reference.
         radiance_rmse: of linear light against the reference's, None where one of them has none.
         flip_map: (height, width), 0…1; None where it was not kept.
@@ -124,7 +124,7 @@ class Result:
 
     name: str
     source: str
-    pixels: Pixels
+    pixels: Pixels | None
     encoding: Encoding
     metrics: Metrics
     times: Times
@@ -225,7 +225,8 @@ class Comparison:
         reference, pictures, rows = self.reference, [], []
         if reference.kind != "variant":
             pictures.append((f"{reference.name}, the reference", eight_bit(reference.pixels, reference.encoding)))
-        for result in self.results[:_MOST_PICTURES]:
+        for result in [result for result in self.results if result.pixels is not None][:_MOST_PICTURES]:
+            assert result.pixels is not None
             pictures.append((result.name, eight_bit(result.pixels, result.encoding)))
             if result.flip_map is not None:
                 pictures.append((f"FLIP of {result.name}: {number(result.metrics.flip)}", heat(result.flip_map)))

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import fastjsonschema
 import numpy as np
 import pytest
 
@@ -312,5 +313,24 @@ def test_a_sweep_keeps_typed_values_and_a_table(cli: Any, tmp_path: Path) -> Non
     assert [float(row["rmse"]) for row in rows][:2] == [0, 0]  # what is measured does not see the light
     assert float(rows[2]["rmse"]) > 0
     assert {row["pareto"] for row in rows} <= {"True", "False"}
+    of_a_line = fastjsonschema.compile(cli("schema", "results").json)
+    for line in lines:
+        of_a_line(line)
+    with pytest.raises(fastjsonschema.JsonSchemaException):
+        of_a_line({**lines[0], "flip": "0"})
+    fields = {field["name"]: field["type"] for field in cli("schema", "results-csv").json["fields"]}
+    assert [name for name in rows[0] if name in fields] == list(fields)
+    assert [name for name in rows[0] if name not in fields] == ["ao.samples", "light.ambient"]
+    as_python: dict[str, Any] = {
+        "integer": int,
+        "number": float,
+        "string": str,
+        "boolean": {"True": True, "False": False}.__getitem__,
+    }
+    for row, line in zip(rows, lines, strict=True):
+        read = {name: as_python[fields[name]](row[name]) for name in fields if row[name]}
+        assert read["gpu_ms"] == line["gpu_ms"]["median"]
+        assert (read["run"], read["frames"], read["passes"]) == (line["name"], 1, line["pass_count"])
+        assert json.loads(row["light.ambient"]) == line["settings"]["light.ambient"]
     assert (tmp_path / "out" / rows[0]["run"] / "metric.exr").is_file()
     assert cli("sweep", "ssao-hemisphere", *axes, *words, "--resume", "--json").json["resumed"] == 4

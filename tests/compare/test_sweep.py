@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import fastjsonschema
 import numpy as np
 import pytest
 
@@ -16,6 +17,7 @@ from rendergraph.cli.compare import summary
 from rendergraph.compare import product
 from rendergraph.compare.axes import Axis, Space, parse_axis, pipelines, typed
 from rendergraph.compare.batches import batches
+from rendergraph.compare.columns import line_schema
 from rendergraph.compare.ledger import Ledger, checksum
 from rendergraph.compare.listing import listed
 from rendergraph.compare.prepare import prepare
@@ -48,7 +50,9 @@ def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
         for path, value in result.settings.items():
             alone = alone.set(path, value)
         np.testing.assert_array_equal(gl.render(alone)["image"], result.pixels)
-        np.testing.assert_array_equal(read(tmp_path / "out" / result.name / "image.png"), result.pixels[..., :3])
+        np.testing.assert_array_equal(
+            read(tmp_path / "out" / result.name / "image.png"), np.asarray(result.pixels)[..., :3]
+        )
         told = json.loads((tmp_path / "out" / result.name / "run.json").read_text())
         assert told["settings"] == {path: typed(value) for path, value in result.settings.items()}
         assert told["flip"] == result.metrics.flip
@@ -212,6 +216,55 @@ def test_what_would_be_drawn_is_listed_and_nothing_is(gl: rg.Session, tmp_path: 
     assert {file: file.stat().st_mtime_ns for file in out.rglob("*")} == before
 
 
+def test_repeats_are_measured_anew_and_their_spread_is_told(gl: rg.Session, tmp_path: Path) -> None:
+    out, base, axes = tmp_path / "out", bad(tmp_path), ["a.mode=1,2"]
+    once = sweep(base, axes, out, frames=2, session=gl)
+    assert [result.times.repeated for result in once.comparison.results] == [None, None]
+    found = sweep(base, axes, out, frames=2, repeats=3, session=gl, resume=True)
+    assert (found.timed, found.redrawn) == (2, 0)
+    for result, row in zip(found.comparison.results, csv.DictReader(io.StringIO(csv_text(found))), strict=True):
+        times, among = result.times, result.times.repeated
+        assert (times.frames, len(times.repeats)) == (6, 3)
+        assert among is not None
+        assert times.headline.min <= among.min <= times.headline.median <= among.max <= times.headline.max
+        assert [row[name] for name in ("repeats", "repeats_min_ms", "repeats_max_ms")] == [
+            "3",
+            f"{among.min}",
+            f"{among.max}",
+        ]
+    assert [len(line["repeats"]) for line in lines(out)] == [0, 0, 3, 3]
+    again = sweep(base, axes, out, frames=2, repeats=3, session=gl, resume=True)
+    assert (again.resumed, again.executed) == (2, 0)
+    assert [r.times for r in again.comparison.results] == [r.times for r in found.comparison.results]
+    assert "(3)" in sweep_page(found, "rendergraph sweep")
+
+
+def test_the_best_pictures_are_kept_and_no_others(gl: rg.Session, tmp_path: Path) -> None:
+    """Against white; each run is a batch of its own, so that one after the other is beaten."""
+    out, base, axes = tmp_path / "out", bad(tmp_path), ["a.mode=9,4,2,1,5"]
+    truth = base.set("a.mode", 1)
+    options: dict[str, Any] = {"frames": 1, "session": gl, "most_bytes": 1}
+    found = sweep(base, axes, out, truth, kept="best", **options)
+    front = {result.name for result in pareto(found.comparison.results)}
+    assert "a.mode=1" in front
+    assert {file.parent.name for file in out.glob("*/radiance.exr")} == front
+    assert {r.name for r in found.comparison.results if r.pixels is not None} == front
+    last = {line["name"]: line["picture"] for line in lines(out)}
+    assert {name for name, picture in last.items() if picture} == front
+    assert len(list(out.glob("*/run.json"))) == 5
+    of_a_line = fastjsonschema.compile(line_schema())
+    for line in lines(out):
+        of_a_line(line)
+    sweep_page(found, "rendergraph sweep")
+    again = sweep(base, axes, out, truth, kept="best", resume=True, **options)
+    assert (again.resumed, len(again.comparison.results)) == (5, 5)
+    whole = sweep(base, axes, out, truth, resume=True, **options)
+    assert (whole.resumed, len(list(out.glob("*/radiance.exr")))) == (len(front), 5)
+    first = sweep(base, axes, tmp_path / "b", kept="best", **options)  # the first is measured against, and stays
+    assert first.comparison.results[0].pixels is not None
+    assert (tmp_path / "b" / "a.mode=9" / "radiance.exr").exists()
+
+
 def lines(folder: Path) -> list[dict[str, Any]]:
     return Ledger(folder / RESULTS).read()[0]
 
@@ -228,6 +281,16 @@ def test_a_value_that_fails_is_a_row_and_the_others_go_on(gl: rg.Session, tmp_pa
     told = {line["name"]: line.get("error") for line in lines(out)}
     assert told == {"a.mode=1": None, "a.mode=2": None, "a.mode=4": None, "a.mode=3": failure.text}
     assert "a.mode=3 failed" in sweep_page(found, "rendergraph sweep")
+    rows = list(csv.DictReader(io.StringIO(csv_text(found))))
+    assert [(row["a.mode"], bool(row["flip"]), row["error"]) for row in rows] == [
+        ("1", True, ""),
+        ("2", True, ""),
+        ("4", True, ""),
+        ("3", False, failure.text),
+    ]
+    of_a_line = fastjsonschema.compile(line_schema())
+    for line in lines(out):
+        of_a_line(line)
     again = sweep(base, (Axis("a.mode", ("1", "2", "3", "4")),), out, frames=1, session=gl, resume=True)
     assert (again.resumed, len(again.failures), len(lines(out))) == (3, 1, 4)
     with pytest.raises(InputError, match="RG410"):

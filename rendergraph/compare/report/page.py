@@ -19,6 +19,7 @@ from rendergraph.compare.report.parts import (
 )
 from rendergraph.compare.report.pictures import first, sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
+from rendergraph.compare.timing import Times
 from rendergraph.compare.values import Comparison, Result, machine
 from rendergraph.diff import diff, diff_svg, diff_text
 from rendergraph.metrics import description
@@ -144,6 +145,12 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Sect
 # --- tables ----------------------------------------------------------------------------------------------------------
 
 
+def _repeats(times: Times) -> str:
+    """The least and the greatest median, and of how many."""
+    found = times.repeated
+    return _cell(f"{number(found.min, 2)}–{number(found.max, 2)} ({len(times.repeats)})" if found else "–")
+
+
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
     more = list(dict.fromkeys(name for result in comparison.results for name in result.columns))
     measured = all(result.memory for result in comparison.results)
@@ -151,7 +158,10 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
     light = any(result.radiance_rmse is not None for result in comparison.results)
     heads = ["", "#FLIP", "#RMSE", "#PSNR dB", "#SSIM", *(f"#{escape(name)}" for name in more)]
     heads += ["#light RMSE"] if light else []
-    heads += ["#GPU ms", "#CPU ms", *(["#frame ms"] if whole else []), "#passes", "#textures"] if measured else []
+    again = measured and any(result.times.repeated for result in comparison.results)
+    if measured:
+        times_heads = ["#GPU ms", *(["#repeats"] if again else []), "#CPU ms", *(["#frame ms"] if whole else [])]
+        heads += [*times_heads, "#passes", "#textures"]
     heads.append("")
     most = max(result.times.headline.median for result in comparison.results)
     names = {result.name for result in front}
@@ -164,7 +174,8 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
         if result.name in names:
             kinds.append("best")
         last = "Pareto front" if result.name in names else ""
-        last += f' <button type="button" data-compare="pic-{place}">view</button>'
+        if result.pixels is not None:
+            last += f' <button type="button" data-compare="pic-{place}">view</button>'
         cells = [
             f'<th scope="row">{escape(result.name.replace(",", ", "))}</th>',
             *(_cell(number(value)) for value in (m.flip, m.rmse)),
@@ -174,7 +185,9 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
         ]
         cells += [_cell(number(result.radiance_rmse))] if light else []
         if measured:
-            cells += [milliseconds(times.gpu_ms, most if times.gpu_ms else 0), milliseconds(times.cpu_ms)]
+            cells += [milliseconds(times.gpu_ms, most if times.gpu_ms else 0)]
+            cells += [_repeats(times)] if again else []
+            cells += [milliseconds(times.cpu_ms)]
             cells += [milliseconds(times.frame_ms)] if whole else []
             cells += [_cell(str(result.pass_count)), _cell(mebibytes(int(str(result.memory["allocated_bytes"]))))]
         rows.append(f'<tr class="{" ".join(kinds)}">{"".join(cells)}<td>{last}</td></tr>')
@@ -192,6 +205,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
             f" Times are medians of {comparison.results[0].times.frames} frames, with the tenth to ninetieth "
             "percentile beneath."
         )
+        words += " Repeats are the least and the greatest median of several measurements." if again else ""
     return table(heads, rows, "Errors, times and memory") + f"<p class=quiet>{words}</p>"
 
 

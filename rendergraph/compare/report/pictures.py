@@ -11,7 +11,7 @@ from rendergraph.images import viewable
 
 def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
     """Identity and label of every picture in the sheet, the reference's first where it is no variant."""
-    own = [(f"pic-{place}", result.name) for place, result in enumerate(comparison.results)]
+    own = [(f"pic-{n}", result.name) for n, result in enumerate(comparison.results) if result.pixels is not None]
     return own if comparison.reference.kind == "variant" else [("pic-ref", comparison.reference.name), *own]
 
 
@@ -66,6 +66,8 @@ def sheet(comparison: Comparison, most: int) -> str:
         figures.append(_figure("pic-ref", source, f"{reference.name}, the reference"))
     maps = len(comparison.results) <= most
     for place, result in enumerate(comparison.results):
+        if result.pixels is None:
+            continue
         figure = _figure(f"pic-{place}", png(eight_bit(result.pixels, result.encoding)), result.name)
         if maps and result.flip_map is not None:
             figure += _figure("", png(heat(result.flip_map)), f"FLIP {number(result.metrics.flip)}")
