@@ -28,6 +28,20 @@ def _cube_size(node: Any, facts: Facts) -> tuple[int, int]:
     return node.size, node.size
 
 
+def _levels(node: Any) -> int:
+    return min(node.mips, node.size.bit_length())
+
+
+def _sharp(node: Any) -> int:
+    """How many of the levels are halved from the whole size; those of wide lobes begin anew, larger."""
+    return _levels(node) // 2
+
+
+def _rough_size(node: Any, facts: Facts) -> tuple[int, int]:
+    side = node.size >> max(1, _sharp(node) - 1)
+    return side, side
+
+
 class ImageBasedLight(Node):
     """Light from all around, by the picture that is there.
 
@@ -54,18 +68,36 @@ class ImageBasedLight(Node):
         kind="texture_cube",
         format="rgba16f",
         size=_cube_size,
-        mips=lambda node, facts: min(node.mips, node.size.bit_length()),
+        mips=lambda node, facts: _sharp(node),
         kept=True,
-        doc="Mean radiance over GGX's lobe around each direction; roughness grows evenly from level to level, 0 to 1.",
+        doc="Mean radiance over GGX's lobe around each direction; roughness grows evenly from level to level, from 0.",
+    )
+    rough = Output(
+        Radiance,
+        kind="texture_cube",
+        format="rgba16f",
+        size=_rough_size,
+        mips=lambda node, facts: _levels(node) - _sharp(node),
+        kept=True,
+        doc="The levels of roughness that follow, to 1: with more texels than halving would leave them.",
     )
     between = Output(
         Radiance,
         kind="texture_cube",
         format="rgba16f",
         size=lambda node, facts: (node.size // 2, node.size // 2),
-        mips=lambda node, facts: min(node.mips, node.size.bit_length()) - 1,
+        mips=lambda node, facts: _sharp(node),
         kept=True,
-        doc="The same at the roughnesses halfway between the levels of `specular`.",
+        doc="The same at the roughnesses halfway after each level of `specular`.",
+    )
+    rough_between = Output(
+        Radiance,
+        kind="texture_cube",
+        format="rgba16f",
+        size=_rough_size,
+        mips=lambda node, facts: _levels(node) - _sharp(node) - 1,
+        kept=True,
+        doc="The same halfway between the levels of `rough`.",
     )
     harmonics = Output(
         IrradianceSH,
@@ -77,12 +109,14 @@ class ImageBasedLight(Node):
     light: ClassVar[Function] = Function(
         EnvironmentLight,
         shader="environment_light.glsl",
-        reads=("map", specular.sampled("trilinear"), between.sampled("trilinear"), "harmonics"),
+        reads=("map", *(cube.sampled("trilinear") for cube in (specular, between, rough, rough_between)), "harmonics"),
         doc="Light from around a direction.",
     )
 
     size: int = structural(default=128, min=16, max=2048, unit="texels", doc="Side of the cube map's faces.")
-    mips: int = structural(default=6, min=2, max=12, doc="Levels of `specular`, from roughness 0 to 1.")
+    mips: int = structural(
+        default=6, min=3, max=12, doc="Levels of roughness from 0 to 1; as many less one lie between."
+    )
     samples: int = define(default=64, min=8, max=1024, doc="Directions that a texel averages where lobes are sampled.")
     integrated_from: float = structural(
         default=0.25,
@@ -122,11 +156,11 @@ class ImageBasedLight(Node):
             out=self.harmonics,
             label="harmonics",
         )
-        last = steps.desc(self.specular).mips - 1
-        for mip in range(last + 1):
-            self._filter(steps, self.specular, mip, mip / last)
-        for mip in range(last):
-            self._filter(steps, self.between, mip, (mip + 0.5) / last)
+        last = _levels(self) - 1
+        for cubes, after in (((self.specular, self.rough), 0.0), ((self.between, self.rough_between), 0.5)):
+            levels = [(cube, mip) for cube in cubes for mip in range(steps.desc(cube).mips)]
+            for level, (cube, mip) in enumerate(levels):
+                self._filter(steps, cube, mip, (level + after) / last)
 
     def _filter(self, steps: Steps, cube: Output, mip: int, roughness: float) -> None:
         """One level of a prefiltered cube map."""

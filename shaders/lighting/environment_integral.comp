@@ -11,7 +11,7 @@ uniform float roughness;      // perceptual
 uniform writeonly imageCube specular;
 
 const int COARSE = 4;         // cells along a side of a face where the lobe is flat
-const float STEEPNESS = 0.35;  // a cell's side over the angle in which the lobe falls
+const float STEEPNESS = 0.45;  // a cell's side over the angle in which the lobe falls
 
 // GGX's lobe around a normal, seen along it, times N.L, for a given part of a face in place of solid angle.
 float lobe(vec3 normal, vec3 light, float alpha) {

@@ -4,8 +4,10 @@
 #include <equirectangular.glsl>
 
 uniform sampler2D map;
-uniform samplerCube specular;  // levels of even roughness, from 0 to 1
+uniform samplerCube specular;  // levels of even roughness from 0 on,
+uniform samplerCube rough;     // and on to 1
 uniform samplerCube between;   // levels halfway between those
+uniform samplerCube rough_between;
 layout(std430) readonly buffer harmonics {
     vec4 bands[16];
 };
@@ -18,12 +20,14 @@ vec3 diffuse_light(vec3 d) {
 }
 
 vec3 mirrored_light(vec3 d, float roughness) {
-    int last = textureQueryLevels(specular) - 1;
-    float place = 2.0 * float(last) * roughness;  // whole numbers are levels: even ones of `specular`
-    int below = int(place);
-    float share = (below & 1) == 0 ? fract(place) : 1.0 - fract(place);
-    vec3 even = textureLod(specular, d, float((below + 1) / 2)).rgb;
-    return mix(even, textureLod(between, d, float(min(below / 2, last - 1))).rgb, share);
+    int sharp = textureQueryLevels(specular), last = sharp + textureQueryLevels(rough) - 1;
+    float place = 2.0 * float(last) * roughness;  // even numbers are levels, odd ones lie between
+    int below = min(int(place), 2 * last - 1), even = (below + 1) / 2, odd = below / 2;
+    vec3 at_even = even < sharp ? textureLod(specular, d, float(even)).rgb : textureLod(rough, d, float(even - sharp)).rgb;
+    vec3 at_odd =
+        odd < sharp ? textureLod(between, d, float(odd)).rgb : textureLod(rough_between, d, float(odd - sharp)).rgb;
+    float share = place - float(below);
+    return mix(at_even, at_odd, (below & 1) == 0 ? share : 1.0 - share);
 }
 
 vec3 light_from(vec3 direction, float lobe) {
