@@ -29,6 +29,7 @@ VERBS = (
     "diff",
     "compare",
     "sweep",
+    "farm",
     "bench",
     "nodes",
     "pipelines",

@@ -153,13 +153,13 @@ def command(
     if file is not None:
         reference, frames, metric = reference or file.reference, frames or file.frames, metric or file.metric
         repeats, kept = repeats or file.repeats, kept or file.kept
-        pipeline, select = file.pipeline, _with_file(file, select)
+        pipeline, select = file.pipeline, with_file(file, select)
     base = Pipeline(select(pipeline))
     extensions = base.resolve().catalog.extensions
     shared.check_thresholds(thresholds, extensions)
     against = shared.load_reference(reference, select)
     if listing:
-        with _at_its_lines(file):
+        with at_its_lines(file):
             planned = prepare(base, space, out or Path(), against, metric=metric, frame=frame)
             _show(
                 listed(planned, out, frames=frames or 5, repeats=repeats or 1, resume=resume, pictures=kept != "best"),
@@ -170,7 +170,7 @@ def command(
         raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
     again = shared.typed([*words, "-o", str(out)])
     try:
-        with _at_its_lines(file):
+        with at_its_lines(file):
             found = sweep(
                 base,
                 space,
@@ -236,7 +236,7 @@ def _file(name: str) -> SweepFile | None:
 
 
 @contextmanager
-def _at_its_lines(file: SweepFile | None) -> Iterator[None]:
+def at_its_lines(file: SweepFile | None) -> Iterator[None]:
     """Mistakes in what a file says of paths are told at its lines."""
     try:
         yield
@@ -277,14 +277,14 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
     from rendergraph.session import Pipeline
 
     file = read_sweep(path)
-    select = _with_file(file, select)
-    with _at_its_lines(file):
+    select = with_file(file, select)
+    with at_its_lines(file):
         against = shared.load_reference(file.reference, select)
         runs = check_sweep(Pipeline(select(file.pipeline)), file.space, against, file.metric)
     return len(runs), tuple(dict.fromkeys(problem for run in runs for problem in run.link().warnings))
 
 
-def _with_file(file: SweepFile, select: options.Select) -> options.Select:
+def with_file(file: SweepFile, select: options.Select) -> options.Select:
     """The options with what a file says where they say nothing."""
 
     def selected(name: str) -> Selection:

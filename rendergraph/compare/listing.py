@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,12 +109,25 @@ def listed(
         check_folder(out, prepared.study, resume=resume)
         records, _ = Ledger(out / RESULTS).read()
         lines = {record["key"]: record for record in records if "key" in record}
-        kept = {number for number, run in enumerate(prepared.runs) if _is_done(run, lines, frames, repeats, pictures)}
+        kept = {
+            number
+            for number, run in enumerate(prepared.runs)
+            if is_done(run, lines, frames=frames, repeats=repeats, pictures=pictures)
+        }
     waiting = [number for number in range(len(prepared.runs)) if number not in kept]
     groups = batches([run.planned for run in prepared.runs], waiting, most_bytes)
     return Listing(prepared, frozenset(kept), tuple(groups))
 
 
-def _is_done(run: Run, lines: dict[str, dict[str, Any]], frames: int, repeats: int, pictures: bool) -> bool:
+def is_done(
+    run: Run, lines: Mapping[str, dict[str, Any]], *, frames: int, repeats: int = 1, pictures: bool = True
+) -> bool:
+    """Whether a run is there, drawn and measured.
+
+    Args:
+        run: which.
+        lines: of the results, by key.
+        frames, repeats, pictures: as for `listed`.
+    """
     record = found_again(run, lines, pictures=pictures)
     return record is not None and bool(record["frames"]) and enough(Times.from_json(record), frames, repeats)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,22 +51,33 @@ def prepare(
     *,
     metric: str | None = None,
     frame: int = 1,
+    only: Sequence[int] | None = None,
 ) -> Prepared:
     """The runs of a sweep, planned, with the arguments of `sweep`.
+
+    Args:
+        base, axes, out, reference, metric, frame: as for `sweep`.
+        only: numbers of the runs, from 0, where these are but a part; they are called and measured as in the whole.
 
     Raises:
         InputError: as from `sweep`, of what is not the folder.
     """
     space = Space.of(axes)
-    base, reference = _measured(base, reference, metric)
-    staged, notes, picture, output, encoding = _looked_at(base, space, reference, metric)
-    settings, planned = space.runs(), [pipeline.check() for pipeline in staged]
-    variants, other = planned[: len(settings)], planned[-1] if len(staged) > len(settings) else None
+    space.check()
+    settings = space.runs()
     names = unique_names([run_name(run) for run in settings])
-    if picture is None:
-        against, told = key_of(other or variants[0], frame, ""), other.linked.graph.name if other else names[0]
-    else:
-        against, told = file_digest(Path(str(reference))), str(reference)
+    base, reference = _measured(base, reference, metric)
+    told = names[0]
+    if reference is not None:
+        told = str(reference) if isinstance(reference, Path) else reference.resolve().spec.name
+    if only is not None:
+        if reference is None and 0 not in only:
+            (reference,) = pipelines(base, settings[:1])
+        settings, names = [settings[number] for number in only], [names[number] for number in only]
+    staged, notes, picture, output, encoding = _looked_at(base, settings, reference, metric)
+    planned = [pipeline.check() for pipeline in staged]
+    variants, other = planned[: len(settings)], planned[-1] if len(staged) > len(settings) else None
+    against = file_digest(Path(str(reference))) if picture else key_of(other or variants[0], frame, "")
     runs = tuple(
         Run(name, run, variant, output, frame, key_of(variant, frame, against), out / name)
         for name, run, variant in zip(names, settings, variants, strict=True)
@@ -85,10 +96,12 @@ def check_sweep(
     """
     base, reference = _measured(base, reference, metric)
     space = Space.of(axes)
-    staged, *_ = _looked_at(base, space, reference, metric)
+    space.check()
+    settings = space.runs()
+    staged, *_ = _looked_at(base, settings, reference, metric)
     for pipeline in staged:
         pipeline.check()
-    return staged[: len(space.runs())]
+    return staged[: len(settings)]
 
 
 def _measured(
@@ -100,11 +113,9 @@ def _measured(
 
 
 def _looked_at(
-    base: Pipeline, space: Space, reference: Path | Pipeline | None, metric: str | None
+    base: Pipeline, settings: Sequence[Mapping[str, str]], reference: Path | Pipeline | None, metric: str | None
 ) -> tuple[list[Pipeline], list[str], tuple[Pixels, Encoding] | None, str, Encoding]:
     """Runs on one stage and what was changed for that, a reference picture, and the compared output's name and kind."""
-    space.check()
-    settings = space.runs()
     variants = pipelines(base, settings)
     own = [] if reference is None or isinstance(reference, Path) else [reference]
     staged, notes = on_one_stage([*variants, *own])

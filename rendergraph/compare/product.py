@@ -152,6 +152,7 @@ def sweep(
     repeats: int = 1,
     frame: int = 1,
     kept: Pictures = "all",
+    only: Sequence[int] | None = None,
     resume: bool = False,
     most_bytes: int = MOST_BYTES,
     session: Gpu | None = None,
@@ -175,6 +176,7 @@ def sweep(
         frame: number of the frame whose pictures are kept.
         kept: which pictures stay: `all`, or `best`, those of the Pareto front of what is drawn so far, and of the run
             that others are measured against.
+        only: numbers of the runs, from 0, where these are but a part; they are called and measured as in the whole.
         resume: keep runs that the folder has already.
         most_bytes: of textures that variants drawn together may take.
         session: where to draw; a private one by default.
@@ -189,7 +191,7 @@ def sweep(
     """
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
-    planned = prepare(base, axes, out, reference, metric=metric, frame=frame)
+    planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
     runs, other, picture = planned.runs, planned.other, planned.picture
     with claimed(out):
         ledger, lines, torn = open_folder(out, planned.study, resume=resume)

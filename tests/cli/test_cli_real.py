@@ -29,7 +29,7 @@ def has_no_end(words: list[str]) -> bool:
     return "--watch" in words or (words[0] == "view" and "--export" not in words)
 
 
-LONG = ("view", "sweep", "compare", "check-node", "run", "doctor", "bench")  # their examples take seconds
+LONG = ("view", "sweep", "farm", "compare", "check-node", "run", "doctor", "bench")  # their examples take seconds
 
 
 @pytest.mark.parametrize("verb", ["", *(pytest.param(v, marks=pytest.mark.slow if v in LONG else ()) for v in VERBS)])
@@ -42,6 +42,8 @@ def test_the_examples_of_the_help_work(cli: Any, tmp_path: Path, verb: str) -> N
     if verb == "check-node":
         assert cli("new-node", "vignette").code == cli("new-node", "grain", "--kind", "shader-only").code == 0
     (tmp_path / "my.yaml").write_text("extends: forward\n")
+    study = "sweep: 1\npipeline: forward\nsize: [64, 36]\naxes: {shadows.taps: [1, 3]}\n"
+    (tmp_path / "study.yaml").write_text(study)
     found = [words for words in examples(cli, *filter(None, [verb])) if not has_no_end(words)]
     assert found
     for words in found:
