@@ -94,30 +94,45 @@ class Matching:
 
 def fits(value: object, annotation: Any) -> bool:
     """Whether a value is what an annotation says; a float may be written as a whole number, a number is no switch."""
+    return _test(annotation)(value)
+
+
+@cache
+def _test(annotation: Any) -> Callable[[Any], bool]:
+    """What tells whether a value is what an annotation says."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if annotation is Any:
-        return True
+        return lambda value: True
     if annotation is None:
-        return value is None
+        return lambda value: value is None
     if origin is Annotated:
+        plain = _test(annotation.__origin__)
         rules = [rule for rule in annotation.__metadata__ if not isinstance(rule, str)]
-        return fits(value, annotation.__origin__) and all(rule.holds(value) for rule in rules)
+        return lambda value: plain(value) and all(rule.holds(value) for rule in rules)
     if origin in (Union, types.UnionType):
-        return any(fits(value, part) for part in arguments)
+        either = [_test(part) for part in arguments]
+        return lambda value: any(test(value) for test in either)
     if origin is Literal:
-        return any(type(value) is type(choice) and value == choice for choice in arguments)
+        return lambda value: any(type(value) is type(choice) and value == choice for choice in arguments)
     if origin is tuple and Ellipsis not in arguments:
-        return isinstance(value, tuple) and len(value) == len(arguments) and all(map(fits, value, arguments))
+        tests = [_test(part) for part in arguments]
+        return lambda value: (
+            isinstance(value, tuple)
+            and len(value) == len(tests)
+            and all(test(entry) for test, entry in zip(tests, value, strict=True))
+        )
     if origin in (tuple, Sequence):
-        return isinstance(value, tuple | list | range) and all(fits(entry, arguments[0]) for entry in value)
+        entries = _test(arguments[0])
+        return lambda value: isinstance(value, tuple | list | range) and all(map(entries, value))
     if origin is Mapping:
-        key, entry = arguments
-        return isinstance(value, Mapping) and all(fits(k, key) and fits(v, entry) for k, v in value.items())
+        keys, entries = map(_test, arguments)
+        return lambda value: isinstance(value, Mapping) and all(keys(k) and entries(v) for k, v in value.items())
     if Callable in (origin, annotation):
-        return callable(value)
+        return callable
     if annotation in (int, float):
-        return isinstance(value, int if annotation is int else int | float) and not isinstance(value, bool)
-    return isinstance(value, annotation)
+        kinds = int if annotation is int else int | float
+        return lambda value: isinstance(value, kinds) and not isinstance(value, bool)
+    return lambda value: isinstance(value, annotation)
 
 
 def words_for(annotation: Any, limits: Range = Range(), *, file: bool = False) -> str:
@@ -211,12 +226,17 @@ def mistakes_of(thing: DataclassInstance, who: str, subject: str = "") -> Iterat
         who: how messages name it, if at all.
         subject: see `Mistake`; the field by default.
     """
-    hints = hints_of(type(thing))
-    for entry in fields(thing):
-        value = getattr(thing, entry.name)
-        if entry.init and value is not entry.default:
-            what = f"{who}: {entry.name}" if who else entry.name
-            yield from mistakes_in(what, value, hints[entry.name], subject or entry.name)
+    for name, default, hint in _given(type(thing)):
+        value = getattr(thing, name)
+        if value is not default:
+            yield from mistakes_in(f"{who}: {name}" if who else name, value, hint, subject or name)
+
+
+@cache
+def _given(kind: type[DataclassInstance]) -> tuple[tuple[str, Any, Any], ...]:
+    """Names, defaults and annotations of the fields that its constructor takes."""
+    hints = hints_of(kind)
+    return tuple((entry.name, entry.default, hints[entry.name]) for entry in fields(kind) if entry.init)
 
 
 def right(thing: T, who: str = "") -> T:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
-from rendergraph.document import Document, Value, YamlLimits, load, parse
+from rendergraph.document import Document, Value, YamlLimits, parse, read_text
 from rendergraph.errors import InputError
 from rendergraph.keys import Codes, Key, Later, Names, Naming, Table, Walk
 from rendergraph.keys.forms import ANYTHING, FLAG, NUMBER, TEXT, either, listed, row, shipped, version, whole
@@ -114,12 +115,18 @@ def read(
     Raises:
         InputError: it cannot be read, or is no pipeline; with all mistakes.
     """
-    if text is not None:
-        document = parse(text, name or str(path or "<text>"), path=path, limits=limits, keep_going=True)
-    elif path is not None:
-        document = load(path, limits=limits, keep_going=True, name=name)
-    else:
-        raise ValueError("read() needs a path or a text")
+    name = name or str(path or "<text>")
+    if text is None:
+        if path is None:
+            raise ValueError("read() needs a path or a text")
+        text = read_text(path, limits, name)
+    return _read(path, text, limits, name, keep_going, patch)
+
+
+@lru_cache(maxsize=32)
+def _read(path: Path | None, text: str, limits: YamlLimits, name: str, keep_going: bool, patch: bool) -> Document:
+    """The same text of the same place is the same document, as often as it is read."""
+    document = parse(text, name, path=path, limits=limits, keep_going=True)
     return checked(document, keep_going=keep_going, patch=patch)
 
 

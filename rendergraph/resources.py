@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from itertools import takewhile
 from pathlib import Path
@@ -35,4 +35,10 @@ def shipped_scenes() -> dict[str, Path]:
 
 
 def _by_name(home: Path) -> dict[str, Path]:
+    return dict(_listed(home, home.stat().st_mtime_ns))
+
+
+@lru_cache
+def _listed(home: Path, changed: int) -> dict[str, Path]:
+    """The files of a folder, which is `changed` when one comes or goes."""
     return {path.stem: path for path in sorted(home.glob("*.yaml"), key=lambda path: path.stem)}

@@ -5,7 +5,7 @@ Nothing here touches GL: a format knows its GL enum as a number so that `gl` nee
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "function"]
@@ -255,9 +255,10 @@ class TextureDesc:
         return None
 
     @property
-    def storage_class(self) -> TextureDesc:
-        """The description with its format replaced by the texel class's name: equal ones can share through a view."""
-        return replace(self, format=FORMATS[self.format].view_class)
+    def storage_class(self) -> tuple[object, ...]:
+        """What equal ones of can share through a view: the texel class's name, and everything but the format."""
+        made = self.kind, self.width, self.height, self.layers, self.mips, self.samples
+        return FORMATS[self.format].view_class, *made
 
 
 @dataclass(frozen=True)

@@ -31,15 +31,24 @@ def load(
         InputError: it cannot be read or is no YAML of ours; with all mistakes.
     """
     name = name or str(path)
+    text = read_text(path, limits, name)
+    return build(text, Source(name, path, text), limits, keep_going)
+
+
+def read_text(path: Path, limits: YamlLimits, name: str) -> str:
+    """The text of a file, without a byte order mark; `name` is how messages name it.
+
+    Raises:
+        InputError: it cannot be read, or is not UTF-8.
+    """
     raw = read_bytes(path, limits.bytes, name)
     try:
-        text = raw.decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         good = Source(name, path, raw[: error.start].decode("utf-8-sig", "replace"))
         line, column = good.at(len(good.text))
         where = Place(name, line, column)
         raise InputError(Problem("RG008", "the text is not UTF-8; save the file as UTF-8", where)) from None
-    return build(text, Source(name, path, text), limits, keep_going)
 
 
 def parse(
@@ -102,6 +111,7 @@ __all__ = [
     "load",
     "parse",
     "read_bytes",
+    "read_text",
     "said",
     "scalar",
     "shown",

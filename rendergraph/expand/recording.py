@@ -46,9 +46,12 @@ class Recording:
             for name, ends in self.links.items()
             if ends
         }
-        facts = Facts(graph.size, graph.lights, objects=graph.objects or (), environment=graph.environment)
-        self.links |= {name: (ENVIRONMENT,) for name in of_scene if name not in inputs and facts.of_scene}
-        self.facts = replace(facts, inputs=inputs | {n: facts.of_scene for n in of_scene if n not in inputs})
+        facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
+        around = [name for name in of_scene if name not in inputs]
+        if around:
+            self.links |= dict.fromkeys(around, (ENVIRONMENT,)) if facts.of_scene else {}
+            facts = replace(facts, inputs=inputs | dict.fromkeys(around, facts.of_scene))
+        self.facts = facts
 
     # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
 

@@ -53,6 +53,7 @@ CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
 DEFAULT_FORMAT = "rgba16f"
 _LIGHTS = Annotated[Sequence[Count], "the indices of lights"]
+_TEXEL, _COUNT, _SAMPLES, _FORMATNAME = Texel | None, Count | None, Samples | None, FormatName | None
 
 
 class _Unknown(Exception):
@@ -156,7 +157,7 @@ class Infer:
         port = self.nodes[end.node].ports[end.port]
         assert isinstance(port, WrittenPort)
         try:
-            value: Texel | None = self._fitting(end, "clear", port.clear, Texel | None)
+            value: Texel | None = self._fitting(end, "clear", port.clear, _TEXEL)
         except _Unknown:
             return None
         return value
@@ -189,7 +190,7 @@ class Infer:
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):
-            count = self._fitting(end, "count", port.count, Count | None)
+            count = self._fitting(end, "count", port.count, _COUNT)
             lights = self._view_lights(end, port)
             if count is None:
                 count = len(lights) if port.lights else 1
@@ -272,16 +273,16 @@ class Infer:
     def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None, usual: int) -> TextureDesc:
         draft = self.nodes[end.node]
         size = self._size(end, port, like)
-        name = self._fitting(end, "format", port.format, FormatName | None, "RG211")
+        name = self._fitting(end, "format", port.format, _FORMATNAME, "RG211")
         name = name or (like.format if like is not None else DEFAULT_FORMAT)
         kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
-        layers = self._fitting(end, "layers", port.layers, Count | None)
+        layers = self._fitting(end, "layers", port.layers, _COUNT)
         if layers is None:
             layers = like.layers if like is not None else usual
         layers = 6 if kind == "texture_cube" else layers
         full = full_mip_count(*size)
         mips = self._fitting(end, "mips", port.mips, Count) or full
-        samples = self._fitting(end, "samples", port.samples, Samples | None)
+        samples = self._fitting(end, "samples", port.samples, _SAMPLES)
         if samples is None:
             samples = 1 if mips > 1 or kind == "texture_cube" else self._samples_of(draft, like, size)
         if kind == "texture2d" and layers != 1:

@@ -7,7 +7,7 @@ as what a heap of bytes could reach. So an order above that peak is taken only w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -129,9 +129,14 @@ def schedule(
     sinks = _sinks(expansion, kept, versions)
     whole_frame = {id: resources[id].bytes for id in alive_all_frame(resources, kept_versions)}
 
+    models: dict[Hashable, Model] = {}
+
     def model_of(waits: Waits, copies: Mapping[str, int]) -> Model:
-        alive = whole_frame | {id: resources[id].desc.bytes * number for id, number in copies.items()}
-        return Model.of(waits, kept, resources, alive, shown, sinks)
+        key = id(waits), frozenset(copies.items())
+        if key not in models:
+            alive = whole_frame | {id: resources[id].desc.bytes * number for id, number in copies.items()}
+            models[key] = Model.of(waits, kept, resources, alive, shown, sinks)
+        return models[key]
 
     found = _least(model_of, waits, readers_first(waits, kept, kept_versions), resources, budget_s)
     order, chosen = found.order, None
@@ -214,8 +219,24 @@ def _least(
 
 def _optimise(model: Model, waits: Waits, budget_s: float) -> _Found:
     """An order that allocates little, the least peak found, and a peak that no order is below."""
+    key = model.content, budget_s
+    if key not in _orders:
+        if len(_orders) >= _MOST_ORDERS:
+            _orders.clear()
+        _orders[key] = _ordered(model, budget_s)
+    cost, order, least, bound = _orders[key]
+    return _Found(cost, tuple(model.steps[step] for step in order), waits, least, bound)
+
+
+_MOST_ORDERS = 64
+_orders: dict[Hashable, tuple[Cost, Sequence[int], int, int]] = {}
+"""What was found for a model before: most changes of a pipeline leave the order what it was."""
+
+
+def _ordered(model: Model, budget_s: float) -> tuple[Cost, Sequence[int], int, int]:
+    """Cost, numbers of the steps, the least peak found, the bound."""
     if not len(model):
-        return _Found(Cost(model.constant, model.constant, 0), (), waits, model.constant, model.constant)
+        return Cost(model.constant, model.constant, 0), (), model.constant, model.constant
     pool_bound, bound = model.bounds()
     orders = []
     for order in seeds(model):
@@ -236,7 +257,7 @@ def _optimise(model: Model, waits: Waits, budget_s: float) -> _Found:
         least = min(least, improved.peak)
         if (improved.pool, improved.peak) < (cost.pool, cost.peak):
             cost, best = improved, better
-    return _Found(cost, tuple(model.steps[step] for step in best), waits, least, bound)
+    return cost, best, least, bound
 
 
 __all__ = ["Schedule", "schedule", "step_names"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rendergraph.schedule.dependencies import StepKey, Versions, Waits, is_filled_by_update, touched_ids
@@ -65,6 +65,12 @@ class Model:
     shown: frozenset[int]
     names: tuple[str, ...]
     constant: int
+
+    @property
+    def content(self) -> Hashable:
+        """All that decides what an order costs; which steps the numbers stand for does not."""
+        kept = self.before, self.touched, self.born, self.sizes, self.classes, self.toucher_count
+        return *kept, self.shown, self.constant
 
     @classmethod
     def of(

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import wraps
+from functools import cache, wraps
 from typing import Annotated, Any, ParamSpec, TypeAlias
 
 from rendergraph.annotations import Length, Range, hints_of, may_be, mistakes_in, quoted
@@ -40,11 +40,16 @@ def argument(name: str, value: object, annotation: Any) -> None:
 def checked(method: Callable[P, None]) -> Callable[P, None]:
     """A method whose arguments are looked at first; those that may be ports it looks at itself, knowing the node."""
 
+    @cache
+    def looked_at() -> tuple[list[str], dict[str, Any]]:
+        hints = hints_of(method)
+        return list(hints), {name: hint for name, hint in hints.items() if not may_be(hint, Port)}
+
     @wraps(method)
     def call(*arguments: P.args, **named: P.kwargs) -> None:
-        hints = hints_of(method)
-        for name, value in (*zip(list(hints), arguments[1:], strict=False), *named.items()):
-            if name in hints and not may_be(hints[name], Port):
+        names, hints = looked_at()
+        for name, value in (*zip(names, arguments[1:], strict=False), *named.items()):
+            if name in hints:
                 argument(name, value, hints[name])
         method(*arguments, **named)
 
