@@ -245,8 +245,11 @@ def right(thing: T, who: str = "") -> T:
     Raises:
         Misuse: one of them is not.
     """
-    for mistake in mistakes_of(thing, who or type(thing).__name__):
-        raise Misuse(mistake.text)
+    for name, default, hint in _given(type(thing)):
+        value = getattr(thing, name)
+        if value is not default and not fits(value, hint):
+            for mistake in mistakes_of(thing, who or type(thing).__name__):
+                raise Misuse(mistake.text)
     return thing
 
 

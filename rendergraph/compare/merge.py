@@ -77,7 +77,7 @@ def kinship(graphs: Sequence[Graph], order: Sequence[str]) -> list[tuple[int, ..
 
 
 def _moved(end: Endpoint, names: Mapping[str, str]) -> Endpoint:
-    return replace(end, node=names[end.node])
+    return end._replace(node=names[end.node])
 
 
 def _view(view: str | None, names: Mapping[str, str]) -> str | None:

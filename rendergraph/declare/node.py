@@ -31,6 +31,15 @@ def _ports_of(cls: type[Node]) -> dict[str, Port]:
 
 
 @cache
+def _outputs_of(cls: type[Node]) -> dict[str, Output | InOut | Function | Views]:
+    return {
+        name: port
+        for name, port in _ports_of(cls).items()
+        if isinstance(port, Output | InOut | Function) or (isinstance(port, Views) and port.public)
+    }
+
+
+@cache
 def _inputs_of(cls: type[Node]) -> dict[str, Input | InOut]:
     return {name: port for name, port in _ports_of(cls).items() if isinstance(port, Input | InOut)}
 
@@ -114,11 +123,7 @@ class Node(BaseModel):
     @classmethod
     def outputs(cls) -> dict[str, Output | InOut | Function | Views]:
         """Ports that others may read."""
-        return {
-            name: port
-            for name, port in cls.ports().items()
-            if isinstance(port, Output | InOut | Function) or (isinstance(port, Views) and port.public)
-        }
+        return _outputs_of(cls)
 
     @classmethod
     def groups(cls) -> dict[str, tuple[str, ...]]:

@@ -55,7 +55,7 @@ def past(link: Link, nodes: Mapping[str, Draft], references: References) -> Link
         into = next(_into(draft, link.source.port, references), None)
         if into is None:
             break
-        source = replace(into.source, previous=into.source.previous or link.source.previous)
+        source = into.source._replace(previous=into.source.previous or link.source.previous)
         link = replace(link, source=source, declared=(*link.declared, *into.declared))
     return link
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import LightFacts, Node, Texel, TextureInfo
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
 
-@dataclass(frozen=True, order=True)
-class Endpoint:
+class Endpoint(NamedTuple):
     """One port of one node; `previous` reads last frame's value."""
 
     node: str
@@ -33,7 +32,7 @@ class Endpoint:
     @property
     def now(self) -> Endpoint:
         """The port itself, also where last frame's value is meant."""
-        return replace(self, previous=False) if self.previous else self
+        return self._replace(previous=False) if self.previous else self
 
 
 @dataclass(frozen=True)

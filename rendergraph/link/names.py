@@ -121,7 +121,7 @@ class References:
         if found is None:
             return None
         source = found.source
-        return replace(found, source=replace(source, previous=source.previous or bool(match[3])), value=value)
+        return replace(found, source=source._replace(previous=source.previous or bool(match[3])), value=value)
 
     def outputs_of(self, scope: str, name: str) -> list[str]:
         """What a node or sub-pipeline of a scope offers, empty where it is unknown."""
@@ -193,7 +193,7 @@ class References:
         link = self._follow(found.parent, match[1], match[2], port, given, depth + 1)
         if link is None:
             return None
-        source = replace(link.source, previous=link.source.previous or bool(match[3]))
+        source = link.source._replace(previous=link.source.previous or bool(match[3]))
         crossing = Crossing(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
         return replace(link, source=source, declared=(*link.declared, crossing))
 
@@ -212,7 +212,7 @@ class References:
         link = self._follow(scope, match[1], match[2], port or wanted, inner, depth + 1)
         if link is None:
             return None
-        source = replace(link.source, previous=link.source.previous or bool(match[3]))
+        source = link.source._replace(previous=link.source.previous or bool(match[3]))
         return replace(link, source=source)
 
     def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str, value: Value) -> str:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache, wraps
 from typing import Annotated, Any, ParamSpec, TypeAlias
 
-from rendergraph.annotations import Length, Range, hints_of, may_be, mistakes_in, quoted
+from rendergraph.annotations import Length, Range, fits, hints_of, may_be, mistakes_in, quoted
 from rendergraph.errors import Misuse, nearest, suggestion
 from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
@@ -49,7 +49,7 @@ def checked(method: Callable[P, None]) -> Callable[P, None]:
     def call(*arguments: P.args, **named: P.kwargs) -> None:
         names, hints = looked_at()
         for name, value in (*zip(names, arguments[1:], strict=False), *named.items()):
-            if name in hints:
+            if name in hints and not fits(value, hints[name]):
                 argument(name, value, hints[name])
         method(*arguments, **named)
 

@@ -182,6 +182,8 @@ class Step:
     @property
     def all_reads(self) -> tuple[Read, ...]:
         """Reads of the step and of the functions it calls."""
+        if not self.functions:
+            return self.reads
         return self.reads + tuple(read for function in self.functions for read in function.reads)
 
 
