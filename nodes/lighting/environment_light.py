@@ -29,7 +29,7 @@ def _cube_size(node: Any, facts: Facts) -> tuple[int, int]:
 
 
 def _levels(node: Any) -> int:
-    return min(node.mips, node.size.bit_length())
+    return min(int(node.mips), int(node.size).bit_length())
 
 
 def _sharp(node: Any) -> int:
@@ -38,7 +38,7 @@ def _sharp(node: Any) -> int:
 
 
 def _rough_size(node: Any, facts: Facts) -> tuple[int, int]:
-    side = node.size >> max(1, _sharp(node) - 1)
+    side = int(node.size) >> max(1, _sharp(node) - 1)
     return side, side
 
 
