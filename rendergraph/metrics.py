@@ -203,14 +203,18 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
     """FLIP at each pixel, 0…1; `b` is the reference.
 
     OpenImageIO takes linear light for both forms, so display values are decoded first. HDR-FLIP chooses its exposures
-    from the reference alone: a `maxluminance` of 0 is what the authors' own program computes.
+    from the reference alone: a `maxluminance` of 0 is what the authors' own program computes. A reference without light
+    gives no exposure; light is then compared as a display would show it unexposed, clipped to 0…1.
     """
     import OpenImageIO as oiio  # for this metric alone
 
-    hdr = encoding == "linear"
+    hdr = encoding == "linear" and bool(np.any(np.nan_to_num(b) > 0))
     if np.array_equal(a, b) and np.isfinite(a).all():
         return np.zeros(a.shape[:2], np.float32)
-    linear = [np.ascontiguousarray(x if hdr else from_srgb(x), np.float32) for x in (a, b)]
+    linear = [
+        np.ascontiguousarray(from_srgb(x) if encoding != "linear" else x if hdr else np.clip(x, 0, 1), np.float32)
+        for x in (a, b)
+    ]
     linear = [np.nan_to_num(x, nan=0.0, posinf=65504.0, neginf=0.0) for x in linear]
     test, reference = (oiio.ImageBuf(x) for x in linear)
     found = oiio.ImageBufAlgo.FLIP_diff(

@@ -35,6 +35,15 @@ def test_black_against_white_is_as_bad_as_can_be() -> None:
     assert map_.shape == (24, 32)
 
 
+def test_light_against_none_is_compared_as_it_is() -> None:
+    """HDR-FLIP takes its exposures from the reference, and black has none."""
+    for bright in (1.0, 7.0):
+        found, _ = metrics.measure(np.full((24, 32, 3), bright, np.float32), np.zeros((24, 32, 3)), encoding="linear")
+        assert found.flip == pytest.approx(metrics.measure(WHITE, BLACK)[0].flip, abs=1e-6)
+    dim = metrics.measure(np.full((24, 32, 3), 0.01, np.float32), np.zeros((24, 32, 3)), encoding="linear")[0].flip
+    assert 0 < dim < found.flip
+
+
 def test_a_constant_offset_has_that_rmse() -> None:
     found, _ = metrics.measure(np.full((16, 16, 3), 0.5), np.full((16, 16, 3), 0.6))
     assert found.rmse == pytest.approx(0.1)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
@@ -72,6 +72,13 @@ GROUP = options.Parsed("PATH,PATH", _group)
 @click.option(
     "--keep", "kept", type=click.Choice(["all", "best"]), help="Which pictures stay: the front's alone are the best."
 )
+@click.option(
+    "--minimise",
+    multiple=True,
+    metavar="METRIC",
+    help="Look for the least flip, rmse, radiance_rmse, ms, bytes, … in place of all combinations; several: the front.",
+)
+@click.option("--budget", type=click.IntRange(1, 10_000), metavar="N", help="Runs of a search.  [default: 50]")
 @click.option("--csv", "as_csv", is_flag=True, help="Write results.csv, too: a row a run, for spreadsheets.")
 @shared.reference_option
 @shared.metric_option
@@ -99,6 +106,8 @@ def command(
     resume: bool,
     listing: bool,
     kept: Pictures | None,
+    minimise: tuple[str, ...],
+    budget: int | None,
     as_csv: bool,
     reference: str | None,
     metric: str | None,
@@ -127,7 +136,7 @@ def command(
       rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr -o lit --size 160x90 --json
       rendergraph sweep forward -x light.shading=phong,pbr,unlit --reference shading-pbr -o lit --size 160x90 --resume
     """
-    from rendergraph.compare import sweep
+    from rendergraph.compare import search, sweep
     from rendergraph.compare.listing import listed
     from rendergraph.compare.prepare import prepare
     from rendergraph.compare.report import quality_svg, sweep_page
@@ -143,6 +152,8 @@ def command(
     words += options.words(select(pipeline)) + ([] if reference is None else ["--reference", reference])
     words += ["--metric", metric] if metric else []
     words += ["--keep", kept] if kept else []
+    words += [word for name in minimise for word in ("--minimise", name)]
+    words += ["--budget", str(budget)] if budget else []
     words += ["--csv"] if as_csv else []
     words += [*(["--title", title] if title else []), *(["--note", note] if note else [])]
     words += ["-n", str(frames)] if frames else []
@@ -153,11 +164,17 @@ def command(
     if file is not None:
         reference, frames, metric = reference or file.reference, frames or file.frames, metric or file.metric
         repeats, kept = repeats or file.repeats, kept or file.kept
+        minimise, budget = minimise or file.minimise, budget or file.budget
         pipeline, select = file.pipeline, with_file(file, select)
     base = Pipeline(select(pipeline))
     extensions = base.resolve().catalog.extensions
     shared.check_thresholds(thresholds, extensions)
     against = shared.load_reference(reference, select)
+    if minimise and (listing or space.samples):
+        what = (
+            "--list: an optimiser asks for runs when it knows of others" if listing else "--samples: take one of them"
+        )
+        raise UsageError(Problem("RG500", f"--minimise and {what}"))
     if listing:
         with at_its_lines(file):
             planned = prepare(base, space, out or Path(), against, metric=metric, frame=frame)
@@ -171,20 +188,21 @@ def command(
     again = shared.typed([*words, "-o", str(out)])
     try:
         with at_its_lines(file):
-            found = sweep(
-                base,
-                space,
-                out,
-                against,
-                metric=metric,
-                frames=frames or 5,
-                repeats=repeats or 1,
-                kept=kept or "all",
-                frame=frame,
-                resume=resume,
-                device=device,
-                progress=on_terminal(),
-            )
+            given: dict[str, Any] = {
+                "metric": metric,
+                "frames": frames or 5,
+                "repeats": repeats or 1,
+                "kept": kept or "all",
+                "frame": frame,
+                "resume": resume,
+                "device": device,
+                "progress": on_terminal(),
+            }
+            if minimise:
+                given |= {"minimise": minimise, "budget": budget or 50, "seed": space.seed}
+                found = search(base, space, out, against, **given)
+            else:
+                found = sweep(base, space, out, against, **given)
     except KeyboardInterrupt:
         there = kept_runs(out)
         say(f"{amount(there, 'run')} kept in {out}" + (f"; go on with: {again} --resume" if there else ""))
@@ -272,7 +290,7 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
     Raises:
         InputError: with all mistakes.
     """
-    from rendergraph.compare import check_sweep
+    from rendergraph.compare import check_search, check_sweep
     from rendergraph.compare.sweepfile import read_sweep
     from rendergraph.session import Pipeline
 
@@ -280,8 +298,14 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
     select = with_file(file, select)
     with at_its_lines(file):
         against = shared.load_reference(file.reference, select)
-        runs = check_sweep(Pipeline(select(file.pipeline)), file.space, against, file.metric)
-    return len(runs), tuple(dict.fromkeys(problem for run in runs for problem in run.link().warnings))
+        base = Pipeline(select(file.pipeline))
+        if file.minimise:
+            runs = check_search(base, file.space, against, file.minimise, file.metric)
+        else:
+            runs = check_sweep(base, file.space, against, file.metric)
+    return (file.budget or 50) if file.minimise else len(runs), tuple(
+        dict.fromkeys(problem for run in runs for problem in run.link().warnings)
+    )
 
 
 def with_file(file: SweepFile, select: options.Select) -> options.Select:
@@ -311,6 +335,9 @@ def _text(found: Sweep) -> str:
     ]
     if comparison.software:
         lines.append(shared.SOFTWARE)
+    if (search := found.search) is not None:
+        heads, rows = ("least", *search.minimise), [(name, *search.values[name]) for name in search.front]
+        lines.append(table([(name, *(f"{one:.4g}" for one in own)) for name, *own in rows], heads))
     return "\n".join(lines)
 
 

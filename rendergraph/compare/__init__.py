@@ -10,12 +10,25 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis, Space
     from rendergraph.compare.files import compare_pictures
+    from rendergraph.compare.optimise import check_search, search
     from rendergraph.compare.pictures import compare
     from rendergraph.compare.prepare import check_sweep
     from rendergraph.compare.product import Sweep, sweep
     from rendergraph.compare.values import Comparison, Result
 
-__all__ = ["Axis", "Comparison", "Result", "Space", "Sweep", "check_sweep", "compare", "compare_pictures", "sweep"]
+__all__ = [
+    "Axis",
+    "Comparison",
+    "Result",
+    "Space",
+    "Sweep",
+    "check_search",
+    "check_sweep",
+    "compare",
+    "compare_pictures",
+    "search",
+    "sweep",
+]
 
 _WHERE = {
     "Axis": "axes",
@@ -24,6 +37,8 @@ _WHERE = {
     "compare_pictures": "files",
     "Sweep": "product",
     "check_sweep": "prepare",
+    "check_search": "optimise",
+    "search": "optimise",
     "sweep": "product",
 }
 

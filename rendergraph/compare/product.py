@@ -13,6 +13,7 @@ from rendergraph import metrics
 from rendergraph.compare.axes import Axes, Space, typed
 from rendergraph.compare.batches import MOST_BYTES, Batch, Drawn, batches, draw, measure
 from rendergraph.compare.divergence import passes
+from rendergraph.compare.goals import Search
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.pictures import light_error
 from rendergraph.compare.prepare import prepare
@@ -61,6 +62,7 @@ class Sweep:
         redrawn: runs that were there, drawn from files that have changed since.
         torn: lines of the results that were not whole.
         failures: runs that could not be drawn or compared; they are no variants.
+        search: what was looked for, where an optimiser chose the runs.
     """
 
     comparison: Comparison
@@ -72,6 +74,7 @@ class Sweep:
     redrawn: int
     torn: int
     failures: tuple[Failure, ...]
+    search: Search | None = None
 
     def __repr__(self) -> str:
         return f"<Sweep of {', '.join(axis.path for axis in self.space.axes)}: {len(self.comparison.results)} runs>"
@@ -84,16 +87,22 @@ class Sweep:
         found = self.comparison.as_json()
         runs = found.pop("variants")
         front = {result.name for result in pareto(self.comparison.results)}
-        return found | {
-            "axes": {axis.path: axis.text if axis.span else list(map(typed, axis.values)) for axis in self.space.axes},
-            "executed_passes": self.executed,
-            "passes_one_by_one": self.alone,
-            "resumed": self.resumed,
-            "timed_again": self.timed,
-            "redrawn": self.redrawn,
-            "runs": [run | {"pareto": run["name"] in front} for run in runs],
-            "failed": [failure.as_json() for failure in self.failures],
-        }
+        return (
+            found
+            | {
+                "axes": {
+                    axis.path: axis.text if axis.span else list(map(typed, axis.values)) for axis in self.space.axes
+                },
+                "executed_passes": self.executed,
+                "passes_one_by_one": self.alone,
+                "resumed": self.resumed,
+                "timed_again": self.timed,
+                "redrawn": self.redrawn,
+                "runs": [run | {"pareto": run["name"] in front} for run in runs],
+                "failed": [failure.as_json() for failure in self.failures],
+            }
+            | ({"search": self.search.as_json()} if self.search else {})
+        )
 
 
 @dataclass(eq=False)
@@ -144,7 +153,7 @@ class _Work:
 def sweep(
     base: Pipeline,
     axes: Axes,
-    out: Path,
+    out: Path | str,
     reference: Path | Pipeline | None = None,
     *,
     metric: str | None = None,
@@ -191,6 +200,7 @@ def sweep(
     """
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
+    out = Path(out)
     planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
     runs, other, picture = planned.runs, planned.other, planned.picture
     with claimed(out):

@@ -57,6 +57,13 @@ SWEEP = Table(
             "sampling", choice(*get_args(Sampling)), "`latin`: a sample in each equal part of every axis; or `random`."
         ),
         Key("seed", whole(0), "Of the samples: the same one gives the same.", default=0),
+        Key(
+            "minimise",
+            either(TEXT, listed(TEXT, "names", least=1), wanted="a name such as flip or ms, or a list of them"),
+            "Look for what makes this least, or these, in place of all combinations.",
+            example="minimise: [flip, ms]",
+        ),
+        Key("budget", whole(1, MOST_RUNS), "How many runs the search may ask for.", default=50),
         Key("reference", shipped(shipped_pipelines), "A picture or a pipeline that all runs are compared with."),
         Key("metric", TEXT, "A port, `NODE.PORT`, whose texture is measured in place of the picture."),
         Key("scene", shipped(shipped_scenes), "What is drawn, in place of the pipeline's own."),
@@ -83,6 +90,7 @@ class SweepFile:
         sets: `PATH=VALUE` texts.
         frames, repeats: how many are measured, and how often.
         kept: which pictures stay.
+        minimise, budget: what a search looks for, and how many runs it may ask for.
         places: what stands under each path, of axes and of `set`, and the groups of `zip`.
     """
 
@@ -96,6 +104,8 @@ class SweepFile:
     frames: int | None = None
     repeats: int | None = None
     kept: Literal["all", "best"] | None = None
+    minimise: tuple[str, ...] = ()
+    budget: int | None = None
     places: Mapping[str, Value] = field(default_factory=dict)
 
     def placed(self, error: InputError) -> InputError:
@@ -134,7 +144,7 @@ def read_sweep(path: Path) -> SweepFile:
     said = plain(root, SWEEP)
     groups = {",".join(group.plain()): group for group in _parts(root.get("zip"))}
     said |= {key: _beside(path, said[key]) for key in ("pipeline", "reference", "scene") if key in said}
-    given = root.get("set")
+    given, minimise = root.get("set"), said.get("minimise", ())
     return SweepFile(
         said["pipeline"],
         Space(
@@ -152,6 +162,8 @@ def read_sweep(path: Path) -> SweepFile:
         said.get("frames"),
         said.get("repeats"),
         said.get("keep"),
+        tuple([minimise] if isinstance(minimise, str) else minimise),
+        said.get("budget"),
         entries(root, "set") | groups | entries(root, "axes"),
     )
 

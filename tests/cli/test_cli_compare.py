@@ -190,6 +190,60 @@ def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    (tmp_path / "study.yaml").write_text(
+        "sweep: 1\npipeline: forward\nsize: [32, 18]\nframes: 1\nset: {sun.resolution: 64}\nreference: shading-pbr\n"
+        "minimise: rmse\nbudget: 3\nseed: 4\naxes: {light.ambient: 0.0:0.5, display.exposure: -1:1:0.5}\n"
+    )
+    assert cli("check", "study.yaml").err == "study.yaml: a sweep of 3 runs\n"
+    told = cli("sweep", "study.yaml", "-o", "out", "--json").json
+    assert [len(told["runs"]), told["search"]["minimise"], told["search"]["budget"]] == [3, ["rmse"], 3]
+    asked = {entry["name"]: entry["values"][0] for entry in told["search"]["asked"]}
+    assert asked == {run["name"]: run["rmse"] for run in told["runs"]}
+    assert told["search"]["front"] == [min(asked, key=lambda name: asked[name])]
+    again = cli("sweep", "study.yaml", "-o", "out", "--resume").out
+    assert "3 runs kept from before" in again
+    assert f"least{' ' * (len(told['search']['front'][0]) - 5)}  rmse" in again
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("--minimise", "flip", "--list"), 2, "RG500 --minimise and --list: an optimiser asks for runs when it knows"),
+        (("--minimise", "flip", "--samples", "3", "-o", "o"), 2, "RG500 --minimise and --samples: take one of them"),
+        (("--minimise", "flip", "-o", "o"), 3, "RG524 a search needs what its runs are measured against"),
+        (("--minimise", "x", "--reference", "forward", "-o", "o"), 3, "RG524 there is nothing called 'x' to minimise"),
+    ],
+)
+def test_searches_that_cannot_be_are_told(cli: Any, words: tuple[str, ...], code: int, message: str) -> None:
+    pytest.importorskip("optuna")
+    found = cli("sweep", "forward", "-x", "light.ambient=0.0:1", *words)
+    assert (found.code, message in found.err) == (code, True), found
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (("export", "study.yaml", "-o", "job.yaml"), 2, "RG500 say which kind of job: --openjd"),
+        (("export", "missing.yaml", "--openjd", "-o", "job.yaml"), 3, "RG011 there is no file 'missing.yaml'"),
+        (("export", "wrong.yaml", "--openjd", "-o", "job.yaml"), 3, "wrong.yaml:3:8: RG103"),
+        (("measure", "study.yaml", "-o", "out"), 2, "RG500 farm measure draws some runs: --runs 1-16"),
+        (("measure", "study.yaml", "--runs", "3", "-o", "out"), 2, "there is no run 3; the sweep has 2 runs"),
+        (("measure", "study.yaml", "--runs", "2-1", "-o", "out"), 2, "'2-1' is not N or A-B"),
+        (("frames", "study.yaml", "--runs", "1", "-o", "out"), 2, "RG500 farm frames draws some frames: --frames 1-24"),
+    ],
+)
+def test_jobs_that_cannot_be_are_told(
+    cli: Any, tmp_path: Path, words: tuple[str, ...], code: int, message: str
+) -> None:
+    for name, path in (("study", "shadows.taps"), ("wrong", "shadows.tap")):
+        (tmp_path / f"{name}.yaml").write_text(f"sweep: 1\npipeline: forward\naxes: {{{path}: [1, 3]}}\n")
+    found = cli("farm", *words)
+    assert (found.code, message in found.err) == (code, True), found
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> None:
     file = tmp_path / "study.yaml"
     text = "sweep: 1\npipeline: forward\nreference: shading-pbr\naxes: {shadows.taps: [1, 3], display.curve: [aces, none]}\n"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rendergraph as rg
@@ -49,6 +49,7 @@ def base(folder: Path) -> rg.Pipeline:
     return rg.load(folder / "p.yaml", plugins=[folder / "fx.frag"])
 
 
+@settings(deadline=None)
 @given(st.sets(st.integers(1, 400), min_size=1))
 def test_numbers_are_written_and_read(numbers: set[int]) -> None:
     assert parse_numbers(numbers_text(numbers)) == tuple(sorted(numbers))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from html import escape
 
+from rendergraph.compare.goals import Search
 from rendergraph.compare.product import Sweep, pareto
 from rendergraph.compare.report.parts import (
     Section,
@@ -92,6 +93,7 @@ def sweep_page(found: Sweep, command: str, *, title: str = "", note: str = "") -
         comparison,
         [
             section("axes", "Axes", axes, saved),
+            section("search", "Search", _search(found.search) if found.search else ""),
             section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
             section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
             section("times", "Times", *_times(comparison, best, front), _front_words(front)),
@@ -99,6 +101,23 @@ def sweep_page(found: Sweep, command: str, *, title: str = "", note: str = "") -
         ],
         command,
     )
+
+
+def _search(found: Search) -> str:
+    """The best of a search, and how it came there."""
+    rows = [
+        f'<tr><th scope="row">{escape(name.replace(",", ", "))}</th>'
+        + "".join(_cell(number(value)) for value in found.values[name])
+        + "</tr>"
+        for name in found.front
+    ]
+    what = " and ".join(f"<code>{escape(name)}</code>" for name in found.minimise)
+    one = len(found.minimise) == 1
+    words = f"{'The least' if one else 'The front of the least'} {what} of {len(found.order)} runs that were asked for."
+    steps = ", ".join(f"{number(value)} after {place}" for place, value in found.best_after())
+    words += f" The best <code>{escape(found.minimise[0])}</code> was {steps}." if steps else ""
+    heads = ["", *(f"#{escape(name)}" for name in found.minimise)]
+    return table(heads, rows, "What the search has found") + f"<p class=quiet>{words}</p>"
 
 
 def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Result]) -> tuple[str, str]:
