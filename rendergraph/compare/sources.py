@@ -5,14 +5,14 @@ from __future__ import annotations
 import ast
 import hashlib
 import sys
-from collections.abc import Iterable, Iterator
-from functools import lru_cache
+from collections.abc import Iterator
+from functools import lru_cache, partial
 from importlib.util import resolve_name
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rendergraph.errors import InputError
-from rendergraph.program import stage_texts
+from rendergraph.program import Remembered, stage_texts, text_key
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Expanded
 
 _BUILTIN = "rendergraph.nodes"
+_TEXTS: Remembered[str] = Remembered()
 
 
 def sources_digest(expanded: Expanded) -> str:
@@ -55,12 +56,18 @@ def _shader_texts(expanded: Expanded) -> Iterator[str]:
     expansion = expanded.expansion
     types = {node.id: node.type for node in expanded.linked.graph.nodes}
     for step in expansion.steps:
+        sources = types, expansion.resources, expansion.views
         try:
-            texts = stage_texts(step, types, expansion.resources, expansion.views)
+            yield _TEXTS.get(text_key(step, *sources), partial(_text_digest, step, *sources))
         except InputError as error:  # said when it is drawn, at its place
             yield str(error)
-            continue
-        yield from (text.text for text in texts.values())
+
+
+def _text_digest(*step_and_sources: Any) -> str:
+    found = hashlib.sha256()
+    for text in stage_texts(*step_and_sources).values():
+        found.update(hashlib.sha256(text.text.encode()).digest())
+    return found.hexdigest()
 
 
 def _code(graph: Graph) -> Iterator[str]:
@@ -83,21 +90,32 @@ def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
             continue
         seen.add(module.__name__)
         yield file_digest(Path(file))
-        waiting += [other for other in _imported(module) if other == package or other.startswith(f"{package}.")]
+        waiting += [other for other in _imports(module) if other == package or other.startswith(f"{package}.")]
 
 
-def _imported(module: ModuleType) -> Iterable[str]:
+def _imports(module: ModuleType) -> tuple[str, ...]:
     """Names that a module's imports may mean, absolute."""
+    file = Path(str(module.__file__))
     try:
-        tree = ast.parse(Path(str(module.__file__)).read_bytes())
+        status = file.stat()
+    except OSError:
+        return ()
+    return _imported(file, module.__package__ or "", status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=4096)
+def _imported(file: Path, package: str, modified_ns: int, size: int) -> tuple[str, ...]:
+    try:
+        tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
-        return
+        return ()
+    found: list[str] = []
     for statement in ast.walk(tree):
         if isinstance(statement, ast.Import):
-            yield from (alias.name for alias in statement.names)
+            found += [alias.name for alias in statement.names]
         elif isinstance(statement, ast.ImportFrom):
             base = statement.module or ""
             if statement.level:
-                base = resolve_name("." * statement.level + base, module.__package__ or "")
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in statement.names)
+                base = resolve_name("." * statement.level + base, package)
+            found += [base, *(f"{base}.{alias.name}" for alias in statement.names)]
+    return tuple(found)

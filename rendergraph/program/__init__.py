@@ -22,9 +22,11 @@ from __future__ import annotations
 
 from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
 from rendergraph.program.messages import compile_problems, declared_at, link_problems
+from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts
 
 __all__ = [
+    "Remembered",
     "StageText",
     "StepTexts",
     "Texts",
@@ -38,5 +40,6 @@ __all__ = [
     "positions_macro",
     "prefix",
     "stage_texts",
+    "text_key",
     "unfit_sampler",
 ]

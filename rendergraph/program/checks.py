@@ -15,10 +15,13 @@ from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
 from rendergraph.glsl.reached import reached
 from rendergraph.program.messages import declared_at, mentioned_at
+from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.program.text import StageText, prefix, stage_texts
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, TextureDesc
 
+_PASSED: Remembered[None] = Remembered()
+"""Texts in which nothing was wrong."""
 Texts = Callable[[], Mapping[str, StageText]]
 """A program's texts, put together where they are looked at."""
 
@@ -55,14 +58,24 @@ def check_texts(
             continue  # its text is that of another step
         seen.add(key)
         try:
-            texts = stage_texts(step, types, resources, views)
-            check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
-            _check_samplers(step, texts, resources)
-            _check_outs(step, texts, types[step.node].cls)
+            whole = text_key(step, types, resources, views), _kept(step, resources)
+            _PASSED.get(whole, partial(_check_step, step, types, resources, views))
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
+
+
+def _check_step(
+    step: Step,
+    types: Mapping[str, NodeType],
+    resources: Mapping[str, Resource],
+    views: Mapping[str, ViewTable],
+) -> None:
+    texts = stage_texts(step, types, resources, views)
+    check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
+    _check_samplers(step, texts, resources)
+    _check_outs(step, texts, types[step.node].cls)
 
 
 # --- samplers --------------------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
 from rendergraph.program.images import with_formats
+from rendergraph.program.remembered import text_key
 from rendergraph.resources import folder
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
@@ -128,23 +129,10 @@ class StepTexts:
         Raises:
             InputError: a file is missing or cannot be put together (RG400 to RG409).
         """
-        node = self.types[step.node]
-        key = (
-            (node.cls, node.shaders),
-            replace(step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None),
-            tuple(replace(f, uniforms=tuple((name, 0) for name, _ in f.uniforms)) for f in step.functions),
-            tuple((replace(use, resource="", version=0), self._seen(use.resource)) for use in step.reads),
-            tuple((replace(use, resource="", version=0), self._seen(use.resource)) for use in step.writes),
-            tuple(defines.items()),
-        )
+        key = text_key(step, self.types, self.resources, self.views), tuple(defines.items())
         if key not in self._made:
             self._made[key] = stage_texts(step, self.types, self.resources, self.views, defines=defines)
         return {stage: replace(text, node=step.node) for stage, text in self._made[key].items()}
-
-    def _seen(self, id: str) -> object:
-        """What a text may tell of a resource."""
-        resource = self.resources[id]
-        return resource.desc, resource.lights, resource.view and self.views.get(resource.view, ViewTable()).count
 
 
 def read_defines(

@@ -1,0 +1,69 @@
+"""What has been found out about program texts, kept from one pipeline to the next: variants share most of theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from rendergraph import stamps
+from rendergraph.catalog import NodeType
+from rendergraph.expand import ViewTable
+from rendergraph.stamps import Stamp
+from rendergraph.steps import Resource, Step
+
+T = TypeVar("T")
+_MOST = 2048
+
+
+class Remembered(Generic[T]):
+    """Answers by key, each as long as the files that it was made from stay as they were; the oldest go first."""
+
+    def __init__(self, most: int = _MOST) -> None:
+        self._most = most
+        self._known: dict[Hashable, tuple[T, Mapping[Path, Stamp]]] = {}
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """The answer; what raises is asked again next time."""
+        found = self._known.get(key)
+        if found is not None and not stamps.changed(found[1]):
+            stamps.again(found[1])
+            return found[0]
+        with stamps.looking() as files:
+            value = make()
+        self._known.pop(key, None)
+        while len(self._known) >= self._most:
+            del self._known[next(iter(self._known))]
+        self._known[key] = value, files
+        return value
+
+
+def text_key(
+    step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
+) -> Hashable:
+    """All that `stage_texts` makes a step's texts of beside files: equal keys give equal texts, also of two graphs."""
+
+    def seen(id: str) -> Hashable:
+        resource = resources[id]
+        count = resource.view and views.get(resource.view, ViewTable()).count
+        return resource.desc, resource.lights, count
+
+    def made_of(node: str) -> Hashable:
+        type = types[node]
+        return type.cls, type.file, type.shaders, type.inherited
+
+    return (
+        made_of(step.node),
+        replace(step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None),
+        tuple(
+            (
+                replace(each, reads=(), uniforms=tuple((name, 0) for name, _ in each.uniforms)),
+                made_of(each.node),
+                tuple((replace(use, resource="", version=0), seen(use.resource)) for use in each.reads),
+            )
+            for each in step.functions
+        ),
+        tuple((replace(use, resource="", version=0), seen(use.resource)) for use in step.reads),
+        tuple((replace(use, resource="", version=0), seen(use.resource)) for use in step.writes),
+    )
