@@ -131,6 +131,18 @@ def _positive(text: str) -> float:
     return number
 
 
+def _executor(text: str) -> str:
+    from rendergraph.farm.choose import check_word
+
+    return check_word(text)
+
+
+def _devices(text: str) -> tuple[int, ...]:
+    if text and not re.fullmatch(r"[0-9]{1,4}(,[0-9]{1,4})*", text):
+        raise ValueError(f"'{text}' is not NUMBER,NUMBER, as `doctor` numbers GL devices")
+    return tuple(map(int, text.split(","))) if text else ()
+
+
 SIZE = Parsed("WxH", _size)
 FRAMES = Parsed("A-B", _frames)
 SETTING = Parsed("PATH=VALUE", _setting)
@@ -138,6 +150,8 @@ OUTPUT = Parsed("[NAME=]FILE", _output)
 TAP = Parsed("NODE.PORT=FILE", _tap)
 LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
+EXECUTOR = Parsed("WHO", _executor)
+DEVICES = Parsed("N,N", _devices)
 
 
 class NamedPath(click.Path):
@@ -162,6 +176,31 @@ plugin_option = click.option(
     "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node modules, or a folder of them: code."
 )
 device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
+
+
+def executor_options(function: F) -> F:
+    """Who does the work: the verb gets `executor`, `devices` and `timeout`."""
+    for decorate in reversed(
+        [
+            click.option(
+                "--executor",
+                type=EXECUTOR,
+                metavar="WHO",
+                help="Who draws: serial, processes[:N], dask[:N], dask://HOST:PORT.  [default: as suits the machine]",
+            ),
+            click.option(
+                "--devices", type=DEVICES, default="", metavar="N,N", help="GL devices that processes share out."
+            ),
+            click.option(
+                "--timeout",
+                type=POSITIVE,
+                metavar="SECONDS",
+                help="How long a worker may say nothing before another one gets its work.  [default: 600]",
+            ),
+        ]
+    ):
+        function = decorate(function)
+    return function
 
 
 def offered(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:

@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from contextvars import ContextVar
 from typing import Any, TextIO
@@ -67,6 +67,12 @@ def say(text: str, *, always: bool = False) -> None:
     """A word to the person, on stderr; `always` where it is why the exit code is not 0."""
     if always or not _Voice.quiet:
         _write(_printable(text, sys.stderr))
+
+
+def say_event(event: Mapping[str, Any]) -> None:
+    """What happens while work is done, as a line of JSON on stderr, for whoever watches by program."""
+    if not _Voice.quiet:
+        _write(json.dumps(jsonable(event), ensure_ascii=True, default=str))
 
 
 def tell(problem: Problem) -> None:

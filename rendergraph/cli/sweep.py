@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
-from rendergraph.cli.output import amount, emit, emit_json, on_terminal, say, table, warn
+from rendergraph.cli.output import amount, emit, emit_json, on_terminal, say, say_event, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis, Space
     from rendergraph.compare.listing import Listing
-    from rendergraph.compare.product import Pictures, Sweep
+    from rendergraph.compare.product import Sweep
     from rendergraph.compare.sampling import Sampling
     from rendergraph.compare.sweepfile import SweepFile
+    from rendergraph.compare.work import Pictures
     from rendergraph.session import Selection
 
 
@@ -93,6 +94,7 @@ GROUP = options.Parsed("PATH,PATH", _group)
 )
 @shared.title_option
 @shared.note_option
+@options.executor_options
 @options.json_option
 @options.device_option
 def command(
@@ -117,6 +119,9 @@ def command(
     thresholds: tuple[shared.Threshold, ...],
     title: str,
     note: str,
+    executor: str | None,
+    devices: tuple[int, ...],
+    timeout: float | None,
     as_json: bool,
     device: int | None,
     select: options.Select,
@@ -125,7 +130,8 @@ def command(
 
     PIPELINE is a pipeline, or a file with `sweep: 1`, `pipeline`, `axes`, and what else `explain sweep` lists; options
     win. A path is what -s takes: a parameter, an input, a node's type. Commas inside brackets belong to a value; ranges
-    include both ends. What several runs have in common is drawn once.
+    include both ends. What several runs have in common is drawn once. With --json, stderr has a line of JSON for each
+    event: what is done, by which worker, how fast, and the seconds left.
 
     \b
     Examples:
@@ -133,6 +139,7 @@ def command(
       rendergraph sweep ssao-hemisphere -x ao.samples=8,16 --metric ao.occlusion --size 96x54 --csv -o ao
       rendergraph sweep ssao-hemisphere -x ao.samples=8:64:8 -x ao.radius=log:0.1:10:5 --list
       rendergraph sweep ssao-hemisphere -x ao.samples=8:64 -x ao.radius=log:0.1:10 --samples 4 --size 64x36 -o lhs
+      rendergraph sweep forward -x shadows.taps=1,2,3 --executor processes:2 --size 64x36 -o two
       rendergraph sweep forward -x light.shading=phong,pbr --reference shading-pbr -o lit --size 160x90 --json
       rendergraph sweep forward -x light.shading=phong,pbr,unlit --reference shading-pbr -o lit --size 160x90 --resume
     """
@@ -196,7 +203,11 @@ def command(
                 "frame": frame,
                 "resume": resume,
                 "device": device,
-                "progress": on_terminal(),
+                "progress": on_terminal() and not as_json,
+                "executor": executor,
+                "devices": devices,
+                "timeout": timeout,
+                "events": say_event if as_json else None,
             }
             if minimise:
                 given |= {"minimise": minimise, "budget": budget or 50, "seed": space.seed}
@@ -320,7 +331,7 @@ def with_file(file: SweepFile, select: options.Select) -> options.Select:
 
 
 def _text(found: Sweep) -> str:
-    from rendergraph.compare.product import pareto
+    from rendergraph.compare.front import pareto
 
     comparison = found.comparison
     front = {result.name for result in pareto(comparison.results)}

@@ -64,32 +64,43 @@ def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int
         numbers: which of them.
         most_bytes: of textures in a batch; a single variant may have more.
     """
+    return [batch for cut in cuts(variants, numbers) for batch in fitting(variants, cut, most_bytes)]
+
+
+def cuts(variants: Sequence[Planned], numbers: Sequence[int], most: int = MOST_RUNS) -> list[list[int]]:
+    """The variants in groups, those together that share most of their first passes.
+
+    Args:
+        variants: all with one scene, camera and size.
+        numbers: which of them.
+        most: variants of a group.
+    """
     if not numbers:
         return []
     graphs = [variants[number].linked.graph for number in numbers]
     kin = dict(zip(numbers, kinship(graphs, passes(variants[numbers[0]].plan)), strict=True))
     waiting = sorted(numbers, key=kin.__getitem__)
-    found: list[Batch] = []
+    found: list[list[int]] = []
     while waiting:
-        cut = _cut([kin[number] for number in waiting])
-        found += _fitting(variants, waiting[:cut], most_bytes)
+        cut = _cut([kin[number] for number in waiting], most)
+        found.append(waiting[:cut])
         waiting = waiting[cut:]
     return found
 
 
-def _cut(kin: Sequence[tuple[int, ...]]) -> int:
-    """How many of the first variants are a batch: as many as may be, or some less where what follows shares less."""
-    if len(kin) <= MOST_RUNS:
+def _cut(kin: Sequence[tuple[int, ...]], most: int) -> int:
+    """How many of the first variants are a group: as many as may be, or some less where what follows shares less."""
+    if len(kin) <= most:
         return len(kin)
 
     def shared(at: int) -> int:
         differing = (place for place, pair in enumerate(zip(kin[at - 1], kin[at], strict=True)) if pair[0] != pair[1])
         return next(differing, len(kin[at]))
 
-    return min(range(MOST_RUNS, MOST_RUNS // 2, -1), key=shared)
+    return min(range(most, most // 2, -1), key=shared)
 
 
-def _fitting(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int) -> list[Batch]:
+def fitting(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int) -> list[Batch]:
     """These variants in one batch, or halved until each batch fits."""
     chosen = [variants[number] for number in numbers]
     merged = merge([variant.linked.graph for variant in chosen])
@@ -104,7 +115,7 @@ def _fitting(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: in
         if len(numbers) == 1:
             raise
     half = len(numbers) // 2
-    return [*_fitting(variants, numbers[:half], most_bytes), *_fitting(variants, numbers[half:], most_bytes)]
+    return [*fitting(variants, numbers[:half], most_bytes), *fitting(variants, numbers[half:], most_bytes)]
 
 
 def draw(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Iterator[Drawn]:

@@ -16,7 +16,7 @@ from rendergraph.compare.divergence import passes
 from rendergraph.compare.ledger import CHECKSUM, Ledger, checksum
 from rendergraph.compare.sources import sources_digest
 from rendergraph.compare.timing import NO_TIMES, Times
-from rendergraph.compare.values import Pixels, Result, machine
+from rendergraph.compare.values import Pixels, Result
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.jsonable import jsonable
 from rendergraph.metrics import Encoding, Metrics
@@ -24,6 +24,7 @@ from rendergraph.session.made import at_time, described
 from rendergraph.version import __version__
 
 if TYPE_CHECKING:
+    from rendergraph.link import Graph
     from rendergraph.session.values import Planned
 
 RUN = "run.json"
@@ -66,6 +67,11 @@ class Run:
         """The picture's file: light keeps its values."""
         return self.folder / (f"{self.output}.png" if self.output == "image" else f"{self.output}.exr")
 
+    @property
+    def metadata(self) -> dict[str, str]:
+        """What its picture says of how it was made."""
+        return {**described(self.planned.linked), **at_time(self.frame, 30.0)}
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -105,40 +111,62 @@ def key_of(planned: Planned, frame: int, against: str) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
-def keep(run: Run, result: Result, arrays: Mapping[str, Pixels], device: Mapping[str, object]) -> dict[str, Any]:
+def picture_bytes(graph: Graph, output: str, ending: str, pixels: Pixels, metadata: Mapping[str, str]) -> bytes:
+    """The file of an output's picture."""
+    from rendergraph.images import PictureInfo, Saved, encoded  # a sweep is checked without OpenImageIO
+
+    info = graph.textures[graph.outputs[output]]
+    shown = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
+    return encoded(Saved(Path(f"{output}{ending}"), pixels, shown, raw=False), metadata)
+
+
+def keep(
+    run: Run, result: Result, picture: bytes, device: Mapping[str, object], on: Mapping[str, str]
+) -> dict[str, Any]:
     """Write a run's picture and its `run.json`, as yet without times, and return the record.
+
+    Args:
+        run: which.
+        result: what is known of it.
+        picture: its file.
+        device, on: what drew it, and the machine.
 
     Raises:
         RenderError: the disk does not take it.
     """
-    from rendergraph.images import PictureInfo, Saved, save_outputs  # a sweep is checked without OpenImageIO
+    from rendergraph.images.files import failed, staged  # a sweep is checked without OpenImageIO
 
     try:
         run.folder.mkdir(exist_ok=True)
     except OSError as error:
         text = f"the folder cannot be made: {error.strerror}"
         raise RenderError(Problem("RG507", text, Place(str(run.folder)))) from error
-    graph = run.planned.linked.graph
-    info = graph.textures[graph.outputs[run.output]]
-    shown = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
-    picture = Saved(run.picture, arrays[run.output], shown, raw=False)
-    save_outputs([picture], {**described(run.planned.linked), **at_time(run.frame, 30.0)})
+    with staged([run.picture]) as (part,):
+        try:
+            part.write_bytes(picture)
+        except OSError as error:
+            raise failed(run.picture, error.strerror or str(error)) from error
     record = {
         "key": run.key,
         **jsonable(result.as_json()),
         **UNTIMED,
         "picture": f"{run.folder.name}/{run.picture.name}",
-        "picture_sha256": _digest(run.picture),
-        "size": list(graph.size),
+        "picture_sha256": hashlib.sha256(picture).hexdigest(),
+        "size": list(run.planned.linked.graph.size),
         "device": dict(device),
-        "machine": machine(),
+        "machine": dict(on),
     }
     _describe(run, record)
     return record
 
 
 def settle(
-    run: Run, record: Mapping[str, Any], times: Times, device: Mapping[str, object], ledger: Ledger
+    run: Run,
+    record: Mapping[str, Any],
+    times: Times,
+    device: Mapping[str, object],
+    on: Mapping[str, str],
+    ledger: Ledger,
 ) -> dict[str, Any]:
     """Add the times to a run that was kept, then its line to the results, and return the new record.
 
@@ -148,7 +176,7 @@ def settle(
         RenderError: the disk does not take it.
     """
     timed = {key: value for key, value in record.items() if key != CHECKSUM}
-    timed |= {**jsonable(times.as_json()), "device": dict(device), "machine": machine()}
+    timed |= {**jsonable(times.as_json()), "device": dict(device), "machine": dict(on)}
     _write_down(run, timed, ledger)
     return timed
 

@@ -8,7 +8,8 @@ import json
 from typing import Any
 
 from rendergraph.compare.columns import failed_row, row
-from rendergraph.compare.product import Sweep, pareto
+from rendergraph.compare.front import pareto
+from rendergraph.compare.product import Sweep
 
 
 def csv_text(found: Sweep) -> str:

@@ -6,6 +6,6 @@ do not depend on which executor it is.
 
 from __future__ import annotations
 
-from rendergraph.farm.tasks import Event, Executor, Failed, Finished, Item, Lost, Serial, Task, Worker
+from rendergraph.farm.tasks import Event, Executor, Failed, Finished, Handle, Item, Lost, Serial, Task, Worker
 
-__all__ = ["Event", "Executor", "Failed", "Finished", "Item", "Lost", "Serial", "Task", "Worker"]
+__all__ = ["Event", "Executor", "Failed", "Finished", "Handle", "Item", "Lost", "Serial", "Task", "Worker"]

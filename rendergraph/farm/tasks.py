@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from rendergraph.errors import DeviceError, InputError, Problem, RenderError, RendergraphError
 
 if TYPE_CHECKING:
+    from rendergraph.farm.bundle import Bundle
     from rendergraph.session.gpu import Gpu
 
 ATTEMPTS = 2
@@ -22,14 +24,23 @@ _OF_THE_DEVICE = frozenset({"RG612", "RG613", "RG614", "RG616"})
 """Errors that may be another on another device, or when less is done at once: memory, read-back, driver."""
 
 
+@dataclass(frozen=True)
+class Handle:
+    """Something that several tasks need, sent to a worker once; known by its content."""
+
+    digest: str
+
+
 class Task(ABC):
     """A piece of work that any worker can do: plain values that can be pickled, no GL and no open files.
 
     Attributes:
         name: what messages and events call it.
+        needs: what it takes from its worker, put there once.
     """
 
     name: str
+    needs: tuple[Handle, ...] = ()
 
     @abstractmethod
     def run(self, worker: Worker) -> Iterator[Any]:
@@ -48,12 +59,15 @@ class Worker:
     Attributes:
         name: for messages and events.
         kept: what a task leaves for the next ones here, by keys of its own.
+        root: the folder beneath which files lie that were sent here; None where they are found at their own places.
     """
+
+    root: Path | None = None
 
     def __init__(self, name: str, gpu: Gpu | None = None, device: int | None = None) -> None:
         self.name = name
         self.kept: dict[Any, Any] = {}
-        self.data: Mapping[str, bytes] = {}
+        self._values: dict[str, Any] = {}
         self._gpu, self._device = gpu, device
         self._stack = ExitStack()
 
@@ -69,6 +83,14 @@ class Worker:
 
             self._gpu = self._stack.enter_context(opened(None, self._device))
         return self._gpu
+
+    def give(self, handle: Handle, value: Any) -> None:
+        """Put something here that tasks need."""
+        self._values[handle.digest] = value
+
+    def take(self, handle: Handle) -> Any:
+        """What a handle stands for."""
+        return self._values[handle.digest]
 
     def close(self) -> None:
         """End the context, where it is its own."""
@@ -156,8 +178,16 @@ class Executor(AbstractContextManager["Executor"], ABC):
     def close(self) -> None:
         """End it at once, with what is still at work."""
 
-    def share(self, files: Sequence[Any]) -> None:
-        """Make data known to the workers; where they are this process there is nothing to do."""
+    @abstractmethod
+    def put(self, value: Any) -> Handle:
+        """Something that tasks need, which can be pickled; each worker gets it once."""
+
+    def bring(self, files: Bundle) -> None:
+        """Send what pipelines are drawn from to workers that do not share a disk with this process.
+
+        Raises:
+            InputError: a worker lacks a plugin that is needed, or has another version of something.
+        """
 
     def __enter__(self) -> Self:
         return self
@@ -208,6 +238,12 @@ class Serial(Executor):
                 yield Failed(task, self._worker.name, error)
             else:
                 yield Finished(task, self._worker.name, time.monotonic() - begun)
+
+    def put(self, value: Any) -> Handle:
+        """It stays where it is."""
+        handle = Handle(f"{id(value):x}")
+        self._worker.give(handle, value)
+        return handle
 
     def close(self) -> None:
         """End the context, where it is its own."""

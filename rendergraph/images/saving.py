@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -107,6 +108,18 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
         names = channel_names(info, shaped.shape[-1])
         jobs.append((path, shaped, names, "display" if decoded else "data", half))
     write_all(jobs, metadata)
+
+
+def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
+    """What `save_outputs` would write, for whoever writes it elsewhere.
+
+    Raises:
+        UsageError, InputError, RenderError: as from `save_outputs`.
+    """
+    with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
+        path = Path(folder) / file.path.name
+        save_outputs([file._replace(path=path)], metadata)
+        return path.read_bytes()
 
 
 def viewable_as(pixels: Pixels, info: Described) -> Bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeAlias
@@ -27,12 +28,15 @@ def shown(progress: Progress | bool | None, word: str) -> Iterator[Progress]:
     if not progress or sys.stderr is None:
         yield _nobody
         return
-    longest = 0
+    longest, begun, before = 0, time.monotonic(), 0
 
     def bar(done: int, total: int) -> None:
-        nonlocal longest
+        nonlocal longest, begun, before
+        if before == 0:  # what was there already took no time
+            begun, before = time.monotonic(), done
         full = _WIDTH * done // max(1, total)
         text = f"{'█' * full}{'·' * (_WIDTH - full)} {done} of {total} {word}"
+        text += _pace(done - before, total - done, time.monotonic() - begun)
         longest = max(longest, len(text))
         encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
         sys.stderr.write("\r" + text.encode(encoding, "replace").decode(encoding))
@@ -43,6 +47,15 @@ def shown(progress: Progress | bool | None, word: str) -> Iterator[Progress]:
     finally:
         sys.stderr.write("\r" + " " * longest + "\r")
         sys.stderr.flush()
+
+
+def _pace(done: int, left: int, seconds: float) -> str:
+    """How fast it goes, and the time that is left, once that can be told."""
+    if done < 1 or seconds < 1 or not left:
+        return ""
+    wait = left * seconds / done
+    told = f"{wait:.0f} s" if wait < 120 else f"{wait / 60:.0f} min" if wait < 7200 else f"{wait / 3600:.1f} h"
+    return f", {done / seconds:.3g} a second, {told} left"
 
 
 def _nobody(done: int, total: int) -> None:

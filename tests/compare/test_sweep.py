@@ -14,14 +14,15 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.cli.compare import summary
-from rendergraph.compare import product
+from rendergraph.compare import groups
 from rendergraph.compare.axes import Axis, Space, parse_axis, pipelines, typed
 from rendergraph.compare.batches import batches
 from rendergraph.compare.columns import line_schema
+from rendergraph.compare.front import pareto
 from rendergraph.compare.ledger import Ledger, checksum
 from rendergraph.compare.listing import listed
 from rendergraph.compare.prepare import prepare
-from rendergraph.compare.product import pareto, sweep
+from rendergraph.compare.product import sweep
 from rendergraph.compare.report import sweep_page
 from rendergraph.compare.study import RESULTS, kept_runs
 from rendergraph.compare.table import csv_text
@@ -155,7 +156,7 @@ def test_runs_are_kept_before_they_are_measured(
 
     axes = AXES[:1]
     with monkeypatch.context() as patched:
-        patched.setattr(product, "measure", interrupted)
+        patched.setattr(groups, "measure", interrupted)
         with pytest.raises(KeyboardInterrupt):
             sweep(base, axes, tmp_path, frames=1, session=gl)
     assert kept_runs(tmp_path) == 2

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from html import escape
 
+from rendergraph.compare.front import pareto
 from rendergraph.compare.goals import Search
-from rendergraph.compare.product import Sweep, pareto
+from rendergraph.compare.product import Sweep
 from rendergraph.compare.report.parts import (
     Section,
     card,

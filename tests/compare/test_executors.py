@@ -1,0 +1,212 @@
+"""Sweeps whose runs are drawn elsewhere: the same pictures and rows, whoever draws them and whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rendergraph as rg
+from rendergraph.compare.ledger import Ledger
+from rendergraph.compare.product import Sweep, sweep
+from rendergraph.compare.study import RESULTS
+from rendergraph.errors import InputError, UsageError
+from rendergraph.farm.processes import Processes
+
+MAKE = """// Stripes.
+/*---
+outputs:
+  color: {semantic: radiance, format: rgba32f, doc: Stripes.}
+params:
+  wave: {default: 1.0, min: 0, max: 99, doc: How many.}
+---*/
+uniform float wave;
+out vec4 color;
+void main() { color = vec4(fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * wave), wave, 0.25, 1.0); }
+"""
+BEND = """// Powers.
+/*---
+inputs:
+  source: {semantic: radiance, doc: What.}
+outputs:
+  color: {semantic: radiance, format: rgba16f, doc: A power of it.}
+params:
+  power: {default: 1, min: 1, max: 9, role: define, doc: Which.}
+  gain: {default: 1.0, min: 0, max: 9, doc: Then.}
+---*/
+uniform sampler2D source;
+uniform float gain;
+out vec4 color;
+void main() {
+    vec4 seen = texelFetch(source, ivec2(gl_FragCoord.xy), 0);
+    color = gain * pow(seen, vec4(float(POWER)));
+#if POWER == 9
+    color = vec4(nonsense);
+#endif
+}
+"""
+FILE = """rendergraph: 1
+size: [16, 9]
+nodes:
+  make: {type: ./make.frag}
+  bend: {type: ./bend.frag, inputs: {source: make.color}}
+outputs: {radiance: bend.color}
+"""
+AXES: Mapping[str, list[float]] = {
+    "make.wave": list(range(1, 5)),
+    "bend.power": [1, 2, 3, 4],
+    "bend.gain": [0.5, 1, 2, 3],
+}
+FEW: Mapping[str, list[float]] = {"make.wave": [1, 2, 3], "bend.power": [1, 2]}
+
+
+@pytest.fixture
+def base(tmp_path: Path) -> rg.Pipeline:
+    for name, text in (("make.frag", MAKE), ("bend.frag", BEND), ("p.yaml", FILE)):
+        (tmp_path / name).write_text(text)
+    return rg.load(tmp_path / "p.yaml")
+
+
+def rows(folder: Path) -> dict[str, dict[str, Any]]:
+    """Each run's row, without what is measured in seconds and where."""
+    measured = ("frame_ms", "gpu_ms", "cpu_ms", "passes", "repeats", "machine", "device", "sha256")
+    records, torn = Ledger(folder / RESULTS).read()
+    assert torn == 0
+    found = {record["name"]: {key: value for key, value in record.items() if key not in measured} for record in records}
+    assert len(found) == len(records)
+    return found
+
+
+def pictures(folder: Path) -> dict[str, bytes]:
+    return {path.parent.name: path.read_bytes() for path in folder.glob("*/*.exr")}
+
+
+def test_64_variants_are_the_same_one_by_one_and_by_processes(
+    base: rg.Pipeline, gl: rg.Session, tmp_path: Path
+) -> None:
+    here = sweep(base, AXES, tmp_path / "here", frames=1, session=gl)
+    told: list[Mapping[str, Any]] = []
+    there = sweep(base, AXES, tmp_path / "there", frames=1, executor="processes:2", events=told.append)
+    same(here, tmp_path / "here", there, tmp_path / "there")
+    assert len(rows(tmp_path / "there")) == 64
+    # The first run is drawn alone, before all others, whose passes it would share; that is all that is drawn more.
+    assert (here.executed, there.executed) == (4 * (1 + 16), 4 * (1 + 16) + 1)
+    assert {event["worker"] for event in told} == {"process-0", "process-1"}
+    assert [event["done"] for event in told if event["event"] == "run"] == list(range(1, 65))
+    last = [event for event in told if event["event"] == "run"][-1]
+    assert (last["of"], last["seconds_left"], last["failed"]) == (64, 0.0, False)
+
+
+def same(one: Sweep, first: Path, other: Sweep, second: Path) -> None:
+    """Two sweeps have the same results."""
+    assert rows(first) == rows(second)
+    assert pictures(first) == pictures(second)
+    for a, b in zip(one.comparison.results, other.comparison.results, strict=True):
+        assert (a.name, a.metrics, a.radiance_rmse) == (b.name, b.metrics, b.radiance_rmse)
+        assert a.pixels is not None and b.pixels is not None and a.pixels.tobytes() == b.pixels.tobytes()
+        assert (a.flip_map is None) == (b.flip_map is None)
+        assert a.flip_map is None or b.flip_map is None or a.flip_map.tobytes() == b.flip_map.tobytes()
+
+
+def test_a_worker_that_is_killed_costs_nothing_but_time(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    here = sweep(base, FEW, tmp_path / "here", frames=1, session=gl)
+    farm = Processes(2)
+    killed: list[int] = []
+
+    def kill(event: Mapping[str, Any]) -> None:
+        told.append(event["event"])
+        busy = [seat.child.process.pid for seat in farm._seats if seat.child is not None and seat.task is not None]
+        if not killed and busy:
+            killed.append(busy[0])
+            os.kill(busy[0], signal.SIGKILL)
+
+    told: list[str] = []
+    with farm:
+        there = sweep(base, FEW, tmp_path / "there", frames=1, executor=farm, events=kill)
+    assert killed
+    assert "lost" in told
+    assert there.failures == ()
+    same(here, tmp_path / "here", there, tmp_path / "there")
+
+
+DEADLY = '''"""A node that ends the process that draws it, where that is no test."""
+
+import os
+import signal
+import sys
+
+from rendergraph.api import Node, Output, Radiance, Steps, define
+
+
+class Deadly(Node):
+    """One colour."""
+
+    color = Output(Radiance, format="rgba16f", clear=0.5, doc="The colour.")
+    dose: int = define(default=1, min=1, max=9, doc="Deadly at 3.")
+
+    def record(self, steps: Steps) -> None:
+        """Nothing but a clear."""
+        if self.dose == 3 and "pytest" not in sys.modules:
+            os.kill(os.getpid(), signal.SIGKILL)
+        steps.clear(self.color, 0.5)
+'''
+
+
+def test_a_run_that_is_deadly_is_a_row_with_its_reason_and_resume_tries_it_again(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "plugin").mkdir()
+    (tmp_path / "plugin" / "deadly.py").write_text(DEADLY)
+    file = tmp_path / "p.yaml"
+    file.write_text("rendergraph: 1\nsize: [8, 8]\nnodes: {a: {type: deadly}}\noutputs: {radiance: a.color}\n")
+    base, axes, out = rg.load(file, plugins=[tmp_path / "plugin"]), {"a.dose": [1, 2, 3, 4, 5]}, tmp_path / "out"
+    found = sweep(base, axes, out, frames=1, executor="processes:2")
+    assert [result.name for result in found.comparison.results] == [f"a.dose={dose}" for dose in (1, 2, 4, 5)]
+    (failure,) = found.failures
+    assert failure.name == "a.dose=3"
+    assert "RG640 worker" in failure.text
+    assert "SIGKILL" in failure.text
+    assert rows(out)["a.dose=3"]["error"] == failure.text
+
+
+def test_a_value_that_fails_is_a_row_there_as_here(base: rg.Pipeline, tmp_path: Path) -> None:
+    found = sweep(base, {"bend.power": [1, 9, 2]}, tmp_path / "out", frames=1, executor="processes:2")
+    assert [result.name for result in found.comparison.results] == ["bend.power=1", "bend.power=2"]
+    assert "nonsense" in found.failures[0].text
+
+
+def test_a_file_that_changes_meanwhile_is_told(base: rg.Pipeline, tmp_path: Path) -> None:
+    def change(event: Mapping[str, Any]) -> None:
+        (tmp_path / "make.frag").write_text(MAKE.replace("0.25", "0.5"))
+
+    found = sweep(base, FEW, tmp_path / "out", frames=1, executor="processes:1", events=change)
+    assert len(found.comparison.results) == 6  # one group, begun before: what it was planned of was read before, too
+    with Processes(2) as farm:
+        (tmp_path / "make.frag").write_text(MAKE)
+        told = sweep(base.set("bend.gain", 2), FEW, tmp_path / "b", frames=1, executor=farm, events=change)
+    assert told.failures
+    assert all("RG642" in failure.text and "a file has changed" in failure.text for failure in told.failures)
+
+
+def test_node_classes_at_hand_are_drawn_here_alone(make: Any, tmp_path: Path) -> None:
+    pattern = make({"a": {"type": "pattern", "params": {}}}, "a.color")
+    axes = {"a.seed": [1.0, 2.0]}
+    assert len(sweep(pattern, axes, tmp_path / "a", frames=1).comparison.results) == 2
+    with pytest.raises(UsageError, match="RG641 node classes that are at hand cannot be sent"):
+        sweep(pattern, axes, tmp_path / "b", frames=1, executor="processes:2")
+
+
+def test_two_sweeps_do_not_share_a_folder_whoever_draws(base: rg.Pipeline, tmp_path: Path) -> None:
+    def second(event: Mapping[str, Any]) -> None:
+        with pytest.raises(InputError, match=r"RG504 .*another sweep is at work in it"):
+            sweep(base, FEW, tmp_path / "out", frames=1, executor="processes:2", resume=True)
+        seen.append(json.dumps(event))
+
+    seen: list[str] = []
+    sweep(base, {"bend.power": [1, 2]}, tmp_path / "out", frames=1, executor="processes:1", events=second)
+    assert seen
