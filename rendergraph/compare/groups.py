@@ -15,7 +15,7 @@ from rendergraph.compare.timing import Times
 from rendergraph.compare.values import Pixels, machine, not_finite_pixels
 from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.farm import Handle, Task, Worker
-from rendergraph.farm.bundle import placed
+from rendergraph.farm.bundle import at_home, placed
 from rendergraph.farm.tasks import of_the_worker
 from rendergraph.metrics import Encoding, Metrics
 from rendergraph.session import stages
@@ -56,7 +56,7 @@ class Variant:
     @classmethod
     def of(cls, run: Run, number: int, *, drawn: bool) -> Variant:
         """A run as a worker has to know it."""
-        selection, digest = run.planned.linked.selection, sources_digest(run.planned)
+        selection, digest = run.planned.linked.selection, _drawn_from(run.planned)
         ending, metadata = run.picture.suffix, run.metadata
         return cls(number, run.name, selection, digest, run.output, ending, metadata, drawn, run.planned)
 
@@ -75,10 +75,16 @@ class Variant:
         pipeline = Pipeline(placed(self.selection, worker.root), catalog)
         worker.kept["catalog"] = pipeline.resolve().catalog
         planned = stages.plan(stages.expand(pipeline.link()))
-        if sources_digest(planned) != self.digest:
+        if _drawn_from(planned) != self.digest:
             text = f"what '{self.name}' is drawn from is not the same on worker '{worker.name}' as when the work began"
             raise InputError(Problem("RG642", f"{text}: a file has changed, or another version is installed there"))
         return planned
+
+
+def _drawn_from(planned: Planned) -> str:
+    """What decides the picture and its figures beside the resolved file."""
+    metrics = sorted(metric.name for metric in planned.linked.catalog.extensions.metrics())
+    return f"{sources_digest(planned)} {' '.join(metrics)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +206,7 @@ class Group(Task):
                 if self.against is None:
                     raise
                 planned.append(None)
-                yield Unable(variant.number, error)
+                yield Unable(variant.number, _at_home(error, worker))
         variants = [each for each in planned if each is not None]
         own = [variant for variant, each in zip(self.variants, planned, strict=True) if each is not None]
         against: Against | None = worker.take(self.against) if self.against is not None else None
@@ -222,7 +228,7 @@ class Group(Task):
                 elif against is None or of_the_worker(error):
                     raise
                 else:
-                    yield Unable(own[batch.numbers[0]].number, error)
+                    yield Unable(own[batch.numbers[0]].number, _at_home(error, worker))
 
     def _batch(
         self, worker: Worker, batch: Batch, variants: Sequence[Planned], own: Sequence[Variant], against: Against | None
@@ -245,6 +251,12 @@ class Group(Task):
         for place, times in taken:
             yield Timed(own[place].number, times, device, on)
         yield Passes(batch.pass_count)
+
+
+def _at_home(error: InputError | RenderError, worker: Worker) -> InputError | RenderError:
+    found = at_home(error, worker.root)
+    assert isinstance(found, InputError | RenderError)  # of the same kind
+    return found
 
 
 def _compared(

@@ -42,6 +42,12 @@ class Prepared:
     study: Mapping[str, Any]
     notes: tuple[str, ...]
 
+    @property
+    def modules(self) -> set[str]:
+        """The modules of the node classes in use."""
+        planned = [run.planned for run in self.runs] + ([self.other] if self.other else [])
+        return {type(node.node).__module__ for each in planned for node in each.linked.graph.nodes}
+
 
 def prepare(
     base: Pipeline,

@@ -17,8 +17,10 @@ from rendergraph.compare.runs import RUN, Failure
 from rendergraph.compare.study import begin, claimed, open_folder
 from rendergraph.compare.values import Comparison, Reference
 from rendergraph.compare.work import Events, Pictures, Work
+from rendergraph.farm.bundle import bundled
 from rendergraph.farm.choose import Where, chosen
 from rendergraph.session.progress import Progress, shown
+from rendergraph.stamps import looking
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
@@ -140,7 +142,8 @@ def sweep(
         DeviceError: there is no usable GL device.
     """
     out = Path(out)
-    planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
+    with looking() as files:
+        planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
     runs = planned.runs
     with claimed(out):
         ledger, lines, torn = open_folder(out, planned.study, resume=resume)
@@ -161,6 +164,7 @@ def sweep(
                 ) as farm,
                 shown(progress, "runs") as tell,
             ):
+                farm.bring(lambda: bundled(files, base.selection.plugins, planned.modules))
                 begin(out, planned.study)
                 work.draw(farm, tell)
     results = tuple(work.results[number] for number in sorted(work.results))

@@ -81,7 +81,7 @@ def end_with(parent: int) -> None:
         os._exit(1)
 
 
-def work(pipe: int, name: str, device: int | None, root: str | None) -> None:
+def work(pipe: int, name: str, device: int | None, root: str | None = None, home: str | None = None) -> None:
     """What a process does that works on tasks: one after the other, until the pipe ends.
 
     It is told `(give, digest, value)` and `(run, task)`, and tells `ready` or `unable` once, then of each task
@@ -92,12 +92,16 @@ def work(pipe: int, name: str, device: int | None, root: str | None) -> None:
         name: what it is called.
         device: GL device number.
         root: the folder beneath which files lie that were sent here.
+        home: the current folder, as it is called where they came from.
     """
     from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError
+    from rendergraph.farm.bundle import at_home
     from rendergraph.farm.tasks import Handle, Worker
 
     worker = Worker(name, device=device)
-    worker.root = Path(root) if root is not None else None
+    if root is not None and home is not None:
+        worker.root = Path(root)
+        os.chdir(worker.root / Path(home).relative_to("/"))
     with Connection(pipe) as end, contextlib.closing(worker), contextlib.suppress(EOFError, OSError):
         try:
             end.send(("ready", worker.gpu.device.as_json()))
@@ -114,7 +118,7 @@ def work(pipe: int, name: str, device: int | None, root: str | None) -> None:
                 for value in told[0].run(worker):
                     end.send(("item", value))
             except RendergraphError as error:
-                end.send(("failed", error))
+                end.send(("failed", at_home(error, worker.root)))
             except MemoryError:
                 end.send(("failed", RenderError(Problem("RG640", "the worker ran out of memory"))))
             else:

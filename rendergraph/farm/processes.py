@@ -103,7 +103,7 @@ class Processes(Executor):
 
     def _assign(self, seat: _Seat, task: Task) -> Iterator[Event]:
         if seat.child is None:
-            words = {"name": seat.name, "device": seat.device, "root": None}
+            words = {"name": seat.name, "device": seat.device}
             seat.ready = False
             seat.child, seat.has = started("rendergraph.farm.child:work", words, self._environment), set()
         seat.task, seat.heard = task, time.monotonic()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -182,7 +182,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
     def put(self, value: Any) -> Handle:
         """Something that tasks need, which can be pickled; each worker gets it once."""
 
-    def bring(self, files: Bundle) -> None:
+    def bring(self, make: Callable[[], Bundle]) -> None:
         """Send what pipelines are drawn from to workers that do not share a disk with this process.
 
         Raises:

@@ -108,7 +108,9 @@ def same(one: Sweep, first: Path, other: Sweep, second: Path) -> None:
     assert pictures(first) == pictures(second)
     for a, b in zip(one.comparison.results, other.comparison.results, strict=True):
         assert (a.name, a.metrics, a.radiance_rmse) == (b.name, b.metrics, b.radiance_rmse)
-        assert a.pixels is not None and b.pixels is not None and a.pixels.tobytes() == b.pixels.tobytes()
+        assert a.pixels is not None
+        assert b.pixels is not None
+        assert a.pixels.tobytes() == b.pixels.tobytes()
         assert (a.flip_map is None) == (b.flip_map is None)
         assert a.flip_map is None or b.flip_map is None or a.flip_map.tobytes() == b.flip_map.tobytes()
 

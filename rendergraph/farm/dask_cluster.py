@@ -1,0 +1,276 @@
+"""A Dask cluster as an executor: one that is started here, one at an address, or whatever a `Client` leads to."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import pickle
+import queue
+import time
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeAlias
+from uuid import uuid4
+
+from rendergraph.errors import InputError, Problem, RenderError, UsageError
+from rendergraph.farm.bundle import Bundle, bundled, version_of
+from rendergraph.farm.tasks import ATTEMPTS, Event, Executor, Failed, Finished, Handle, Item, Lost, Task, of_the_worker
+
+Client: TypeAlias = Any  # an extra, of which most is not typed
+Cluster: TypeAlias = Any
+Future: TypeAlias = Any
+
+CONNECT = 10.0
+"""Seconds for a scheduler to answer, and to come back."""
+_POLL = 0.25
+
+
+def need() -> None:
+    """Make sure that Dask is installed.
+
+    Raises:
+        UsageError: it is not; how to get it.
+    """
+    if find_spec("distributed") is None:
+        raise UsageError(Problem("RG500", "a Dask cluster needs distributed; pip install 'rendergraph[farm]'"))
+
+
+def local(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
+    """A cluster on this machine, which ends with its work.
+
+    Raises:
+        UsageError: Dask is not installed.
+    """
+    need()
+    distributed: Any = import_module("distributed")
+    # Its workers are threads of this process: each does its work in a process of its own, by its station, and Dask's way
+    # of starting processes would run the caller's script once more.
+    cluster = distributed.LocalCluster(
+        n_workers=count, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+    )
+    return Dask(distributed.Client(cluster, set_as_default=False), devices, timeout=timeout, cluster=cluster)
+
+
+def of(where: Any, device: int | None, *, timeout: float) -> Dask:
+    """The cluster at an address, `dask://host:port`, or of a `Client`, which stays open.
+
+    Raises:
+        UsageError: Dask is not installed, or this is neither.
+        RenderError: nobody answers there.
+    """
+    need()
+    distributed: Any = import_module("distributed")
+    if isinstance(where, distributed.Client):
+        return Dask(where, (device,), timeout=timeout)
+    if not isinstance(where, str):
+        text = f"an executor is a word, an Executor, or a Dask Client, not {type(where).__name__}"
+        raise UsageError(Problem("RG641", text))
+    address = where.removeprefix("dask://")
+    try:
+        client = distributed.Client(f"tcp://{address}", timeout=CONNECT, set_as_default=False)
+    except OSError:
+        text = f"no Dask scheduler answers at {address}; start one: dask scheduler"
+        raise RenderError(Problem("RG641", text)) from None
+    if not _workers(client):
+        client.close()
+        text = f"the Dask scheduler at {address} has no workers; start some: dask worker {address}"
+        raise RenderError(Problem("RG641", text))
+    return Dask(client, (device,), timeout=timeout, owned=True)
+
+
+def _workers(client: Client) -> dict[str, Any]:
+    found: dict[str, Any] = client.scheduler_info(n_workers=-1)["workers"]
+    return found
+
+
+class Dask(Executor):
+    """A Dask cluster. A worker does one task at a time; where any has `resources={'GPU': 1}`, only those are used."""
+
+    def __init__(
+        self,
+        client: Client,
+        devices: Sequence[int | None] = (None,),
+        *,
+        timeout: float,
+        cluster: Cluster = None,
+        owned: bool = False,
+    ) -> None:
+        """Take a client.
+
+        Args:
+            client: of the cluster.
+            devices: GL device numbers that workers named by number share out.
+            timeout: seconds that a worker may say nothing.
+            cluster: that ends with the work.
+            owned: whether the client is closed with it.
+        """
+        workers = _workers(client)
+        self._resources = {"GPU": 1} if any("GPU" in each["resources"] for each in workers.values()) else None
+        self.workers = max(1, sum(self._resources is None or "GPU" in each["resources"] for each in workers.values()))
+        self.described = f"{self.workers} Dask workers"
+        self._client, self._cluster, self._owned = client, cluster, owned or cluster is not None
+        self._devices, self._timeout = devices, timeout
+        self._station = f"rendergraph-{uuid4().hex[:12]}"
+        self._bundle: Bundle | None = None
+        self._files: dict[str, Future] = {}
+        self._values: dict[str, Future] = {}
+        self._done: queue.SimpleQueue[Future] = queue.SimpleQueue()
+        self._tasks: dict[str, Task] = {}
+        self._futures: dict[str, Future] = {}
+        self._tried: dict[Task, int] = {}
+
+    def bring(self, make: Callable[[], Bundle]) -> None:
+        """Send files, and ask every worker whether it can be used.
+
+        Raises:
+            InputError: one lacks a plugin that is needed, or has another version of something.
+        """
+        from rendergraph.farm.dask_worker import Station, fitness
+
+        bundle = make()
+        paths = {digest: path for path, digest in bundle.files.items()}
+        wanted = {digest: path for digest, path in paths.items() if digest not in self._files}
+        self._files |= self._scattered({digest: Path(path).read_bytes() for digest, path in wanted.items()})
+        if self._bundle is None:
+            station = Station(self._station, bundle.packages, tuple(self._devices), self._timeout)
+            try:
+                self._client.register_plugin(station, name=self._station)
+                told = self._client.run(fitness, self._station, on_error="return")
+            except (ImportError, AttributeError, RuntimeError, OSError) as error:
+                raise self._without(str(error)) from error
+            problems = []
+            for worker, unfit in told.items():
+                if unfit is not None:
+                    found = unfit if isinstance(unfit, InputError) else self._without(f"{worker}: {unfit}")
+                    problems += list(found.problems)
+            if problems:
+                raise InputError(problems)
+        self._bundle = bundle
+
+    @staticmethod
+    def _without(error: str) -> InputError:
+        way = f"install it there: pip install 'rendergraph[farm]=={version_of('rendergraph')}'"
+        return InputError(Problem("RG642", f"a worker cannot use rendergraph ({' '.join(error.split())[:200]}); {way}"))
+
+    def _scattered(self, contents: dict[str, bytes]) -> dict[str, Future]:
+        """Contents by what they are known by; Dask keeps one of each for a worker that needs it."""
+        if not contents:
+            return {}
+        named = {f"rendergraph-{digest}": content for digest, content in contents.items()}
+        found = self._client.scatter(named, hash=False)
+        return {key.removeprefix("rendergraph-"): future for key, future in found.items()}
+
+    def put(self, value: Any) -> Handle:
+        """Sent to the cluster, and from there to workers whose tasks need it."""
+        data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
+        handle = Handle(hashlib.sha256(data).hexdigest())
+        if handle.digest not in self._values:
+            self._values |= self._scattered({handle.digest: data})
+        return handle
+
+    def submit(self, task: Task) -> None:
+        """One more task."""
+        from rendergraph.farm.dask_worker import perform
+
+        if self._bundle is None:
+            self.bring(lambda: bundled((), ()))
+        assert self._bundle is not None
+        digests = sorted(set(self._bundle.files.values()))
+        needs = [handle.digest for handle in task.needs]
+        future = self._client.submit(
+            perform,
+            self._station,
+            pickle.dumps(task, protocol=pickle.HIGHEST_PROTOCOL),
+            needs,
+            self._bundle,
+            digests,
+            *(self._files[digest] for digest in digests),
+            *(self._values[digest] for digest in needs),
+            key=f"{self._station}-{uuid4().hex}",
+            pure=False,
+            retries=0,
+            resources=self._resources,
+        )
+        self._tasks[future.key], self._futures[future.key] = task, future
+        future.add_done_callback(self._done.put)
+
+    def events(self) -> Iterator[Event]:
+        """What comes from the workers, when a task is over."""
+        gone = None
+        while self._tasks:
+            try:
+                future = self._done.get(timeout=_POLL)
+            except queue.Empty:
+                gone = self._answers(gone)
+                continue
+            task = self._tasks.pop(future.key, None)
+            self._futures.pop(future.key, None)
+            if task is not None:
+                yield from self._told(task, future)
+
+    def _answers(self, gone: float | None) -> float | None:
+        """Since when the scheduler has not answered, None where it does.
+
+        Raises:
+            RenderError: for too long.
+        """
+        if self._client.status == "running":
+            return None
+        gone = gone or time.monotonic()
+        if self._client.status in ("closed", "closing") or time.monotonic() - gone > CONNECT:
+            raise RenderError(
+                Problem("RG641", "the Dask scheduler is gone; what is finished is kept: --resume goes on")
+            )
+        return gone
+
+    def _told(self, task: Task, future: Future) -> Iterator[Event]:
+        begun = time.monotonic()
+        if future.status in ("cancelled", "lost"):
+            while self._client.status == "connecting":
+                time.sleep(_POLL)
+                self._answers(begun)
+            self._answers(None)
+            yield from self._lost(task, "scheduler", RenderError(Problem("RG640", "the cluster lost the task")))
+            return
+        if future.status == "error":
+            error = future.exception()
+            text = f"worker lost: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
+            yield from self._lost(task, "cluster", RenderError(Problem("RG640", text)))
+            return
+        worker, told = future.result()
+        for kind, value in told:
+            if kind == "item":
+                yield Item(task, value, worker)
+            elif kind == "finished":
+                yield Finished(task, worker, value)
+            elif kind == "lost" or of_the_worker(value):
+                yield from self._lost(task, worker, value)
+            else:
+                yield Failed(task, worker, value)
+
+    def _lost(self, task: Task, worker: str, error: Any) -> Iterator[Event]:
+        self._tried[task] = self._tried.get(task, 0) + 1
+        if self._tried[task] < ATTEMPTS:
+            self.submit(task)
+            yield Lost(task, worker, tuple(error.problems))
+        else:
+            yield Failed(task, worker, error, lost=True)
+
+    def close(self) -> None:
+        """Leave the cluster: what still runs for us there ends, and so does a cluster that was started for it."""
+        self._tasks.clear()
+        with contextlib.suppress(Exception):  # it may be gone, in any way
+            if self._client.status == "running":
+                self._client.cancel(list(self._futures.values()), force=True)
+                if self._cluster is None and self._bundle is not None:
+                    self._client.unregister_worker_plugin(self._station)
+        self._futures.clear()
+        self._files.clear()
+        self._values.clear()
+        with contextlib.suppress(Exception):
+            if self._owned:
+                self._client.close(timeout=1)
+            if self._cluster is not None:
+                self._cluster.close(timeout=1)
