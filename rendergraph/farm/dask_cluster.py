@@ -45,8 +45,8 @@ def local(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
     """
     need()
     distributed: Any = import_module("distributed")
-    # Its workers are threads of this process: each does its work in a process of its own, by its station, and Dask's way
-    # of starting processes would run the caller's script once more.
+    # Its workers are threads of this process, and each works in a process of its own, by its station: Dask's own way of
+    # starting processes would run the caller's script once more.
     cluster = distributed.LocalCluster(
         n_workers=count, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
     )
