@@ -8,7 +8,7 @@ answers them, so that one that was interrupted ends where it would have ended.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +20,7 @@ from rendergraph.compare.prepare import check_sweep
 from rendergraph.compare.product import Sweep, sweep
 from rendergraph.compare.values import Result
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
+from rendergraph.farm.choose import Where, chosen
 from rendergraph.session.progress import Progress, shown
 from rendergraph.session.wanted import figures
 
@@ -74,13 +75,16 @@ def search(
     resume: bool = False,
     session: Gpu | None = None,
     device: int | None = None,
+    executor: Where = None,
+    devices: Sequence[int] = (),
+    timeout: float | None = None,
     progress: Progress | bool | None = None,
     **options: Any,
 ) -> Sweep:
     """Look for the settings that make one thing, or several at once, as small as can be.
 
     Args:
-        base, axes, out, reference, session, device, progress: as for `sweep`; spans are as good as values.
+        base, axes, out, reference, session, device, executor, devices, timeout, progress: as for `sweep`; spans are as good as values.
         minimise: `flip`, `rmse`, `radiance_rmse`, `ms` (the time of a frame), `bytes` (of textures), a metric that a
             plugin adds, or a figure of the pipeline; of several the whole front is looked for.
         budget: how many runs are asked for; those that are asked for twice count twice.
@@ -93,19 +97,19 @@ def search(
         UsageError: Optuna is not installed.
         RenderError, DeviceError: as from `sweep`.
     """
-    from rendergraph.session.gpu import opened  # a search is checked without GL
-
     need()
     space = Space.of(axes)
     check_search(base, space, reference, minimise, options.get("metric"))
     knobs = {knob.name: knob for knob in map(_Knob, space.groups)}
     trials: list[tuple[dict[str, str], Result | None]] = []
-    own = opened(session, device) if options.get("executor") is None else nullcontext(session)
-    with own as gpu, shown(progress, "runs") as tell:
+    who = chosen(
+        executor, session, device, tasks=1, devices=devices, timeout=timeout, travels=base.catalog is None
+    )  # a few runs at a time are one group: this process, unless somebody is named
+    with who as farm, shown(progress, "runs") as tell:
 
         def drawn(runs: Sequence[Mapping[str, str]], *, again: bool) -> Sweep:
             chosen, begun = replace(space, chosen=tuple(runs)), len(trials)
-            given = {**options, "resume": again, "session": gpu, "device": device}
+            given = {**options, "resume": again, "executor": farm}
             return sweep(
                 base, chosen, out, reference, **given, progress=lambda done, _: tell(min(begun + done, budget), budget)
             )
