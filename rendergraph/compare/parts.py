@@ -90,7 +90,7 @@ def draw_frames(
         InputError, RenderError: as from drawing.
     """
     from rendergraph.images import Saved, numbered, save_outputs  # whoever exports a job needs no OpenImageIO
-    from rendergraph.session import RenderOptions, stages
+    from rendergraph.session import RenderOptions, stages  # nor this
 
     for run in prepare(base, axes, out, None, metric=metric, only=only).runs:
         linked = run.planned.linked
