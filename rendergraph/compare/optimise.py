@@ -84,7 +84,8 @@ def search(
     """Look for the settings that make one thing, or several at once, as small as can be.
 
     Args:
-        base, axes, out, reference, session, device, executor, devices, timeout, progress: as for `sweep`; spans are as good as values.
+        base, axes, out, reference, session, device, progress: as for `sweep`; spans are as good as values.
+        executor, devices, timeout: likewise; it stays from one batch of runs to the next.
         minimise: `flip`, `rmse`, `radiance_rmse`, `ms` (the time of a frame), `bytes` (of textures), a metric that a
             plugin adds, or a figure of the pipeline; of several the whole front is looked for.
         budget: how many runs are asked for; those that are asked for twice count twice.
