@@ -48,7 +48,7 @@ class Station(WorkerPlugin):
     def teardown(self, worker: Any) -> None:
         """The work is done, or given up: whatever is still at it ends."""
         if self._child is not None:
-            self._child.process.kill()
+            self._child.end()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def perform(

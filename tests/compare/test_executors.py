@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
-from collections.abc import Mapping
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +19,10 @@ import rendergraph as rg
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.product import Sweep, sweep
 from rendergraph.compare.study import RESULTS
-from rendergraph.errors import InputError, UsageError
+from rendergraph.errors import InputError, RenderError, UsageError
 from rendergraph.farm.processes import Processes
+
+distributed: Any = pytest.importorskip("distributed")
 
 MAKE = """// Stripes.
 /*---
@@ -212,3 +218,144 @@ def test_two_sweeps_do_not_share_a_folder_whoever_draws(base: rg.Pipeline, tmp_p
     seen: list[str] = []
     sweep(base, {"bend.power": [1, 2]}, tmp_path / "out", frames=1, executor="processes:1", events=second)
     assert seen
+
+
+# --- Dask ------------------------------------------------------------------------------------------------------------
+
+
+class Cluster:
+    """A scheduler and workers on the loopback, each a process that stands in a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.workers = folder, dict[str, subprocess.Popen[bytes]]()
+        with socket.socket() as found:
+            found.bind(("127.0.0.1", 0))
+            self.address = f"127.0.0.1:{found.getsockname()[1]}"
+        port = self.address.partition(":")[2]
+        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+
+    def start(self, what: str, *words: str) -> subprocess.Popen[bytes]:
+        own = self.folder / f"{what}-{len(self.workers)}"
+        own.mkdir()
+        program = "import sys; from distributed.cli import dask_" + what + " as it; it.main()"
+        settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+        return subprocess.Popen(
+            [sys.executable, "-c", program, *words],
+            cwd=own,
+            env=os.environ | settings,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def worker(self, name: str) -> None:
+        flags = ("--no-nanny", "--nthreads", "1", "--no-dashboard", "--local-directory", str(self.folder / name))
+        self.workers[name] = self.start("worker", self.address, "--name", name, *flags)
+
+    def client(self, workers: int) -> Any:
+        found = distributed.Client(f"tcp://{self.address}", timeout=60, set_as_default=False)
+        found.wait_for_workers(workers, timeout=60)
+        return found
+
+    def close(self) -> None:
+        for process in (*self.workers.values(), self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    (tmp_path / "cluster").mkdir()
+    with contextlib.closing(Cluster(tmp_path / "cluster")) as made:
+        made.worker("a")
+        made.worker("b")
+        yield made
+
+
+@pytest.mark.slow
+def test_64_variants_are_the_same_by_dask_though_a_worker_is_killed_and_no_disk_is_shared(
+    base: rg.Pipeline, gl: rg.Session, cluster: Cluster, tmp_path: Path
+) -> None:
+    here = sweep(base, AXES, tmp_path / "here", frames=1, session=gl)
+    with cluster.client(2) as client:
+        told: list[Mapping[str, Any]] = []
+
+        def meanwhile(event: Mapping[str, Any]) -> None:
+            if not told:
+                (tmp_path / "make.frag").rename(tmp_path / "gone")  # workers have their own
+                cluster.workers["a"].kill()
+            told.append(event)
+
+        there = sweep(base, AXES, tmp_path / "there", frames=1, executor=client, events=meanwhile)
+        assert there.failures == ()
+        same(here, tmp_path / "here", there, tmp_path / "there")
+        assert len(rows(tmp_path / "there")) == 64
+        assert {event["worker"].partition("://")[0] for event in told} <= {"tcp", "cluster"}
+        assert client.status == "running"  # it is its owner's
+        assert not list(tmp_path.glob("cluster/b/**/make.frag"))  # nor is anything left there
+
+
+HALO = '''"""A node of an installed plugin."""
+
+from rendergraph.api import Node, Output, Radiance, Steps, param
+
+
+class Halo(Node):
+    """One colour."""
+
+    color = Output(Radiance, format="rgba16f", doc="The colour.")
+    much: float = param(default=1.0, min=0, max=9, doc="How much.")
+
+    def record(self, steps: Steps) -> None:
+        """A clear."""
+        steps.clear(self.color, self.much)
+'''
+
+
+@pytest.mark.slow
+def test_a_plugin_that_a_worker_lacks_is_told_before_anything_runs_and_a_lost_scheduler_keeps_what_is_there(
+    base: rg.Pipeline, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with cluster.client(2) as client:
+        installed = tmp_path / "installed"
+        (installed / "halo_nodes").mkdir(parents=True)
+        (installed / "halo_nodes" / "__init__.py").write_text("")
+        (installed / "halo_nodes" / "halo.py").write_text(HALO)
+        (installed / "halo-1.5.dist-info").mkdir()
+        for name, text in {
+            "METADATA": "Metadata-Version: 2.1\nName: halo\nVersion: 1.5\n",
+            "entry_points.txt": "[rendergraph.nodes]\nhalo = halo_nodes\n",
+            "top_level.txt": "halo_nodes\n",
+            "RECORD": "halo_nodes/__init__.py,,\nhalo_nodes/halo.py,,\n",
+        }.items():
+            (installed / "halo-1.5.dist-info" / name).write_text(text)
+        with monkeypatch.context() as patched:
+            patched.syspath_prepend(str(installed))
+            (tmp_path / "h.yaml").write_text(
+                "rendergraph: 1\nsize: [8, 8]\nnodes: {a: {type: halo}}\noutputs: {radiance: a.color}\n"
+            )
+            with pytest.raises(InputError, match=r"RG642 worker 'tcp://.*' lacks the plugin 'halo'; .*halo==1.5"):
+                sweep(rg.load(tmp_path / "h.yaml"), {"a.much": [1, 2]}, tmp_path / "h", frames=1, executor=client)
+            assert not list((tmp_path / "h").glob("*/*"))
+    killed: list[str] = []
+
+    def kill(event: Mapping[str, Any]) -> None:
+        if not killed and event["event"] == "finished":
+            killed.append(event["task"])
+            cluster.scheduler.kill()
+
+    out = tmp_path / "out"
+    monkeypatch.setattr("rendergraph.farm.dask_cluster.CONNECT", 2.0)
+    with pytest.raises(RenderError, match=r"RG641 the Dask scheduler is gone; what is finished is kept"):
+        sweep(base, AXES, out, frames=1, executor=f"dask://{cluster.address}", events=kill)
+    there = len(rows(out))
+    assert 1 <= there < 64
+    again = sweep(base, AXES, out, frames=1, resume=True)
+    assert (again.resumed, len(rows(out))) == (there, 64)
+    with pytest.raises(RenderError, match=rf"RG641 no Dask scheduler answers at {cluster.address}"):
+        sweep(base, FEW, tmp_path / "none", frames=1, executor=f"dask://{cluster.address}")
+
+
+def test_dask_starts_a_cluster_of_its_own(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    here = sweep(base, FEW, tmp_path / "here", frames=1, session=gl)
+    there = sweep(base, FEW, tmp_path / "there", frames=1, executor="dask:2")
+    same(here, tmp_path / "here", there, tmp_path / "there")
