@@ -347,9 +347,14 @@ def _text(found: Sweep) -> str:
     if comparison.software:
         lines.append(shared.SOFTWARE)
     if (search := found.search) is not None:
-        heads, rows = ("least", *search.minimise), [(name, *search.values[name]) for name in search.front]
-        lines.append(table([(name, *(f"{one:.4g}" for one in own)) for name, *own in rows], heads))
+        told = [(name, *map(_value, search.values[name])) for name in search.front]
+        lines.append(table(told, ("least", *search.minimise)))
     return "\n".join(lines)
+
+
+def _value(value: float) -> str:
+    """Bytes are whole, and large."""
+    return f"{value:.0f}" if value >= 1e4 else f"{value:.4g}"
 
 
 def _show(found: Listing, *, as_json: bool) -> None:

@@ -110,7 +110,7 @@ def search(
 
         def drawn(runs: Sequence[Mapping[str, str]], *, again: bool) -> Sweep:
             chosen, begun = replace(space, chosen=tuple(runs)), len(trials)
-            given = {**options, "resume": again, "executor": farm}
+            given = {**options, "best": minimise, "resume": again, "executor": farm}
             return sweep(
                 base, chosen, out, reference, **given, progress=lambda done, _: tell(min(begun + done, budget), budget)
             )

@@ -95,6 +95,7 @@ def sweep(
     repeats: int = 1,
     frame: int = 1,
     kept: Pictures = "all",
+    best: Sequence[str] = ("flip", "ms"),
     only: Sequence[int] | None = None,
     resume: bool = False,
     most_bytes: int = MOST_BYTES,
@@ -121,8 +122,9 @@ def sweep(
         frames: how many frames are measured, at least; runs that are there and have fewer are measured again.
         repeats: how often they are measured, each time anew: the spread of the medians says what a time is worth.
         frame: number of the frame whose pictures are kept.
-        kept: which pictures stay: `all`, or `best`, those of the Pareto front of what is drawn so far, and of the run
+        kept: which pictures stay: `all`, or `best`, those than which no other so far is better, and that of the run
             that others are measured against.
+        best: what the best are least in, as for `search`.
         only: numbers of the runs, from 0, where these are but a part; they are called and measured as in the whole.
         resume: keep runs that the folder has already.
         most_bytes: of textures that variants drawn together may take.
@@ -147,7 +149,7 @@ def sweep(
     runs = planned.runs
     with claimed(out):
         ledger, lines, torn = open_folder(out, planned.study, resume=resume)
-        work = Work(planned, ledger, lines, frame, frames, repeats, kept, most_bytes, events)
+        work = Work(planned, ledger, lines, frame, frames, repeats, kept, most_bytes, events, best)
         resumed = sum(map(work.is_done, range(len(runs))))
         timed = len(work.results) - resumed
         redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))

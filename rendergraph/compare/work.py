@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 from rendergraph.compare.batches import MOST_BYTES, MOST_RUNS, cuts
 from rendergraph.compare.divergence import passes
-from rendergraph.compare.front import pareto
+from rendergraph.compare.goals import front_of, values_of
 from rendergraph.compare.groups import Against, First, Group, Passes, Pictured, Timed, Unable, Variant
 from rendergraph.compare.ledger import Ledger
 from rendergraph.compare.prepare import Prepared
@@ -37,6 +37,7 @@ class Work:
         frames, repeats: how many are to be measured, and how often.
         pictures: which stay: `all`, or `best`.
         most_bytes: of textures that variants drawn together may take.
+        best: what makes a picture one of the best.
         results, records: what is there, by the run's number; results may lack times.
         failures: what cannot be drawn, likewise.
         device: what drew last; devices: everything that did, by renderer.
@@ -54,6 +55,7 @@ class Work:
     pictures: Pictures = "all"
     most_bytes: int = MOST_BYTES
     events: Events | None = None
+    best: Sequence[str] = ("flip", "ms")
     results: dict[int, Result] = field(default_factory=dict)
     records: dict[int, Mapping[str, Any]] = field(default_factory=dict)
     failures: dict[int, Failure] = field(default_factory=dict)
@@ -211,14 +213,18 @@ class Work:
         self._settled += 1
 
     def _beaten(self) -> set[int]:
-        """Runs whose pictures go: another is both quicker and better."""
+        """Runs whose pictures go: another is as good in everything that counts, and better in something.
+
+        Once beaten is always beaten: only those are asked that still have theirs.
+        """
         if self.pictures == "all":
             return set()
-        measured = {number: result for number, result in self.results.items() if result.times.frames}
-        best = {result.name for result in pareto(list(measured.values()))}
+        shown = [result for result in self.results.values() if result.times.frames and result.pixels is not None]
+        best = set(front_of({result.name: own for result in shown if (own := values_of(result, self.best))}))
         if self.prepared.other is None and (self.reference is None or self.reference.kind == "variant"):
             best.add(self.prepared.runs[0].name)
-        return {number for number, result in measured.items() if result.name not in best}
+        names = {result.name for result in shown} - best
+        return {number for number, result in self.results.items() if result.name in names}
 
     def _drop(self, beaten: set[int]) -> None:
         """Let pictures go, from the folder and from memory."""

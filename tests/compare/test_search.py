@@ -110,12 +110,14 @@ def test_a_search_that_was_interrupted_ends_where_it_would_have(
 def test_several_things_have_a_front(base: rg.Pipeline, least: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
     axes = {"bowl.x": "-10.0:10", "bowl.y": [0.1, 50.0], "bowl.n": [3, 7]}
     space = Space.of(axes, zipped=[("bowl.y", "bowl.n")])
-    found = search(base, space, tmp_path / "o", least, minimise=["rmse", "bytes"], budget=10, frames=1, session=gl)
+    options: dict[str, Any] = {"budget": 10, "frames": 1, "session": gl, "kept": "best"}
+    found = search(base, space, tmp_path / "o", least, minimise=["rmse", "bytes"], **options)
     assert found.search is not None
     assert {result.settings["bowl.n"] for result in found.comparison.results} <= {"3", "7"}
     assert all((r.settings["bowl.y"] == "50.0") == (r.settings["bowl.n"] == "7") for r in found.comparison.results)
     (best,) = found.search.front  # all take the same memory
     assert found.search.values[best][0] == min(values[0] for values in found.search.values.values())
+    assert [file.parent.name for file in (tmp_path / "o").glob("*/radiance.exr")] == [best]
 
 
 @settings(deadline=None, max_examples=60)

@@ -108,17 +108,22 @@ def _search(found: Search) -> str:
     """The best of a search, and how it came there."""
     rows = [
         f'<tr><th scope="row">{escape(name.replace(",", ", "))}</th>'
-        + "".join(_cell(number(value)) for value in found.values[name])
+        + "".join(_cell(_value(value)) for value in found.values[name])
         + "</tr>"
         for name in found.front
     ]
     what = " and ".join(f"<code>{escape(name)}</code>" for name in found.minimise)
     one = len(found.minimise) == 1
     words = f"{'The least' if one else 'The front of the least'} {what} of {len(found.order)} runs that were asked for."
-    steps = ", ".join(f"{number(value)} after {place}" for place, value in found.best_after())
+    steps = ", ".join(f"{_value(value)} after {place}" for place, value in found.best_after())
     words += f" The best <code>{escape(found.minimise[0])}</code> was {steps}." if steps else ""
     heads = ["", *(f"#{escape(name)}" for name in found.minimise)]
     return table(heads, rows, "What the search has found") + f"<p class=quiet>{words}</p>"
+
+
+def _value(value: float) -> str:
+    """Bytes are whole, and large."""
+    return f"{value:,.0f}" if value >= 1e4 else number(value)
 
 
 def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Result]) -> tuple[str, str]:
