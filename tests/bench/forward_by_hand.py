@@ -201,6 +201,8 @@ class Forward:
         index = ctx.buffer(indices.tobytes())
         models = ctx.buffer(np.ascontiguousarray(np.swapaxes(models, 1, 2), "f4").tobytes())
         looks = ctx.buffer(np.hstack([colors, surfaces]).astype("f4").tobytes())
+        self.position_buffer, self.normal_buffer, self.index_buffer = vertices, normals, index
+        self.models_buffer, self.looks_buffer = models, looks
         program: Any = ctx.program(
             VERTEX, FRAGMENT.replace("core\n", "core\n#define SHADOWS\n" if shadow else "core\n", 1)
         )

@@ -1,0 +1,130 @@
+"""Three works against plain moderngl, every frame read back: `python tests/bench/bench_works.py`.
+
+W1: a million triangles in 25 spheres under one light. W2: a ground under them, and a 1024² shadow map. W3: ambient
+occlusion of 32 samples, too. Camera and light move in each frame, at 1280×720; `works_by_hand.py` is the other half. CPU
+time of frames, threads of the rasteriser included, and of the first frame with everything that it takes to get there.
+Goal: at most 1.0.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_forward import FAR, FOV_Y, INTENSITY, NEAR, TARGET, spheres
+from forward_by_hand import look_at, perspective, sphere
+from measure import Row, check_pictures, compare, keep_memory, options, report, save
+from works_by_hand import Deferred, Moving, ground
+
+SIZE = (1280, 720)
+GROUND, HALF = -5.6, 20.0
+SECONDS = 20.0
+EYES = np.array([(-3.0, 3.0, 15.0), (4.0, 4.5, 14.0)])
+DIRECTIONS = np.array([(-0.7, -0.8, -0.5), (0.1, -0.9, -0.6)])
+SETS = {
+    "W1": ["light.lookup=null"],
+    "W2": ["sun.resolution=1024"],
+    "W3": ["sun.resolution=1024", "ao.samples=32"],
+}
+
+
+def scene(under: bool) -> str:
+    """The spheres as a scene file, over a ground, with what moves."""
+    models, colors, surfaces = spheres()
+    lines = ["scene: 1", "objects:"]
+    for number, model in enumerate(models):
+        at = model[:3, 3].tolist()
+        shape = f"shape: sphere, radius: 1, segments: 200, rings: 101, at: {at}, material: m{number}"
+        lines.append(f"  ball{number}: {{{shape}}}")
+    if under:
+        lines.append(
+            f"  ground: {{shape: plane, size: [{2 * HALF}, {2 * HALF}], at: [0, {GROUND}, 0], material: grey}}"
+        )
+    lines += ["materials:", "  grey: {base_color: [0.6, 0.6, 0.6], roughness: 0.9, metallic: 0}"]
+    for number, (color, (metallic, roughness)) in enumerate(zip(colors, surfaces, strict=True)):
+        look = f"base_color: {color.tolist()}, metallic: {metallic}, roughness: {roughness}"
+        lines.append(f"  m{number}: {{{look}}}")
+    lens = f"fov_y_degrees: {math.degrees(FOV_Y)}, near: {NEAR}, far: {FAR}"
+    moving = [f"{{0: {ends[0].tolist()}, {SECONDS}: {ends[1].tolist()}}}" for ends in (EYES, DIRECTIONS)]
+    return "\n".join(
+        [
+            *lines,
+            f"lights: {{sun: {{type: directional, direction: {DIRECTIONS[0].tolist()}, intensity: {INTENSITY}}}}}",
+            f"cameras: {{main: {{eye: {EYES[0].tolist()}, target: {list(TARGET)}, {lens}}}}}",
+            f"keyframes: {{cameras.main.eye: {moving[0]}, lights.sun.direction: {moving[1]}}}",
+            "",
+        ]
+    )
+
+
+def by_hand(name: str) -> Any:
+    """The hand-written program of a work."""
+    models, colors, surfaces = spheres()
+    center = models[:, :3, 3].mean(axis=0)
+    radius = float(np.linalg.norm(models[:, :3, 3] - center, axis=1).max() + 1)
+    more = {} if name == "W1" else {"shadow": 1024, "ball": (center, radius), "under": ground(GROUND, HALF)}
+    kind = Deferred if name == "W3" else Moving
+    light = -DIRECTIONS[0] / np.linalg.norm(DIRECTIONS[0])
+    return kind(SIZE, sphere(200, 101), models, colors, surfaces, np.eye(4), tuple(EYES[0]), light, INTENSITY, **more)
+
+
+def bench(name: str, *, frames: int, turns: int, folder: str | None) -> Row:
+    """One of the works."""
+    import rendergraph as rg
+
+    begun = time.process_time()
+    program = by_hand(name)
+    projection = perspective(FOV_Y, SIZE[0] / SIZE[1], NEAR, FAR)
+    number_of = {"ours": 0, "hand": 0}
+
+    def hand(count: int) -> None:
+        with program.ctx:
+            for _ in range(count):
+                number_of["hand"] += 1
+                share = (number_of["hand"] - 1) / 30 / SECONDS
+                eye, direction = (ends[0] + (ends[1] - ends[0]) * share for ends in (EYES, DIRECTIONS))
+                program.look(look_at(eye, TARGET), projection, eye, -direction / np.linalg.norm(direction))
+                program.draw()
+                program.bytes = program.screen.read(components=4)
+
+    hand(1)
+    first = {"hand": time.process_time() - begun}
+    pictures = {"by_hand": np.frombuffer(program.bytes, "u1").reshape(SIZE[1], SIZE[0], 4)[::-1]}
+    with tempfile.TemporaryDirectory() as temporary:
+        file = Path(temporary) / "work.yaml"
+        file.write_text(scene(name != "W1"))
+        begun = time.process_time()
+        with rg.Session() as session:
+            pipeline = rg.load("ssao-hemisphere" if name == "W3" else "forward", scene=file, size=SIZE, sets=SETS[name])
+            with session.device.current():
+                drawing = session.compile(pipeline, outputs=["image"], warm_up=False)
+
+            def ours(count: int) -> None:
+                with session.device.current():
+                    for _ in range(count):
+                        number_of["ours"] += 1
+                        drawing.draw(number_of["ours"])
+                        pictures["framework"] = drawing.read()["image"]
+
+            ours(1)
+            first["ours"] = time.process_time() - begun
+            save(folder, **{f"{name}_{who}": picture for who, picture in pictures.items()})
+            share = {"W1": 0.0, "W2": 0.02, "W3": 0.1}[name]  # edges of shadows; another occlusion
+            check_pictures(name, pictures["framework"], pictures["by_hand"], bound=6, share=share)
+            print(f"{name}: first frame {first['ours']:.2f} s, by hand {first['hand']:.2f} s", flush=True)
+            return compare(name, ours, hand, frames=frames, turns=turns, goal=1.0)
+
+
+def main() -> None:
+    chosen = options(__doc__, frames=1, turns=20, work=0)
+    keep_memory()
+    names = list(SETS) if not chosen.work else [f"W{chosen.work}"]
+    report([bench(name, frames=chosen.frames, turns=chosen.turns, folder=chosen.save) for name in names], chosen.json)
+
+
+if __name__ == "__main__":
+    main()
