@@ -60,9 +60,13 @@ class ShadowMapNode(Casting):
     )
 
     def record(self, steps: Steps) -> None:
-        """One pass a layer over what casts, from both sides: what has no back is in the light's way all the same."""
+        """One pass a layer over what casts, from both sides: what has no back is in the light's way all the same.
+
+        Of solid things the sun sees front faces alone; other lights may stand within them.
+        """
         offset = (-self.slope_bias, 0.0) if self.slope_bias else None
-        for layer in range(steps.desc(self.shadow_map).layers):
+        for layer, light in enumerate(_lights(self, steps.facts)):
+            sun = steps.lights[light].type == "directional"
             steps.geometry(
                 "<depth.frag>",
                 vertex="<depth.vert>",
@@ -71,7 +75,7 @@ class ShadowMapNode(Casting):
                 view_index=layer,
                 objects="casters",
                 materials="alpha",
-                state=State(cull="none", polygon_offset=offset),
+                state=State(cull="solid" if sun else "none", polygon_offset=offset),
             )
 
     def update(self, frame: Frame) -> None:

@@ -161,4 +161,7 @@ class GeometryCompiler:
         clockwise = bool(self.scene.packed.mirrored[index]) if front == "object" else front == "clockwise"
         if cull == "material":
             cull = "none" if material.double_sided else "back"
+        elif cull == "solid":
+            plain = material.alpha_mode == "opaque" and not material.double_sided
+            cull = "back" if plain and scene.meshes[placed.mesh].solid else "none"
         return MultiDrawKey(tuple(defines.items()), tuple(found.items()), cull, clockwise)

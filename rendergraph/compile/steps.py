@@ -388,7 +388,7 @@ class _Compiler:
         if not depth_test and writes_depth and state.depth_write is not False:
             # OpenGL writes no depth where the test is off.
             depth_test, state = True, replace(state, depth_func="always")
-        resolved = cull or ("none" if state.cull == "material" else state.cull)
+        resolved = cull or ("none" if state.cull in ("material", "solid") else state.cull)
         clockwise = clockwise or state.front == "clockwise"
         targets = sum(write.use == "color" for write in step.writes)
         return gl_state.pieces(

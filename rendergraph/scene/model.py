@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from rendergraph.declare import Added
 from rendergraph.declare.extension import ImageLoader
-from rendergraph.scene.edges import Edges, find_edges
+from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamp
 
 Floats: TypeAlias = npt.NDArray[np.float32]
@@ -78,6 +78,11 @@ class Mesh:
             return None
         x, y, z = (float(value) for value in normal)
         return x, y, z, -float(away.mean())
+
+    @cached_property
+    def solid(self) -> bool:
+        """Whether it is closed and encloses a volume: seen from outside, its front faces hide its back faces."""
+        return is_solid(self.positions, self.indices)
 
     @cached_property
     def convex(self) -> bool:

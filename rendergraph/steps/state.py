@@ -22,7 +22,7 @@ BlendFactor = Literal[
     "one_minus_dst_alpha",
 ]
 BlendOp = Literal["add", "subtract", "reverse_subtract", "min", "max"]
-Cull = Literal["material", "back", "front", "none"]
+Cull = Literal["material", "back", "front", "none", "solid"]
 Front = Literal["object", "counter_clockwise", "clockwise"]
 
 
@@ -100,7 +100,8 @@ class State:
         depth_write: write depth; None: yes where depth is written by the step.
         blend: one `Blend` for all targets, one a target, or None.
         color_mask: which of RGBA are written.
-        cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`.
+        cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`; `solid` culls those that
+            front faces hide from whoever looks from outside: of closed meshes with opaque, single-sided materials.
         front: which triangles show their front: those that run counter-clockwise on the screen, and with `object` of an
             object that its transform mirrors those that run clockwise, as the winding of its corners is turned, too. A
             geometry shader that winds its triangles by itself, and does not pass on the order it is given, says one.

@@ -66,7 +66,9 @@ def by_hand(name: str) -> Any:
     models, colors, surfaces = spheres()
     center = models[:, :3, 3].mean(axis=0)
     radius = float(np.linalg.norm(models[:, :3, 3] - center, axis=1).max() + 1)
-    more = {} if name == "W1" else {"shadow": 1024, "ball": (center, radius), "under": ground(GROUND, HALF)}
+    more: dict[str, Any] = (
+        {} if name == "W1" else {"shadow": 1024, "ball": (center, radius), "under": ground(GROUND, HALF)}
+    )
     kind = Deferred if name == "W3" else Moving
     light = -DIRECTIONS[0] / np.linalg.norm(DIRECTIONS[0])
     return kind(SIZE, sphere(200, 101), models, colors, surfaces, np.eye(4), tuple(EYES[0]), light, INTENSITY, **more)

@@ -147,7 +147,8 @@ class Moving(Forward):
             assert self.ball is not None
             deeper = np.diag([1, 1, self.ball[1] / DEEP, 1])  # the ground lies below the ball
             matrix = (deeper @ light_matrix(to_light, *self.ball)).T.astype("f4").tobytes()
-            self.casters.program["light_matrix"].write(matrix)
+            casters: Any = self.casters.program
+            casters["light_matrix"].write(matrix)
             program["light_matrix"].write(matrix)
 
     def draw_map(self) -> None:
@@ -183,7 +184,7 @@ class Deferred(Moving):
 
     def __init__(self, size: tuple[int, int], *arguments: Any, radius: float = 0.5, **named: Any) -> None:
         super().__init__(size, *arguments, **named)
-        ctx = self.ctx
+        ctx: Any = self.ctx
         self.albedo, self.normal = ctx.texture(size, 4), ctx.texture(size, 4, dtype="f2")
         self.depth = self._depth(size)
         self.depth.compare_func = ""

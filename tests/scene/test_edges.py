@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rendergraph.scene import pack, shapes
-from rendergraph.scene.edges import Edges, find_edges
+from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.scene.model import Material, Mesh, Object, Scene
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
@@ -85,3 +85,30 @@ def test_open_meshes_have_no_triangles_with_adjacency() -> None:
     assert records["count"].tolist() == [0, 72, 0]
     assert records["first_index"].tolist() == [0, 0, 72]
     assert indices.max() < 24
+
+
+@pytest.mark.parametrize(
+    ("faces", "solid"),
+    [
+        (FACES, True),
+        (np.concatenate([FACES, [[0, 1, 1]]]), True),  # without area
+        (np.concatenate([FACES, FACES]), True),  # front faces hide back faces still
+        (FACES[:, ::-1], False),  # inside out
+        (FACES[:3], False),
+        (np.concatenate([FACES[:3], FACES[3:, ::-1]]), False),
+        (np.zeros((0, 3), np.uint32), False),
+    ],
+)
+def test_a_mesh_is_solid_where_its_front_faces_hide_its_back_faces(faces: Any, solid: bool) -> None:
+    assert is_solid(CORNERS, faces) is solid
+    apart = CORNERS[faces].reshape(-1, 3)  # no vertex is shared, and zeros have signs
+    apart[apart == 0] *= np.float32(-1)
+    assert is_solid(apart, np.arange(len(apart)).reshape(-1, 3)) is solid
+
+
+@pytest.mark.parametrize("shape", CLOSED)
+def test_solid_is_what_is_closed(shape: str) -> None:
+    made = shapes.mesh(shape)
+    assert made.solid
+    torn = Mesh("torn", made.positions, made.indices[1:], made.normals)
+    assert not torn.solid
