@@ -219,34 +219,26 @@ def command(
         say(f"{amount(there, 'run')} kept in {out}" + (f"; go on with: {again} --resume" if there else ""))
         raise
     warn([*found.comparison.warnings, *extensions.warnings])
-    page = out / "report.html"
-    options.write(sweep_page(found, again, title=title, note=note), page)
-    chart = out / "quality.svg"
-    options.write(quality_svg(found.comparison), chart)
+    files: dict[str, Path] = {}
+    if found.comparison.results:  # of a sweep that failed as a whole there is nothing to show
+        files |= {"chart": out / "quality.svg", "report": out / "report.html"}
+        options.write(sweep_page(found, again, title=title, note=note), files["report"])
+        options.write(quality_svg(found.comparison), files["chart"])
     if found.timed:
         say(f"{amount(found.timed, 'run')} drawn before, measured now over {amount(frames or 5, 'frame')}")
     if found.redrawn:
         say(f"{amount(found.redrawn, 'run')} drawn again: what they are drawn from has changed, or their pictures have")
     if found.torn:
         say(f"{amount(found.torn, 'line')} of the results not whole; what they told was done again")
-    files = [chart, page]
     if as_csv:
-        files.append(out / "results.csv")
-        options.write(csv_text(found), files[-1])
+        files["csv"] = out / "results.csv"
+        options.write(csv_text(found), files["csv"])
     beyond = shared.exceeded(found.comparison.results, thresholds)
     if as_json:
-        emit_json(
-            found.as_json()
-            | {
-                "report": str(page),
-                "chart": str(chart),
-                **({"csv": str(files[-1])} if as_csv else {}),
-                "exceeded": beyond,
-            }
-        )
+        emit_json(found.as_json() | {name: str(path) for name, path in files.items()} | {"exceeded": beyond})
     else:
         emit(_text(found))
-        for path in files:
+        for path in files.values():
             emit(str(path))
     for text in beyond:
         say(text, always=True)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 AT_ONCE = 8
 """Runs that are asked for before any of them has answered: they are drawn together."""
+MOST_AGAIN = 50
+"""Runs in a row that are known already, after which there are taken to be no others."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def search(
         executor, devices, timeout: likewise; it stays from one batch of runs to the next.
         minimise: `flip`, `rmse`, `radiance_rmse`, `ms` (the time of a frame), `bytes` (of textures), a metric that a
             plugin adds, or a figure of the pipeline; of several the whole front is looked for.
-        budget: how many runs are asked for; those that are asked for twice count twice.
+        budget: how many runs are drawn; fewer where the axes have no more.
         seed: of the optimiser: the same one asks the same of the same answers.
         resume: keep runs that the folder has already, and go on from there, also with a larger budget.
         options: what else `sweep` takes.
@@ -119,18 +121,17 @@ def search(
         told = {name: knob.distribution() for name, knob in knobs.items()}
         parts: list[Sweep] = []
         while len(trials) < budget:
-            asked = [study.ask(told) for _ in range(min(AT_ONCE, budget - len(trials)))]
-            runs = [_joined(knobs, trial.params) for trial in asked]
             known = {_key(settings): result for settings, result in trials}
-            new = list({_key(run): run for run in runs if _key(run) not in known}.values())
-            if new:
-                parts.append(drawn(new, again=resume or bool(trials)))
-                known |= {_key(result.settings): result for result in parts[-1].comparison.results}
-            for trial, run in zip(asked, runs, strict=True):
-                result = known.get(_key(run))
+            asked = _ask(study, told, knobs, known, minimise, min(AT_ONCE, budget - len(trials)))
+            if not asked:
+                break  # there is nothing else
+            parts.append(drawn([run for _, run in asked], again=resume or bool(trials)))
+            answers = {_key(result.settings): result for result in parts[-1].comparison.results}
+            for trial, run in asked:
+                result = answers.get(_key(run))
                 trials.append((run, result))
                 _tell(study, trial, values_of(result, minimise))
-        different = list({_key(run): run for run, _ in trials}.values())
+        different = [run for run, _ in trials]
         whole = drawn(different, again=True)
     return replace(
         whole,
@@ -143,6 +144,32 @@ def search(
         torn=sum(part.torn for part in parts),
         search=_summary(whole.comparison.results, trials, minimise, budget),
     )
+
+
+def _ask(
+    study: Any,
+    told: Mapping[str, Any],
+    knobs: Mapping[str, _Knob],
+    known: Mapping[tuple[tuple[str, str], ...], Result | None],
+    minimise: Sequence[str],
+    count: int,
+) -> list[tuple[Any, dict[str, str]]]:
+    """As many runs as are wanted that are not known yet, or less where the optimiser comes upon no others.
+
+    What it asks for again it is told again at once; of two alike in one batch the second is taken back.
+    """
+    found: dict[tuple[tuple[str, str], ...], tuple[Any, dict[str, str]]] = {}
+    again = 0
+    while len(found) < count and again < MOST_AGAIN:
+        trial = study.ask(told)
+        run = _joined(knobs, trial.params)
+        if _key(run) not in known and _key(run) not in found:
+            found[_key(run)] = trial, run
+            again = 0
+            continue
+        again += 1
+        _tell(study, trial, values_of(known.get(_key(run)), minimise))
+    return list(found.values())
 
 
 def need() -> None:

@@ -100,14 +100,15 @@ def scene_name(linked: Linked) -> str:
 
 def unique_names(names: Sequence[str]) -> list[str]:
     """The names, later ones of a kind with a number behind: `forward`, `forward-2`."""
-    found: list[str] = []
+    found: dict[str, None] = {}
+    given = frozenset(names)
     for name in names:
         number, unique = 1, name
-        while unique in found or (number > 1 and unique in names):
+        while unique in found or (number > 1 and unique in given):
             number += 1
             unique = f"{name}-{number}"
-        found.append(unique)
-    return found
+        found[unique] = None
+    return list(found)
 
 
 def compared_output(

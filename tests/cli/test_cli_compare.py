@@ -190,6 +190,24 @@ def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("more", [(), ("--minimise", "rmse", "--budget", "2")])
+def test_a_sweep_of_which_nothing_can_be_drawn_says_why(cli: Any, tmp_path: Path, more: tuple[str, ...]) -> None:
+    pytest.importorskip("optuna")
+    header = "/*---\ndoc: x\noutputs: {color: {semantic: radiance, format: rgba16f, doc: x}}\n"
+    header += "params: {mode: {default: 1, role: define, doc: x}}\n---*/\n"
+    (tmp_path / "fx.frag").write_text(
+        header + "out vec4 color;\nvoid main() {\n#if MODE == 3\nx;\n#endif\ncolor = vec4(1.0); }\n"
+    )
+    text = "rendergraph: 1\nsize: [8, 8]\nnodes: {a: {type: fx}}\noutputs: {radiance: a.color}\n"
+    (tmp_path / "p.yaml").write_text(text)
+    words = ("-x", "a.mode=3", "--reference", "p.yaml", "--plugin", "fx.frag", "--csv", "-o", "out")
+    found = cli("sweep", "p.yaml", *words, *more, "--json")
+    assert (found.code, "a.mode=3 failed: " in found.err, "RG410" in found.err) == (1, True, True)
+    assert (found.json["runs"], len(found.json["failed"]), found.json.get("report")) == ([], 1, None)
+    with (tmp_path / "out" / "results.csv").open(newline="") as file:
+        assert [row["run"] for row in csv.DictReader(file)] == ["a.mode=3"]
+
+
 def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     (tmp_path / "study.yaml").write_text(

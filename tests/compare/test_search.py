@@ -120,6 +120,19 @@ def test_several_things_have_a_front(base: rg.Pipeline, least: rg.Pipeline, gl: 
     assert [file.parent.name for file in (tmp_path / "o").glob("*/radiance.exr")] == [best]
 
 
+def test_no_run_is_asked_for_twice_and_all_there_are_is_enough(
+    base: rg.Pipeline, least: rg.Pipeline, gl: rg.Session, tmp_path: Path
+) -> None:
+    options: dict[str, Any] = {"minimise": ["rmse"], "frames": 1, "session": gl}
+    found = search(base, {"bowl.n": "0:9:1"}, tmp_path / "o", base.set("bowl.n", 7), budget=30, **options)
+    assert found.search is not None
+    assert sorted(result.settings["bowl.n"] for result in found.comparison.results) == list("0123456789")
+    assert len(found.search.order) == 10
+    assert found.search.front == ("bowl.n=7",)
+    again = search(base, {"bowl.n": "0:9:1"}, tmp_path / "o", base.set("bowl.n", 7), budget=30, resume=True, **options)
+    assert (again.resumed, again.search) == (10, found.search)
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.dictionaries(st.text(max_size=3), st.tuples(*[st.integers(0, 5)] * 3), max_size=12))
 def test_the_front_is_what_none_beats(values: dict[str, tuple[int, ...]]) -> None:
