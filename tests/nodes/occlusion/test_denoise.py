@@ -24,7 +24,11 @@ def filtered(session: rg.Session, **params: Any) -> tuple[dict[str, Floats], Any
     }
     ports = {"x": "smooth.denoised", "raw": "light.radiance", "depth": "gbuffer.depth", "normal": "gbuffer.normal"}
     pipeline = rg.load(
-        "deferred", size=SIZE, sets=["gbuffer.precision=full"], patches=[{"nodes": {"smooth": node}, "outputs": ports}]
+        "deferred",
+        scene="cornell_box",
+        size=SIZE,
+        sets=["gbuffer.precision=full"],
+        patches=[{"nodes": {"smooth": node}, "outputs": ports}],
     )
     frame = session.render(pipeline, outputs=list(ports))
     camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), SIZE)
