@@ -76,6 +76,11 @@ PIPELINE: Table = Table(
             "Folders of shader nodes, and installed packages that the pipeline needs.",
             example="plugins: [./effects, some-package]",
         ),
+        Key(
+            "warm_up",
+            whole(1, 10_000),
+            "How many frames decide the next, where it depends on those before; drawn in parts, each begins so early.",
+        ),
         Key("parameters", Names(PARAMETER, _NAMING), "Knobs of the whole pipeline, used as $name."),
         Key("inputs", Names(INPUT, _NAMING), "What the file takes as the type of a node."),
         Key("nodes", Names(NODE, _NAMING, "node id", _NOT_A_NODE), "Nodes by id."),

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     metavar="FOLDER",
     help="Write every port's texture there as a picture, and all on one sheet.",
 )
+@options.executor_options
 @options.json_option
 @options.device_option
 @click.option("--watch", is_flag=True, help="Stay, and render again whenever a file that went into it changes.")
@@ -61,6 +62,9 @@ def command(
     outputs: tuple[Target, ...],
     taps: tuple[Target, ...],
     tap_all: Path | None,
+    executor: str | None,
+    devices: tuple[int, ...],
+    timeout: float | None,
     as_json: bool,
     device: int | None,
     watch: bool,
@@ -74,7 +78,8 @@ def command(
 
     The extension chooses the format, and the output where none is named: PNG and JPEG take `image`, EXR and HDR take
     `radiance`. Without -o the picture goes to PIPELINE.png in the current folder. A picture that was written so (PNG or
-    EXR) stands for the pipeline, camera and frame that it was made with.
+    EXR) stands for the pipeline, camera and frame that it was made with. FILE.mp4 is a film of all frames.
+    With --executor the frames are drawn in parts by several processes or machines, each frame as by one.
 
     \b
     Examples:
@@ -83,6 +88,7 @@ def command(
       rendergraph run forward -s light.ambient=0 -o image=dark.jpg --tap sun.shadow_map=depth.exr
       rendergraph run forward --tap-all inside
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
+      rendergraph run forward --frames 1-12 --size 64x36 --executor processes:2 -o turn.####.png
       rendergraph run my.yaml --watch
       rendergraph run spheres.exr -s light.ambient=0 -o darker.png
     """
@@ -98,13 +104,29 @@ def command(
     read = partial(_read, selection, modes, outputs, taps, tap_all, warnings)
     draw = partial(_draw, sheet=tap_all, warnings=warnings, quiet=as_json)
     if watch:
+        if executor is not None:
+            raise UsageError(Problem("RG500", "--watch draws here; leave out --executor"))
         from rendergraph.cli.watching import keep_drawing
 
         keep_drawing(lambda gpu: draw(*read(), gpu), device, as_json=as_json)
         return
-    expanded, targets = read()
-    with Gpu(device) as gpu:
-        report = draw(expanded, targets, gpu)
+    with looking() as files:
+        expanded, targets = read()
+    if executor in (None, "serial"):
+        with Gpu(devices[0] if devices and device is None else device) as gpu:
+            report = draw(expanded, targets, gpu)
+    else:
+        from rendergraph.cli.parts import draw_in_parts
+        from rendergraph.farm.bundle import bundled
+        from rendergraph.farm.choose import chosen
+
+        if tap_all is not None:
+            raise UsageError(Problem("RG500", "--tap-all looks at one pipeline closely, and is drawn by one process"))
+        nodes = expanded.linked.graph.nodes
+        modules = {type(node.node).__module__ for node in nodes}
+        with chosen(executor, None, device, tasks=2, devices=devices, timeout=timeout) as farm:
+            farm.bring(lambda: bundled(files, selection.plugins, modules))
+            report = draw_in_parts(expanded, targets, farm, warnings=warnings, quiet=as_json)
     say_summary(report)
     if as_json:
         emit_json(report)
@@ -137,7 +159,7 @@ def _read(
             for number, port in enumerate(ports, start=1)
         )
     known = linked.graph.outputs
-    named = [t if t.name else replace(t, name=images.output_for(t.path, known)) for t in outputs]
+    named = [t if t.name else replace(t, name=images.output_for(_as_picture(t.path), known)) for t in outputs]
     wanted = tuple(dict.fromkeys((*_names(named), *figures(linked.graph))))
     expanded = stages.expand(linked, replace(modes, outputs=wanted, taps=_names(taps)))
     targets = [*named, *taps]
@@ -155,6 +177,13 @@ def _default(source: str, ending: str) -> Path:
         kind = ".exr" if source.lower().endswith(".exr") else ".png"
         return Path(f"{Path(source).stem}-again{ending.removesuffix('.png')}{kind}")
     return Path(f"{Path(source).stem}{ending}")
+
+
+def _as_picture(path: Path) -> Path:
+    """The file whose extension says which output is meant: a film is made of pictures."""
+    from rendergraph.images.video import is_film
+
+    return path.with_suffix(".png") if is_film(path) else path
 
 
 def _make(folder: Path) -> None:
@@ -175,29 +204,41 @@ def _draw(
 ) -> dict[str, Any]:
     """Draw and write everything; the document of `--json`. Paths are printed unless `quiet`."""
     from rendergraph import images
+    from rendergraph.images.video import films, is_film
     from rendergraph.session import stages
 
     written: list[str] = []
     contact = "contact.####.png" if len(expanded.options.frames) > 1 else "contact.png"
+    pictures = [target for target in targets if not is_film(target.path)]
+    moving = [target for target in targets if is_film(target.path)]
     progress = Progress(len(expanded.options.frames))
     frame: Frame | None = None
     unsound: dict[str, Problem] = {}
-    for frame in stages.draw(expanded, gpu):
-        files = [
-            images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
-            for t in targets
-        ]
-        if sheet is not None:
-            files = _with_sheet(files, targets, images.numbered(sheet / contact, frame.number))
-        images.save_outputs(files, frame.metadata)
-        progress.clear()
-        for file in files:
-            written.append(str(file.path))
-            if not quiet:
-                emit(str(file.path))
-        progress.show(len(written) // len(files))
-        unsound = {**frame.unsound, **unsound}  # said once an output, of the first frame that shows it
+    with films([target.path for target in moving], expanded.options.fps, expanded.options.frames[0]) as open_films:
+        for done, frame in enumerate(stages.draw(expanded, gpu), start=1):
+            files = [
+                images.Saved(images.numbered(t.path, frame.number), frame[t.name], frame.info(t.name), raw=t.is_tap)
+                for t in pictures
+            ]
+            if sheet is not None:
+                files = _with_sheet(files, pictures, images.numbered(sheet / contact, frame.number))
+            if files:
+                images.save_outputs(files, frame.metadata)
+            for target in moving:
+                shown = images.viewable_as(frame[target.name], frame.info(target.name))
+                open_films[target.path].add(frame.number, shown)
+            progress.clear()
+            for file in files:
+                written.append(str(file.path))
+                if not quiet:
+                    emit(str(file.path))
+            progress.show(done)
+            unsound = {**frame.unsound, **unsound}  # said once an output, of the first frame that shows it
     progress.clear()
+    for target in moving:
+        written.append(str(target.path))
+        if not quiet:
+            emit(str(target.path))
     assert frame is not None  # a range of frames has one at least
     warnings.say([*frame.warnings, *unsound.values()])
     return frame.as_json() | {"outputs": written}
@@ -224,6 +265,8 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     """Everything that can be said about the files before anything is rendered; `files` are those that were read."""
     from rendergraph import images
     from rendergraph.images.saving import extension
+    from rendergraph.images.video import is_film
+    from rendergraph.images.video import need as need_video
 
     linked, numbers = expanded.linked, expanded.options.frames
     for name, port in expanded.wanted.items():
@@ -235,14 +278,17 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     inputs = {os.path.realpath(name) for name in (*own, *files) if name.is_file()}
     seen: set[str] = set()
     for target in targets:
-        extension(target.path)
+        if is_film(target.path):
+            need_video()
+        else:
+            extension(target.path)
         place = os.path.realpath(target.path)
         if place in seen:
             raise UsageError(Problem("RG502", f"two pictures go to '{target.path}'; give each a file of its own"))
         seen.add(place)
         if place in inputs or any(images.stands_for(target.path, name) for name in inputs):
             raise UsageError(Problem("RG502", f"'{target.path}' is read by this very run; write to another file"))
-        if len(numbers) > 1 and not images.is_numbered(target.path):
+        if len(numbers) > 1 and not images.is_numbered(target.path) and not is_film(target.path):
             better = target.path.with_name(f"{target.path.stem}.####{target.path.suffix}")
             text = f"{len(numbers)} frames do not fit one file '{target.path}'; number them: '{better}'"
             raise UsageError(Problem("RG503", text))

@@ -61,6 +61,10 @@ class Drawing:
         self.runner.reset()
         self.times, self.number = [], 0
 
+    def begin_at(self, number: int) -> None:
+        """Leave out the frames before this one, as though nothing had been remembered of them."""
+        self.number = max(0, number - 1)
+
     def draw(self, number: int, camera: Camera | None = None) -> None:
         """Draw a frame, with the scene as it is at its time.
 

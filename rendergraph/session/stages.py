@@ -189,11 +189,17 @@ def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
     return drawing
 
 
-def draw(expanded: Expanded, gpu: Gpu) -> Iterator[Frame]:
+def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Frame]:
     """Draw frame after frame; each is there to look at before the next one is drawn.
 
     Between two frames the device is as it was before, so that a borrowed one may be used; nothing else can be drawn
     with this `gpu` meanwhile.
+
+    Args:
+        expanded: what.
+        gpu: where.
+        lead: how many frames are drawn before the first, where something is remembered from frame to frame; all by
+            default.
 
     Raises:
         InputError: a mistake in a shader.
@@ -201,6 +207,8 @@ def draw(expanded: Expanded, gpu: Gpu) -> Iterator[Frame]:
     """
     with gpu.current():
         drawing = _begun(expanded, gpu)
+        if lead is not None:
+            drawing.begin_at(expanded.options.frames[0] - lead)
     for number in expanded.options.frames:
         with gpu.current():
             drawing.draw(number)

@@ -1,0 +1,76 @@
+"""Frames that several workers draw: their files are written here, in whatever order they come."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.cli.options import Target
+from rendergraph.cli.output import Progress, Warnings, emit, say_event
+
+if TYPE_CHECKING:
+    from rendergraph.farm import Executor
+    from rendergraph.session import Frame
+    from rendergraph.session.values import Expanded
+
+
+def draw_in_parts(
+    expanded: Expanded, targets: Sequence[Target], farm: Executor, *, warnings: Warnings, quiet: bool
+) -> dict[str, Any]:
+    """Draw and write everything; the document of `--json`. Paths are printed unless `quiet`.
+
+    Raises:
+        InputError: the frames cannot be drawn in parts, or a mistake in a shader.
+        RenderError: it failed while drawing or writing.
+    """
+    from rendergraph import images
+    from rendergraph.farm.frames import Shown, Wanted, chunks, drawn
+    from rendergraph.images.video import films, is_film
+
+    said = expanded.linked.spec.tree.get("warm_up")
+    wanted = [Wanted(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
+    parts = chunks(expanded, wanted, farm.workers, None if said is None else int(said.plain()))
+    frames, written = expanded.options.frames, dict[int, list[str]]()
+    progress, lasts, unsound = Progress(len(frames)), list["Frame"](), dict[int, Any]()
+    with films([t.path for t in targets if is_film(t.path)], expanded.options.fps, frames[0]) as open_films:
+        for shown in drawn(farm, parts):
+            if not isinstance(shown, Shown):
+                lasts.append(shown)
+                continue
+            paths = written.setdefault(shown.number, [])
+            for target, made in zip(targets, shown.files, strict=True):
+                if not isinstance(made, bytes):
+                    open_films[target.path].add(shown.number, made)
+                    continue
+                path = images.numbered(target.path, shown.number)
+                _write(path, made)
+                paths.append(str(path))
+                if not quiet:
+                    progress.clear()
+                    emit(str(path))
+            unsound[shown.number] = dict(shown.unsound)
+            progress.show(len(written))
+            if quiet:
+                say_event({"event": "frame", "frame": shown.number, "done": len(written), "of": len(frames)})
+    progress.clear()
+    lasts.sort(key=lambda frame: frame.number)
+    first = {name: problem for number in sorted(unsound, reverse=True) for name, problem in unsound[number].items()}
+    warnings.say([*(problem for frame in lasts for problem in frame.warnings), *first.values()])
+    whole = replace(lasts[-1], times=tuple(times for frame in lasts for times in frame.times))
+    for path in open_films:
+        if not quiet:
+            emit(str(path))
+    outputs = [path for number in sorted(written) for path in written[number]]
+    return whole.as_json() | {"outputs": [*outputs, *map(str, open_films)]}
+
+
+def _write(path: Path, content: bytes) -> None:
+    from rendergraph.images.files import failed, staged
+
+    with staged([path]) as (part,):
+        try:
+            part.write_bytes(content)
+        except OSError as error:
+            raise failed(path, error.strerror or str(error)) from error

@@ -1,0 +1,130 @@
+"""Films: frames one after the other into an MP4, by the ffmpeg that imageio-ffmpeg brings."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import Place, Problem, RenderError, UsageError
+from rendergraph.images.files import flush
+
+ENDING = ".mp4"
+
+
+def is_film(path: Path) -> bool:
+    """Whether a file holds many frames."""
+    return path.suffix.lower() == ENDING
+
+
+def need() -> None:
+    """Make sure that films can be written.
+
+    Raises:
+        UsageError: imageio-ffmpeg is not installed; how to get it.
+    """
+    if find_spec("imageio_ffmpeg") is None:
+        raise UsageError(Problem("RG500", "an .mp4 needs imageio-ffmpeg; pip install 'rendergraph[video]'"))
+
+
+@contextmanager
+def films(paths: Iterable[Path], fps: float, first: int) -> Iterator[dict[Path, Film]]:
+    """Films that are whole when the block ends well, and leave nothing behind when it does not.
+
+    Raises:
+        RenderError: the encoder failed, or the disk is full.
+    """
+    opened = {path: Film(path, fps, first) for path in paths}
+    try:
+        yield opened
+        for film in opened.values():
+            film.close()
+    finally:
+        for film in opened.values():
+            film.drop()
+
+
+class Film:
+    """A file that frames are added to, in any order; it appears when it is whole.
+
+    H.264 with 4:2:0 colours, which every player shows: sides that are odd grow by a row of black.
+    """
+
+    def __init__(self, path: Path, fps: float, first: int) -> None:
+        """Nothing is written yet.
+
+        Args:
+            path: the file.
+            fps: frames a second.
+            first: number of the frame that comes first.
+        """
+        self.path = path
+        self._fps, self._next = fps, first
+        self._early: dict[int, npt.NDArray[Any]] = {}
+        target = Path(os.path.realpath(path))
+        self._part = target.with_name(f".{target.name[:100]}.{os.urandom(4).hex()}.part")
+        self._writer: Any = None
+
+    def add(self, number: int, pixels: npt.NDArray[Any]) -> None:
+        """One frame: uint8 of shape (height, width, 3 or more).
+
+        Raises:
+            RenderError: the encoder ended, or the disk is full.
+        """
+        self._early[number] = pixels
+        while self._next in self._early:
+            self._write(np.ascontiguousarray(self._early.pop(self._next)[..., :3]))
+            self._next += 1
+
+    def _write(self, pixels: npt.NDArray[Any]) -> None:
+        if self._writer is None:
+            import imageio_ffmpeg  # type: ignore[import-untyped]  # an extra
+
+            height, width = pixels.shape[:2]
+            self._writer = imageio_ffmpeg.write_frames(
+                str(self._part),
+                (width, height),
+                fps=self._fps,
+                codec="libx264",
+                pix_fmt_out="yuv420p",
+                macro_block_size=1,
+                output_params=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-crf", "18", "-f", "mp4"],
+                ffmpeg_log_level="error",
+            )
+            self._writer.send(None)
+        try:
+            self._writer.send(pixels)
+        except (OSError, StopIteration) as error:
+            raise self._failed(error) from error
+
+    def close(self) -> None:
+        """The file is there.
+
+        Raises:
+            RenderError: the encoder failed, or the disk is full.
+        """
+        try:
+            if self._writer is not None:
+                self._writer.close()
+                self._writer = None
+            flush(self._part)
+            os.replace(self._part, os.path.realpath(self.path))
+        except (OSError, RuntimeError) as error:
+            raise self._failed(error) from error
+
+    def drop(self) -> None:
+        """Leave nothing behind of a film that is not whole."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+        self._part.unlink(missing_ok=True)
+
+    def _failed(self, error: Exception) -> RenderError:
+        reason = " ".join(str(error).split())[:200] or "the encoder ended"
+        return RenderError(Problem("RG507", f"the film cannot be written: {reason}", Place(str(self.path))))
