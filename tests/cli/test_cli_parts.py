@@ -109,8 +109,8 @@ def test_frames_that_depend_on_those_before_say_so_or_begin_as_early_as_is_decla
         assert read(tmp_path / f"there.{number:02d}.exr")[0, 0, 0] == number + 100 * (number - 1)
     assert cli("run", "p.yaml", "--frames", "3-12", "-o", "here.##.exr").code == 0
     for number in range(3, 13):
-        seen = [read(tmp_path / f"{name}.{number:02d}.exr") for name in ("here", "there")]
-        np.testing.assert_array_equal(*seen)
+        here, drawn = (read(tmp_path / f"{name}.{number:02d}.exr") for name in ("here", "there"))
+        np.testing.assert_array_equal(here, drawn)
 
 
 def test_films_need_their_extra_and_odd_wishes_are_told(
