@@ -1,19 +1,20 @@
 """Schedule to ResourcePlan: lifetimes, physical textures, aliases, bytes, lower bound.
 
-Textures are shared whole, in two tiers: `descriptor`, equal descriptions, and `view`, equal texel classes looked at
-through texture views. Within a class lifetimes are intervals, so that giving each the first free texture in order of
-time uses as few textures as are ever alive at once: no assignment uses fewer.
+Textures are shared whole, in three tiers: `descriptor`, equal descriptions; `view`, equal texel classes looked at
+through texture views; and `heap`, blocks of memory for textures of any description. Within a class lifetimes are
+intervals, so that giving each the first free texture in order of time uses as few textures as are ever alive at once:
+no assignment uses fewer.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import Literal, TypeAlias
 
-from rendergraph.allocate.heap import heap_bytes
+from rendergraph.allocate.heap import Item, share_blocks
 from rendergraph.schedule import Schedule, step_names
 from rendergraph.schedule.dependencies import touched_ids
 from rendergraph.schedule.model import storage_class
@@ -25,7 +26,7 @@ MOST_PLACED = 2_000
 
 
 Tier: TypeAlias = Literal["descriptor", "view", "heap"]
-"""How textures share memory: equal descriptions, equal texel classes through views, or bytes of one heap."""
+"""How textures share memory: equal descriptions, equal texel classes through views, or blocks of a heap."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,18 @@ class Physical:
 
     Attributes:
         index: its number.
-        desc: what it is created from; members of another format of the same texel class look at it through a view.
+        desc: what it is created from; members of another format of the same texel class look at it through a view. Of a
+            block the largest member's.
         members: resources that live in it, in time order; a history resource has two physicals to itself.
         bytes: by formula; none for what is the scene's.
+        block: whether it is memory alone, in which members of different texel classes are textures of their own.
     """
 
     index: int
     desc: TextureDesc | BufferDesc
     members: tuple[str, ...]
     bytes: int
+    block: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ class MemoryFigures:
         peak_node: the node whose step is the peak of this order; None without steps.
         proven: an order was found whose peak is that bound.
         least_peak_bytes: the least peak of live bytes of an order that was found.
-        tier: how textures are shared: `view` only where some share needs a view.
+        tier: how textures are shared: `view` only where some share needs a view, `heap` where some lie in a block.
         next_tier: the next way of sharing; None where everything shares all it can already.
         next_tier_bytes: what that would allocate, in this order.
     """
@@ -123,13 +127,14 @@ class ResourcePlan:
         return sum(self.physicals[place].bytes for place in self.placement[id])
 
 
-def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> ResourcePlan:
+def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap: bool = False) -> ResourcePlan:
     """Give every resource of a schedule memory.
 
     Args:
         schedule: steps in order.
         alias: let resources that are never alive together share; without it each has its own.
         views: let formats of one texel class share through texture views.
+        heap: let textures of any description share blocks of memory, where that takes fewer bytes.
     """
     lifetimes = _lifetimes(schedule)
     shareable = [
@@ -137,15 +142,21 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> R
     ]
     by_desc = _colour(schedule, lifetimes, shareable, _description)
     by_class = _colour(schedule, lifetimes, shareable, storage_class)
-    better: Sequence[tuple[Tier, Groups]] = ()  # tiers above the one asked for
+    better: list[tuple[Tier, Groups]] = []  # tiers above the one asked for
     if not alias:
         groups = [[id] for id in shareable]
-        better = (("descriptor", by_desc), ("view", by_class))
+        better = [("descriptor", by_desc), ("view", by_class)]
     elif views:
         groups = _fewest_views(schedule, shareable, by_desc, by_class)
     else:
         groups = by_desc
-        better = (("view", by_class),)
+        better = [("view", by_class)]
+    if len(shareable) <= MOST_PLACED:
+        blocks = _blocks(schedule, lifetimes, shareable, by_desc)
+        if not (alias and heap):
+            better.append(("heap", blocks))
+        elif _bytes(schedule, blocks) < _bytes(schedule, groups):
+            groups = blocks
     # With a texture of its own for everything, history has two in any order.
     copies = schedule.history_copies if alias else dict.fromkeys(schedule.history_copies, 2)
     physicals, placement = _physicals(schedule, groups, copies)
@@ -159,8 +170,8 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True) -> R
         physicals=physicals,
         placement=placement,
         released={position: tuple(ids) for position, ids in sorted(released.items())},
-        memory=_memory(schedule, lifetimes, shareable, physicals, placement, better),
-        reasons=_reasons(schedule, lifetimes, physicals, placement, alias=alias, views=views),
+        memory=_memory(schedule, physicals, placement, better),
+        reasons=_reasons(schedule, lifetimes, physicals, placement, _alike(views=views, heap=heap), alias=alias),
     )
 
 
@@ -244,6 +255,25 @@ def _fewest_views(schedule: Schedule, ids: Iterable[str], by_desc: Groups, by_cl
     return sorted(chosen, key=lambda group: order[group[0]])
 
 
+def _blocks(schedule: Schedule, lifetimes: Mapping[str, Lifetime], ids: Sequence[str], by_desc: Groups) -> Groups:
+    """Textures in blocks of memory, buffers as they are; no history and nothing kept is among them."""
+    resources = schedule.resources
+    textures = [id for id in ids if isinstance(resources[id].desc, TextureDesc)]
+    items = [
+        Item(resources[id].bytes, lifetimes[id].first, lifetimes[id].last, storage_class(resources[id]))
+        for id in textures
+    ]
+    buffers = [group for group in by_desc if isinstance(resources[group[0]].desc, BufferDesc)]
+    blocks = [[textures[number] for number in block] for block in share_blocks(items)]
+    order = {id: place for place, id in enumerate(ids)}
+    return sorted([*buffers, *blocks], key=lambda group: order[group[0]])
+
+
+def _bytes(schedule: Schedule, groups: Groups) -> int:
+    """What groups take: each as much as its largest member."""
+    return sum(max(schedule.resources[id].desc.bytes for id in group) for group in groups)
+
+
 def _physicals(
     schedule: Schedule, groups: Groups, copies: Mapping[str, int]
 ) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
@@ -251,11 +281,12 @@ def _physicals(
     placement: dict[str, tuple[int, ...]] = {}
     whole = [id for id in schedule.resources if id in schedule.whole_frame]
     for members in (*groups, *([id] for id in whole)):
-        resource = schedule.resources[members[0]]
+        resource = max((schedule.resources[id] for id in members), key=lambda resource: resource.desc.bytes)
         first = len(physicals)
         taken = 0 if resource.role == "scene" else resource.desc.bytes
+        block = len({storage_class(schedule.resources[id]) for id in members}) > 1
         for _ in range(copies.get(resource.id, 1)):
-            physicals.append(Physical(len(physicals), resource.desc, tuple(members), taken))
+            physicals.append(Physical(len(physicals), resource.desc, tuple(members), taken, block))
         for id in members:
             placement[id] = tuple(range(first, len(physicals)))
     return tuple(physicals), placement
@@ -263,8 +294,6 @@ def _physicals(
 
 def _memory(
     schedule: Schedule,
-    lifetimes: Mapping[str, Lifetime],
-    shareable: Sequence[str],
     physicals: Sequence[Physical],
     placement: Mapping[str, tuple[int, ...]],
     better: Iterable[tuple[Tier, Groups]],
@@ -276,14 +305,9 @@ def _memory(
     next_tier: Tier | None = None
     next_bytes: int | None = None
     for name, groups in better:
-        total = constant + sum(resources[group[0]].bytes for group in groups)
+        total = constant + _bytes(schedule, groups)
         if next_bytes is None and total < allocated:
             next_tier, next_bytes = name, total
-    if next_bytes is None and len(shareable) <= MOST_PLACED:
-        items = [(resources[id].bytes, lifetimes[id].first, lifetimes[id].last) for id in shareable]
-        total = constant + heap_bytes(items, schedule.peak_bytes - constant)
-        if total < allocated:
-            next_tier, next_bytes = "heap", total
     return MemoryFigures(
         no_reuse_bytes=sum(resource.bytes for resource in resources.values()),
         allocated_bytes=allocated,
@@ -291,7 +315,7 @@ def _memory(
         peak_node=schedule.peak_node,
         proven=schedule.proven,
         least_peak_bytes=schedule.least_peak_bytes,
-        tier="view" if viewed else "descriptor",
+        tier="heap" if any(physical.block for physical in physicals) else "view" if viewed else "descriptor",
         next_tier=next_tier,
         next_tier_bytes=next_bytes,
     )
@@ -302,17 +326,14 @@ def _reasons(
     lifetimes: Mapping[str, Lifetime],
     physicals: Sequence[Physical],
     placement: Mapping[str, tuple[int, ...]],
+    alike: tuple[Callable[[Resource], object], str],
     *,
     alias: bool,
-    views: bool,
 ) -> dict[str, str]:
     names = step_names(schedule.steps)
     outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
-    alike: dict[object, int] = defaultdict(int)
-    kind = storage_class if views else _description
-    for id, resource in schedule.resources.items():
-        if id not in schedule.whole_frame:
-            alike[kind(resource)] += 1
+    kind, what = alike
+    count = Counter(kind(resource) for id, resource in schedule.resources.items() if id not in schedule.whole_frame)
     reasons: dict[str, str] = {}
     for id, resource in schedule.resources.items():
         physical = physicals[placement[id][0]]
@@ -330,13 +351,13 @@ def _reasons(
         elif not alias:
             reasons[id] = "aliasing is off"
         elif len(physical.members) == 1:
-            others = alike[kind(resource)] - 1
             reasons[id] = (
-                f"no other {word} is of its {'texel class and' if views and word == 'texture' else 'format and'} size"
-                if not others
+                f"no other {word} {what if word == 'texture' else 'is of its size'}"
+                if count[kind(resource)] == 1
                 else f"whenever it is alive, all {word}s it could share are in use"
             )
         else:
+            word = "block" if physical.block else word
             place = physical.members.index(id)
             other = physical.members[place - 1 if place else 1]
             view = _view(resource, physical)
@@ -351,7 +372,14 @@ def _reasons(
     return reasons
 
 
+def _alike(*, views: bool, heap: bool) -> tuple[Callable[[Resource], object], str]:
+    """What two textures that can share have in common, and how that is said."""
+    if heap:
+        return (lambda resource: isinstance(resource.desc, TextureDesc) or resource.desc), "is there"
+    return (storage_class, "is of its texel class and size") if views else (_description, "is of its format and size")
+
+
 def _view(resource: Resource, physical: Physical) -> str:
-    if isinstance(resource.desc, BufferDesc) or resource.desc == physical.desc:
+    if physical.block or isinstance(resource.desc, BufferDesc) or resource.desc == physical.desc:
         return ""
     return f" through a {resource.desc.format} view"

@@ -172,6 +172,9 @@ _FIELDS = ("scene", "camera", "environment", "size", "sets", "patches", "asset_r
 """Of a `Selection`, all that an option sets."""
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
+heap_option = click.option(
+    "--heap", is_flag=True, help="Let textures of any size and format share memory, where the device can."
+)
 plugin_option = click.option(
     "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node modules, or a folder of them: code."
 )

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 @options.pipeline_options
 @options.json_option
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@options.heap_option
 @click.option("--shuffle", type=int, metavar="SEED", help="Another legal order.")
-def command(selection: Selection, as_json: bool, no_alias: bool, shuffle: int | None) -> None:
+def command(selection: Selection, as_json: bool, no_alias: bool, heap: bool, shuffle: int | None) -> None:
     """Show order, lifetimes and memory, with reasons.
 
     What runs in which order, how long each texture lives, which of them share memory, and the bytes.
@@ -32,7 +33,7 @@ def command(selection: Selection, as_json: bool, no_alias: bool, shuffle: int | 
 
     linked = stages.link(stages.resolve(selection))
     warn(linked.warnings)
-    plan = stages.plan(stages.expand(linked, RenderOptions(alias=not no_alias, shuffle=shuffle))).plan
+    plan = stages.plan(stages.expand(linked, RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle))).plan
     if as_json:
         emit_json(views.plan_json(plan))
     else:

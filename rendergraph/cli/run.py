@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 )
 @click.option("--no-cull", is_flag=True, help="Draw objects outside of the view, too.")
 @click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@options.heap_option
 @click.option("--poison", is_flag=True, help="Overwrite textures that are dead, to show who still reads them.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
 def command(
@@ -71,6 +72,7 @@ def command(
     reuse: bool | None,
     no_cull: bool,
     no_alias: bool,
+    heap: bool,
     poison: bool,
     shuffle: int | None,
 ) -> None:
@@ -98,7 +100,7 @@ def command(
     def modes(linked: Linked) -> RenderOptions:
         shown = frames or linked.frames
         plain = RenderOptions(shown, fps or linked.fps, timed=as_json, reuse=reuse)
-        return replace(plain, cull=not no_cull, alias=not no_alias, poison=poison, shuffle=shuffle)
+        return replace(plain, cull=not no_cull, alias=not no_alias, heap=heap, poison=poison, shuffle=shuffle)
 
     warnings = Warnings()
     read = partial(_read, selection, modes, outputs, taps, tap_all, warnings)

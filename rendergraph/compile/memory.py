@@ -13,6 +13,7 @@ import numpy as np
 from rendergraph.allocate import Physical, ResourcePlan
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
+from rendergraph.gl.blocks import Block, make_blocks
 from rendergraph.gl.device import Device
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import GpuTexture, texel
@@ -79,7 +80,7 @@ class Memory:
     device: Device
     plan: ResourcePlan
     environment: Callable[[], GpuTexture]
-    physicals: list[GpuTexture | moderngl.Buffer] = field(default_factory=list)
+    physicals: list[GpuTexture | moderngl.Buffer | Block] = field(default_factory=list)
     regions: dict[tuple[str, int], Region] = field(default_factory=dict)
     _views: dict[tuple[object, ...], GpuTexture] = field(default_factory=dict)
     _samplers: dict[Sampler, int] = field(default_factory=dict)
@@ -87,9 +88,14 @@ class Memory:
     _dummies: dict[tuple[int, bool], moderngl.Renderbuffer] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        blocks = [physical for physical in self.plan.physicals if physical.block]
+        descs = [[self._desc(id) for id in physical.members] for physical in blocks]
+        made_blocks = iter(make_blocks(self.device, descs))
         try:
             for physical in self.plan.physicals:
-                if self._is_scenes(physical):
+                if physical.block:
+                    self.physicals.append(next(made_blocks))
+                elif self._is_scenes(physical):
                     self.physicals.append(self.environment())
                 elif isinstance(physical.desc, BufferDesc):
                     self.physicals.append(self.device.ctx.buffer(reserve=max(16, physical.desc.bytes)))
@@ -100,6 +106,8 @@ class Memory:
                     if self.device.ctx.supports_labels:
                         self.device.ctx.mglo.set_label(_TEXTURE_LABEL, made.glo, label[:200])
         except BaseException:
+            for block in made_blocks:
+                block.release()
             self.release()
             raise
 
@@ -118,12 +126,18 @@ class Memory:
         places = self.plan.placement[resource]
         place = places[(parity + previous) % 2] if len(places) == 2 else places[0]
         base = self.physicals[place]
+        desc = self._desc(resource)
+        if isinstance(base, Block):
+            return base.textures[desc]
         assert isinstance(base, GpuTexture), f"{resource} is a buffer"
-        desc = self.plan.resources[resource].desc
-        assert isinstance(desc, TextureDesc)
         if desc.format == base.desc.format:
             return base
         return self._view(base, desc.format, None, None)
+
+    def _desc(self, resource: str) -> TextureDesc:
+        desc = self.plan.resources[resource].desc
+        assert isinstance(desc, TextureDesc), f"{resource} is a buffer"
+        return desc
 
     def part(self, resource: str, parity: int, read: Read) -> GpuTexture:
         """What a reader samples: the texture, or a view of one mip or layer."""
@@ -217,7 +231,8 @@ class Memory:
     ) -> list[Call]:
         """The calls that clear a texture, a mip or a layer; one seen through a view is drawn to (`textures.Clear`)."""
         texture = self.texture(resource, parity)
-        if texture in self.physicals:
+        place = self.plan.placement[resource][0]
+        if texture in self.physicals or self.plan.physicals[place].block:
             return [textures.Clear(self.device, texture, value, mip=mip, layer=layer)]
         calls: list[Call] = []
         for level in range(texture.desc.mips) if mip is None else (mip,):

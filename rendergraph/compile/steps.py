@@ -116,6 +116,10 @@ class _Compiler:
         asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
         self._passed = {step.key: Passed(self.device) for step in self.plan.schedule.steps if step.key in asked}
         self.looks_back = False
+        # Where a texture takes a block over: the driver, which knows of no sharing, has to be done with the others.
+        self._takeovers = {
+            self.plan.lifetimes[id].first for block in self.plan.physicals if block.block for id in block.members
+        }
 
     def executable(self) -> Executable:
         steps = [
@@ -160,6 +164,8 @@ class _Compiler:
             compiled.after.append(self._barrier)
         if self.poison:
             compiled.after += self._poison(position, parity)
+        if position in self._takeovers:
+            compiled.before.insert(0, self.device.ctx.finish)
         return compiled
 
     def _watch(self, step: Step, compiled: CompiledStep) -> None:

@@ -43,8 +43,14 @@ def target_of(desc: TextureDesc) -> int:
     return _MULTISAMPLE_TARGETS[desc.kind] if desc.samples > 1 else _TARGETS[desc.kind]
 
 
-def create(device: Device, desc: TextureDesc, label: str = "") -> GpuTexture:
+def create(device: Device, desc: TextureDesc, label: str = "", *, memory: int | None = None) -> GpuTexture:
     """Allocate a texture.
+
+    Args:
+        device: where.
+        desc: what.
+        label: what an error calls it.
+        memory: a memory object at whose beginning it lies; by default it has memory of its own.
 
     Raises:
         RenderError: the driver refused, mostly for lack of memory.
@@ -54,14 +60,15 @@ def create(device: Device, desc: TextureDesc, label: str = "") -> GpuTexture:
     target, gl_format = target_of(desc), FORMATS[desc.format].gl
     glo = raw.make("glCreateTextures", target)
     layered = desc.kind == "texture2d_array"
-    if desc.samples > 1 and layered:
-        raw.glTextureStorage3DMultisample(glo, desc.samples, gl_format, desc.width, desc.height, desc.layers, 1)
-    elif desc.samples > 1:
-        raw.glTextureStorage2DMultisample(glo, desc.samples, gl_format, desc.width, desc.height, 1)
-    elif layered:
-        raw.glTextureStorage3D(glo, desc.mips, gl_format, desc.width, desc.height, desc.layers)
+    size = (desc.width, desc.height, *((desc.layers,) if layered else ()))
+    store = "glTextureStorage" + ("Mem" if memory is not None else "") + ("3D" if layered else "2D")
+    at = (memory, 0) if memory is not None else ()
+    if desc.samples > 1:
+        store += "Multisample"
+        arguments = (desc.samples, gl_format, *size, 1, *at)
     else:
-        raw.glTextureStorage2D(glo, desc.mips, gl_format, desc.width, desc.height)
+        arguments = (desc.mips, gl_format, *size, *at)
+    getattr(raw, store + ("EXT" if memory is not None else ""))(glo, *arguments)
     error = raw.error()
     if error:
         raw.delete("glDeleteTextures", glo)

@@ -85,7 +85,7 @@ def key_of(expanded: Expanded) -> Hashable:
     sources = tuple(
         (node.id, node.type.shaders, node.type.inherited, _declared(node.type.cls)) for node in linked.graph.nodes
     )
-    modes = options.alias, options.poison, options.shuffle
+    modes = options.alias, options.heap, options.poison, options.shuffle
     return _structure(expanded.expansion), sources, id(linked.scene), modes
 
 

@@ -100,6 +100,7 @@ class RenderKeywords(TypedDict, total=False):
     outputs: Sequence[str] | None
     taps: Sequence[str]
     alias: bool
+    heap: bool
     poison: bool
     shuffle: int | None
     warm_up: bool
@@ -119,6 +120,7 @@ class RenderOptions:
         taps: further ports to read: `node.port`, of it `[layer]`, `[mip=1]` or `[layer,mip=1]`, and `:stencil`.
         alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, the seed of a random legal
             order instead of the best one.
+        heap: let textures of any size and format share blocks of memory; the device must have memory objects.
         warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it.
         timed: measure each step, which takes longer than many small ones do.
         reuse: leave out the steps whose values are still there from the frame before and would be the same; no bit of a
@@ -135,6 +137,7 @@ class RenderOptions:
     outputs: tuple[str, ...] | None = None
     taps: tuple[str, ...] = ()
     alias: bool = True
+    heap: bool = False
     poison: bool = False
     shuffle: int | None = None
     warm_up: bool = True

@@ -149,7 +149,8 @@ def plan(expanded: Expanded) -> Planned:
     """
     linked, options, wanted, expansion = expanded.linked, expanded.options, expanded.wanted, expanded.expansion
     schedule = rendergraph.schedule.schedule(expansion, shuffle=options.shuffle)
-    return Planned(linked, options, wanted, expansion, rendergraph.allocate.allocate(schedule, alias=options.alias))
+    allocated = rendergraph.allocate.allocate(schedule, alias=options.alias, heap=options.heap)
+    return Planned(linked, options, wanted, expansion, allocated)
 
 
 def check(linked: Linked) -> Planned:

@@ -8,7 +8,6 @@ from itertools import pairwise
 import pytest
 
 from rendergraph.allocate import Physical, ResourcePlan, allocate
-from rendergraph.allocate.heap import heap_bytes
 from rendergraph.schedule import Schedule
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import BufferDesc, TextureDesc
@@ -154,10 +153,30 @@ def test_no_aliasing_gives_each_its_own() -> None:
     assert plan.reasons["n0.x"] == "aliasing is off"
 
 
+WIDE = replace(HALF, width=512)
+
+
 def test_a_heap_is_the_tier_after_views() -> None:
-    plan = allocate(replace(chain(HALF, RGBA8, RGBA8, replace(HALF, width=128), RGBA8), peak_bytes=3 * UNIT))
-    assert plan.memory.next_tier == "heap"
-    assert plan.memory.next_tier_bytes == 3 * UNIT  # n0 beside n1, then n3 where n0 was
+    plan = allocate(chain(HALF, RGBA8, RGBA8, WIDE, RGBA8))
+    assert plan.memory.allocated_bytes == 8 * UNIT
+    assert (plan.memory.next_tier, plan.memory.next_tier_bytes) == ("heap", 6 * UNIT)
+
+
+def test_in_a_heap_textures_of_any_description_take_turns() -> None:
+    plan = allocate(chain(HALF, RGBA8, DEPTH, WIDE, RGBA8), heap=True)
+    assert members(plan) == [("n0.x", "n3.x"), ("n1.x", "n4.x"), ("n2.x",)]
+    assert plan.memory.allocated_bytes == 6 * UNIT == sum(physical.bytes for physical in plan.physicals)
+    assert plan.memory.tier == "heap"
+    assert plan.memory.next_tier is None
+    assert [physical.block for physical in plan.physicals] == [True, False, False]
+    assert plan.reasons["n3.x"].startswith("shares block 0 with n0.x, dead after")
+
+
+def test_where_a_heap_saves_nothing_textures_share_as_without() -> None:
+    plan = allocate(chain(RGBA8, R32F, RGBA8, R32F), heap=True)
+    assert members(plan) == members(allocate(plan.schedule))
+    assert plan.memory.tier == "descriptor"
+    assert not any(physical.block for physical in plan.physicals)
 
 
 def test_reasons_of_the_lonely() -> None:
@@ -191,15 +210,3 @@ def test_physicals_are_numbered_by_place() -> None:
     plan = allocate(chain(RGBA8, HALF, R32F, DEPTH, RGBA8))
     assert [physical.index for physical in plan.physicals] == list(range(len(plan.physicals)))
     assert all(isinstance(physical, Physical) and physical.bytes == physical.desc.bytes for physical in plan.physicals)
-
-
-def test_a_heap_fills_gaps_by_best_fit() -> None:
-    #        4 at first and a 2 beside it later; the 3 fits where the 4 was
-    assert heap_bytes([(4, 0, 1), (2, 0, 3), (3, 2, 3)], bound=6) == 6
-    assert heap_bytes([], bound=0) == 0
-
-
-def test_a_heap_can_need_more_than_the_peak() -> None:
-    # Two of size 1 that are never alive together are kept apart by what lies between them.
-    items = [(1, 0, 0), (2, 0, 1), (1, 1, 2), (2, 2, 3), (1, 3, 3)]
-    assert 3 <= heap_bytes(items, bound=3) <= 4

@@ -227,7 +227,11 @@ def assert_valid(plan: ResourcePlan, *, alias: bool = True) -> None:
     for home in plan.physicals:
         assert sorted(home.members) == sorted(users[home.index])
         for id in home.members:
-            assert_can_live_in(resources[id].desc, home.desc)
+            if home.block:
+                assert isinstance(resources[id].desc, TextureDesc)
+                assert resources[id].desc.bytes <= home.desc.bytes
+            else:
+                assert_can_live_in(resources[id].desc, home.desc)
     memory = plan.memory
     given = {id for id, resource in resources.items() if resource.role == "scene"}  # uploaded beside the plan
     assert not given & {write.resource for step in steps for write in step.writes}
@@ -291,16 +295,25 @@ def topological_orders(steps: tuple[Step, ...], expansion: Expansion) -> Iterato
 
 
 @pytest.mark.slow
-@given(expansions(), st.sampled_from(["best", "shuffled", "program"]), st.integers(0, 9), st.booleans(), st.booleans())
+@given(
+    expansions(),
+    st.sampled_from(["best", "shuffled", "program"]),
+    st.integers(0, 9),
+    st.booleans(),
+    st.booleans(),
+    st.booleans(),
+)
 @settings(max_examples=300, deadline=None)
-def test_orders_are_legal_and_plans_valid(base: Expansion, way: str, seed: int, alias: bool, views: bool) -> None:
+def test_orders_are_legal_and_plans_valid(
+    base: Expansion, way: str, seed: int, alias: bool, views: bool, heap: bool
+) -> None:
     found = schedule(base, shuffle=seed if way == "shuffled" else None, keep_order=way == "program")
     assert_legal(base, found)
     assert found.peak_bytes == peak_of(found.steps, base)
     if way == "program":
         kept = {step.key for step in found.steps}
         assert found.steps == tuple(step for step in base.steps if step.key in kept)
-    assert_valid(allocate(found, alias=alias, views=views), alias=alias)
+    assert_valid(allocate(found, alias=alias, views=views, heap=heap), alias=alias)
 
 
 @pytest.mark.slow

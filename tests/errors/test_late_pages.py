@@ -310,6 +310,15 @@ def test_targets_that_the_driver_does_not_take(bench: Any, monkeypatch: pytest.M
     assert said(caught.value) == page("RG617")["message"]
 
 
+def test_a_device_without_memory_objects(gl: rg.Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(type(gl.device.ctx), "extensions", property(lambda _: set()))
+    with pytest.raises(RendergraphError, match="RG621") as caught:
+        gl.render(rg.load("forward", size=(16, 9), sets=("sun.resolution=16",)), heap=True, warm_up=False)
+    assert said(caught.value) == page("RG621")["message"].replace(
+        "llvmpipe (LLVM 15.0.6, 256 bits)", gl.device.renderer
+    )
+
+
 def test_every_code_that_is_raised_has_one_page_and_every_page_a_code() -> None:
     sources = [*folder("rendergraph").rglob("*.py"), *folder("rendergraph.nodes").rglob("*.py")]
     raised = {code for file in sources for code in re.findall(r"\"(RG\d{3})\"", file.read_text())}

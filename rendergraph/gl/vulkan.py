@@ -1,0 +1,142 @@
+"""Memory of a device as a file descriptor, which is how OpenGL takes memory objects: Vulkan allocates and exports it.
+
+A few functions of Vulkan 1.1 over its loader. Structures are packed by hand: each is used once.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rendergraph.textures import FORMATS, TextureDesc
+
+_FORMATS = {
+    "r8": 9, "rg8": 16, "rgba8": 37, "srgb8_a8": 43, "r16": 70, "rg16": 77, "rgba16": 91, "rgb10_a2": 64,
+    "rgba16_snorm": 92, "r16f": 76, "rg16f": 83, "rgba16f": 97, "r11f_g11f_b10f": 122, "r32f": 100, "rg32f": 103,
+    "rgba32f": 109, "r8ui": 13, "r16ui": 74, "r32ui": 98, "rg32ui": 101, "rgba32ui": 107, "r32i": 99,
+    "depth16": 124, "depth32f": 126, "depth24_stencil8": 129, "depth32f_stencil8": 130,
+}  # fmt: skip
+_OPAQUE_FD = 1
+_COLOR_USES, _DEPTH_USES = 0x1 | 0x2 | 0x4 | 0x10, 0x1 | 0x2 | 0x4 | 0x20
+
+
+class NoMemoryObjects(Exception):
+    """Vulkan is missing, or has not the device that OpenGL draws on."""
+
+
+class Vulkan:
+    """A device of Vulkan's, open for as long as memory is taken from it."""
+
+    def __init__(self, library: Any, physical: Any, device: Any) -> None:
+        self._library, self._physical, self._device = library, physical, device
+
+    def requirements(self, desc: TextureDesc) -> tuple[int, int]:
+        """Bytes that a texture takes on this device, and a mask of the types of memory that it can lie in."""
+        uses = _DEPTH_USES if FORMATS[desc.format].is_depth else _COLOR_USES
+        external = _packed("@I P I", 1000072001, 0, _OPAQUE_FD)
+        flags = 0x10 if desc.kind == "texture_cube" else 0
+        size = (desc.width, desc.height, 1, desc.mips, desc.layers)
+        asked = (14, _address(external), flags, 1, _FORMATS[desc.format], *size, desc.samples, 0, uses, 0, 0, 0, 0)
+        image, found = ctypes.c_uint64(), (ctypes.c_uint64 * 3)()
+        self._call("vkCreateImage", self._device, _packed("@I P 13I P I", *asked), None, ctypes.byref(image))
+        self._library.vkGetImageMemoryRequirements(self._device, image, found)
+        self._library.vkDestroyImage(self._device, image, None)
+        return found[0], found[2] & 0xFFFFFFFF
+
+    def export(self, size: int, types: int) -> int:
+        """A file descriptor of new memory of a type in the mask, the device's own where there is one."""
+        table = (ctypes.c_uint32 * 256)()
+        self._library.vkGetPhysicalDeviceMemoryProperties(self._physical, table)
+        able = [number for number in range(table[0]) if types >> number & 1]
+        chosen = next((number for number in able if table[1 + 2 * number] & 1), able[0])
+        exported = _packed("@I P I", 1000072002, 0, _OPAQUE_FD)
+        memory, descriptor = ctypes.c_uint64(), ctypes.c_int(-1)
+        asked = _packed("@I P Q I", 5, _address(exported), size, chosen)
+        self._call("vkAllocateMemory", self._device, asked, None, ctypes.byref(memory))
+        self._library.vkGetDeviceProcAddr.restype = ctypes.c_void_p
+        address = self._library.vkGetDeviceProcAddr(self._device, b"vkGetMemoryFdKHR")
+        get = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
+        asked = _packed("@I P Q I", 1000074002, 0, memory.value, _OPAQUE_FD)
+        result = get(self._device, _address(asked), ctypes.addressof(descriptor))
+        self._library.vkFreeMemory(self._device, memory, None)  # whoever holds the descriptor holds the memory
+        _check("vkGetMemoryFdKHR", result)
+        return descriptor.value
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        _check(name, getattr(self._library, name)(*arguments))
+
+
+@contextmanager
+def open_vulkan(identity: bytes) -> Iterator[Vulkan]:
+    """The device with this 16-byte identity, which OpenGL gives as its own.
+
+    Raises:
+        NoMemoryObjects: there is none, or it does not export memory.
+    """
+    try:
+        library = ctypes.CDLL("libvulkan.so.1")
+    except OSError:
+        raise NoMemoryObjects("libvulkan.so.1 cannot be loaded") from None
+    instance, device = ctypes.c_void_p(), ctypes.c_void_p()
+    application = _packed("@I P P I P I I", 0, 0, 0, 0, 0, 0, 1 << 22 | 1 << 12)
+    with _no_layer():
+        asked = _packed("@I P I P I P I P", 1, 0, 0, _address(application), 0, 0, 0, 0)
+        _check("vkCreateInstance", library.vkCreateInstance(asked, None, ctypes.byref(instance)))
+    try:
+        physical = _same_device(library, instance, identity)
+        priority = ctypes.c_float(1.0)
+        queue = _packed("@I P I I I P", 2, 0, 0, 0, 1, ctypes.addressof(priority))
+        names = (ctypes.c_char_p * 1)(b"VK_KHR_external_memory_fd")
+        asked = _packed("@I P I I P I P I P P", 3, 0, 0, 1, _address(queue), 0, 0, 1, _address(names), 0)
+        _check("vkCreateDevice", library.vkCreateDevice(physical, asked, None, ctypes.byref(device)))
+        try:
+            yield Vulkan(library, physical, device)
+        finally:
+            library.vkDestroyDevice(device, None)
+    finally:
+        library.vkDestroyInstance(instance, None)
+
+
+def _same_device(library: Any, instance: Any, identity: bytes) -> Any:
+    count = ctypes.c_uint32()
+    library.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    devices = (ctypes.c_void_p * count.value)()
+    library.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), devices)
+    for handle in devices:
+        names = ctypes.create_string_buffer(struct.pack("@I P", 1000071004, 0), 80)
+        properties = ctypes.create_string_buffer(struct.pack("@I P", 1000059001, _address(names)), 2048)
+        library.vkGetPhysicalDeviceProperties2(ctypes.c_void_p(handle), properties)
+        if names.raw[16:32] == identity:
+            return ctypes.c_void_p(handle)
+    raise NoMemoryObjects("Vulkan does not have the device that OpenGL draws on")
+
+
+@contextmanager
+def _no_layer() -> Iterator[None]:
+    """Without Mesa's layer that orders devices: it looks for a display, and complains where there is none."""
+    before = os.environ.get("NODEVICE_SELECT")
+    os.environ["NODEVICE_SELECT"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["NODEVICE_SELECT"]
+        else:
+            os.environ["NODEVICE_SELECT"] = before
+
+
+def _packed(form: str, *values: int) -> Any:
+    return ctypes.create_string_buffer(struct.pack(form, *values))
+
+
+def _address(structure: Any) -> int:
+    return ctypes.addressof(structure)
+
+
+def _check(name: str, result: int) -> None:
+    if result:
+        raise NoMemoryObjects(f"{name} failed ({result})")

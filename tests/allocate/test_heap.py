@@ -1,0 +1,50 @@
+"""Blocks that items of any size share: against the least of all ways to share them."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+
+from rendergraph.allocate.heap import Item, blocks_bytes, least_bytes, share_blocks
+
+
+def ways(items: list[Item]) -> Iterator[list[list[int]]]:
+    """All partitions into blocks whose members are never alive together, by the definition."""
+
+    def extend(number: int, blocks: list[list[int]]) -> Iterator[list[list[int]]]:
+        if number == len(items):
+            yield blocks
+            return
+        moments = range(items[number].first, items[number].last + 1)
+        for place, block in enumerate(blocks):
+            if not any(items[other].first <= moment <= items[other].last for other in block for moment in moments):
+                yield from extend(number + 1, [*blocks[:place], [*block, number], *blocks[place + 1 :]])
+        yield from extend(number + 1, [*blocks, [number]])
+
+    return extend(0, [])
+
+
+def drawn(chooser: random.Random) -> list[Item]:
+    starts = [chooser.randrange(6) for _ in range(chooser.randint(1, 6))]
+    return [Item(chooser.choice((1, 2, 3, 5, 8, 16)), start, start + chooser.randrange(3)) for start in starts]
+
+
+def test_the_least_of_all_ways_to_share() -> None:
+    chooser = random.Random(5)
+    for _ in range(200):
+        items = drawn(chooser)
+        blocks = share_blocks(items)
+        assert sorted(map(sorted, blocks)) in [sorted(way) for way in ways(items)]
+        least = min(blocks_bytes(items, way) for way in ways(items))
+        assert least_bytes(items) <= least == blocks_bytes(items, blocks)
+
+
+def test_blocks_can_need_more_than_the_peak() -> None:
+    items = [Item(4, 0, 0), Item(3, 1, 1), Item(3, 1, 1)]
+    assert blocks_bytes(items, share_blocks(items)) == least_bytes(items) == 7  # of 6 that live at once
+    assert share_blocks([]) == []
+
+
+def test_members_are_in_the_order_of_time_and_like_goes_with_like() -> None:
+    items = [Item(4, 2, 3, "a"), Item(4, 0, 1, "a"), Item(4, 0, 1, "b"), Item(4, 2, 3, "b")]
+    assert sorted(share_blocks(items)) == [[1, 0], [2, 3]]
