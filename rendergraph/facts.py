@@ -93,6 +93,8 @@ class ObjectFacts:
         double_sided: its material shows from both sides.
         hidden: it is drawn only where a step names it.
         grain: its material is rougher along one direction than across (`anisotropy_strength`), at some time at least.
+        emissive: its material emits light, at some time at least.
+        reflective: its material reflects other than 4 % at normal incidence where it is not metal, at some time.
         mesh: the name of its mesh.
     """
 
@@ -104,6 +106,8 @@ class ObjectFacts:
     double_sided: bool = False
     hidden: bool = False
     grain: bool = False
+    emissive: bool = False
+    reflective: bool = False
     mesh: str = field(default="", compare=False)
     _gap: Callable[[], str] = field(default=str, compare=False, repr=False)
     _plane: Callable[[], object] = field(default=lambda: None, compare=False, repr=False)

@@ -6,12 +6,12 @@ body assigns it. A test holds both against this list.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Emissive, Facts, Input, Material, Normal, Output, Semantic
+from rendergraph.api import Emissive, Facts, Input, Material, Normal, ObjectFacts, Output, Semantic
 
 from ._samples import own_samples
 
@@ -29,6 +29,7 @@ class SurfaceTexture:
         otherwise: what a reader takes that is not given it; such an input is optional.
         needs: the word of the shading models that look at it; all do where there is none.
         unless: the words of those that do not.
+        where: which objects have anything to say there; where none of those that are opaque has, nobody looks at it.
     """
 
     semantic: Semantic
@@ -37,6 +38,7 @@ class SurfaceTexture:
     otherwise: str = ""
     needs: str = ""
     unless: tuple[str, ...] = ("nothing",)
+    where: Callable[[ObjectFacts], bool] | None = None
 
     def drawn(self) -> Output:
         """The port of a node that fills it."""
@@ -47,9 +49,10 @@ class SurfaceTexture:
         doc = f"{self.doc} Unconnected: {self.otherwise}." if self.otherwise else self.doc
         return Input(self.semantic, group="gbuffer", optional=bool(self.otherwise), samples="any", doc=doc)
 
-    def is_looked_at(self, needs: Collection[str]) -> bool:
-        """Whether a shading model with these needs looks at it."""
-        return (not self.needs or self.needs in needs) and not any(word in needs for word in self.unless)
+    def is_looked_at(self, needs: Collection[str], objects: Sequence[ObjectFacts]) -> bool:
+        """Whether a shading model with these needs looks at it, of these objects."""
+        looks = (not self.needs or self.needs in needs) and not any(word in needs for word in self.unless)
+        return looks and (self.where is None or any(self.where(one) for one in objects if not one.blended))
 
     def _format(self, node: Any, facts: Facts) -> str:
         return self.compact if node.precision == "compact" else "rgba32f"
@@ -63,13 +66,14 @@ SURFACE_TEXTURES: Mapping[str, SurfaceTexture] = {
     "material": SurfaceTexture(
         Material, "rgba16", "Metallic, roughness, occlusion, and 1 for surfaces that lights reach, 0 for unlit ones."
     ),
-    "emissive": SurfaceTexture(Emissive, "r11f_g11f_b10f", "Emitted radiance."),
+    "emissive": SurfaceTexture(Emissive, "r11f_g11f_b10f", "Emitted radiance.", where=lambda one: one.emissive),
     "specular": SurfaceTexture(
         AnyTexel,
         "rgba8",
         "Of what is not metal: root of the reflectance at normal incidence, and at grazing incidence in alpha.",
         otherwise="4 %, and 1",
         unless=("nothing", "phong"),
+        where=lambda one: one.reflective,
     ),
     "grain": SurfaceTexture(
         AnyTexel,

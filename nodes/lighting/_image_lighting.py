@@ -44,7 +44,8 @@ class ImageLighting(SurfaceLighting):
         needs = set(steps.needs("shading"))
         if "grain_where_any" in needs and any(entry.grain and not entry.blended for entry in steps.facts.objects):
             needs.add("grain")
-        wanted = {name for name, texture in SURFACE_TEXTURES.items() if texture.is_looked_at(needs)}
+        objects = steps.facts.objects
+        wanted = {name for name, texture in SURFACE_TEXTURES.items() if texture.is_looked_at(needs, objects)}
         ports = [port for name, port in self.inputs().items() if name in wanted]
         return _connected(steps, [self.depth, *ports])
 

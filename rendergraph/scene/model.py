@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -28,6 +28,7 @@ Vec3: TypeAlias = tuple[float, float, float]
 FARTHEST = 1e12
 """No number of a mesh is larger: products of a few would leave single precision."""
 
+_REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
 
@@ -371,7 +372,20 @@ class Scene:
 
     def has_grain(self, material: Material) -> bool:
         """Whether a material is rougher along one direction than across, now or at another time."""
-        return material.anisotropy_strength > 0 or f"materials.{material.name}.anisotropy_strength" in self.keyframes
+        return material.anisotropy_strength > 0 or self._changes(material, "anisotropy_strength")
+
+    def emits(self, material: Material) -> bool:
+        """Whether a material emits light, now or at another time."""
+        return any(material.emissive) or self._changes(material, "emissive")
+
+    def reflects(self, material: Material) -> bool:
+        """Whether what is not metal of a material reflects other than 4 % along its normal, now or at another time."""
+        usual = material.ior == 1.5 and material.specular == 1.0 and material.specular_color == (1.0, 1.0, 1.0)
+        textured = not material.textures.keys().isdisjoint(("specular", "specular_color"))
+        return textured or not usual or any(map(partial(self._changes, material), _REFLECTANCE))
+
+    def _changes(self, material: Material, key: str) -> bool:
+        return f"materials.{material.name}.{key}" in self.keyframes
 
     def __repr__(self) -> str:
         return (

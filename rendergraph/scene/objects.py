@@ -34,6 +34,8 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
                 material.double_sided,
                 placed.hidden,
                 scene.has_grain(material),
+                scene.emits(material),
+                scene.reflects(material),
                 mesh.name,
                 partial(attrgetter("edges.gap"), mesh),
                 partial(attrgetter("plane"), mesh),

@@ -68,6 +68,7 @@ bool surface_at(ivec2 texel, int number, out Surface s) {
     s.occlusion = stored.z;
     s.lit = stored.w;
 #endif
+    s.emissive = vec3(0.0);
 #ifdef HAS_EMISSIVE
     s.emissive = texelFetch(emissive, texel, number).rgb;
 #endif

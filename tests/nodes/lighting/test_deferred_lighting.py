@@ -214,17 +214,36 @@ def test_compact_coefficients_of_the_empirical_models_are_finer(radiance: Any, s
 # --- the graph -------------------------------------------------------------------------------------------------------
 
 
-def drawn(*sets: str) -> set[str]:
-    plan = rg.load("deferred", scene="cornell_box", size=(64, 48), sets=sets).plan()
+def drawn(*sets: str, scene: str | Path = "cornell_box") -> set[str]:
+    plan = rg.load("deferred", scene=scene, size=(64, 48), sets=sets).plan()
     return {name.partition(".")[2] for name in plan.resources if name.startswith("gbuffer.")}
 
 
 def test_only_what_the_shading_model_reads_is_drawn() -> None:
     assert drawn("light.shading=unlit") == {"depth", "albedo"}
     common = {"depth", "albedo", "normal", "material", "emissive"}
-    assert drawn() == common | {"specular"}
-    assert drawn("light.shading=anisotropic") == common | {"specular", "grain"}
+    assert drawn() == common
+    assert drawn("light.shading=anisotropic") == common | {"grain"}
     assert drawn("light.shading=phong") == common | {"phong_diffuse", "phong_specular", "phong_ambient"}
+
+
+@pytest.mark.parametrize(
+    ("material", "more", "found"),
+    [
+        ("roughness: 1", "", set()),
+        ("emissive: [0, 0.1, 0]", "", {"emissive"}),
+        ("ior: 1.8", "", {"specular"}),
+        ("specular: 0.5", "", {"specular"}),
+        ("specular_color: [1, 0.5, 1]", "", {"specular"}),
+        ("emissive: [1, 1, 1], ior: 1.2, alpha_mode: blend", "", set()),
+        ("roughness: 1", "keyframes: {materials.m.emissive: {0: [0, 0, 0], 1: [1, 1, 1]}}\n", {"emissive"}),
+        ("roughness: 1", "keyframes: {materials.m.ior: {0: 1.5, 1: 2}}\n", {"specular"}),
+    ],
+)
+def test_only_what_a_material_has_is_drawn(tmp_path: Path, material: str, more: str, found: set[str]) -> None:
+    text = f"objects: {{box: {{shape: box, material: m}}}}\nmaterials: {{m: {{{material}}}}}\n"
+    (tmp_path / "s.yaml").write_text(text + "lights: {sun: {type: directional}}\n" + more)
+    assert drawn(scene=tmp_path / "s.yaml") == {"depth", "albedo", "normal", "material"} | found
 
 
 def test_an_unlit_picture_casts_no_shadow() -> None:
