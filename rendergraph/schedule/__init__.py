@@ -138,7 +138,10 @@ def schedule(
             models[key] = Model.of(waits, kept, resources, alive, shown, sinks)
         return models[key]
 
-    found = _least(model_of, waits, readers_first(waits, kept, kept_versions), resources, budget_s)
+    early = readers_first(waits, kept, kept_versions)
+    each = [_least(model_of, waits, one, resources, budget_s) for one in early]
+    found = min(each, key=lambda found: (found.cost.pool, found.cost.peak))
+    found = replace(found, least=min(one.least for one in each), bound=min(one.bound for one in each))
     order, chosen = found.order, None
     if keep_order or shuffle is not None:
         model = model_of(waits, {})

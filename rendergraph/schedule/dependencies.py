@@ -7,12 +7,15 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
-from itertools import pairwise
+from itertools import islice, pairwise, permutations
 from typing import TypeAlias
 
 from rendergraph.errors import InputError, Mistake, Problem
 from rendergraph.steps import Resource, Step, Write
 from rendergraph.textures import TextureDesc
+
+MOST_TURNS = 720
+"""Orders in which histories are tried to be read before they are written: all of six."""
 
 StepKey: TypeAlias = tuple[str, int]
 """A step's `key`: node id and number."""
@@ -206,29 +209,37 @@ def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> 
     return copies
 
 
-def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> tuple[Waits, list[str]]:
+def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> list[tuple[Waits, list[str]]]:
     """The same with all who read a history's last value ahead of who writes the next, wherever that can be.
 
     Returns:
-        What the steps wait for then, and the histories of which not every order is so by itself.
+        What the steps wait for then, and the histories of which not every order is so by itself. Once, but where one
+        history's readers stand in the way of another's: once for each set of them that go together.
     """
-    readers: dict[str, list[StepKey]] = defaultdict(list)
+    readers: dict[str, set[StepKey]] = defaultdict(set)
     for step in kept:
         for read in step.all_reads:
-            if read.previous:
-                readers[read.resource].append(step.key)
-    more: dict[StepKey, dict[StepKey, tuple[str, str]]] = {key: dict(found) for key, found in waits.items()}
-    ordered: list[str] = []
-    for id in sorted(readers):
-        writers = versions.writers.get(id)
-        if not writers:
-            continue
-        writer = writers[next(iter(writers))].key
-        loose = sorted(reader for reader in set(readers[id]) if not _follows(more, writer, reader))
-        if loose and not any(_follows(more, reader, writer) for reader in loose):
-            more[writer] |= dict.fromkeys(loose, (id, "overwrites"))
-            ordered.append(id)
-    return more, ordered
+            if read.previous and versions.writers.get(read.resource):
+                readers[read.resource].add(step.key)
+    ids = sorted(readers)
+
+    def in_turn(order: Sequence[str]) -> tuple[Waits, list[str]]:
+        more: dict[StepKey, dict[StepKey, tuple[str, str]]] = {key: dict(found) for key, found in waits.items()}
+        ordered: list[str] = []
+        for id in order:
+            writers = versions.writers[id]
+            writer = writers[next(iter(writers))].key
+            loose = sorted(reader for reader in readers[id] if not _follows(waits, writer, reader))
+            if loose and not any(_follows(more, reader, writer) for reader in readers[id]):
+                more[writer] |= dict.fromkeys(loose, (id, "overwrites"))
+                ordered.append(id)
+        return more, ordered
+
+    found = in_turn(ids)
+    if all(id in found[1] or id not in in_turn([id])[1] for id in ids):
+        return [found]
+    turns = map(in_turn, islice(permutations(ids), MOST_TURNS))
+    return list({frozenset(ordered): (more, ordered) for more, ordered in turns}.values())
 
 
 def _follows(waits: Waits, step: StepKey, other: StepKey) -> bool:

@@ -126,6 +126,26 @@ def test_a_second_texture_of_a_history_is_taken_where_reading_first_costs_more()
     assert small.peak_bytes == small.lower_bound_bytes == (2 + 1 + 8) * MIB
 
 
+@pytest.mark.parametrize("large", ["a.old", "b.old"])
+def test_of_two_histories_that_cannot_both_be_read_first_the_larger_is(large: str) -> None:
+    steps = (
+        step("a", ("b.old@",), ("a.old",)),
+        step("b", ("a.old@",), ("b.old",)),
+        step("show", ("a.old", "b.old"), ("show.x",)),
+    )
+    found = schedule(expansion(*steps, sizes={large: 8}, a_old="history", b_old="history"))
+    assert found.history_copies == {"a.old": 2, "b.old": 2} | {large: 1}
+    assert found.peak_bytes == found.lower_bound_bytes == (2 + 8 + 1) * MIB
+
+
+def test_a_history_that_its_writer_reads_takes_two_textures_in_any_order() -> None:
+    """So nobody need wait for those who read it, and `more` is gone before `look.x` is there."""
+    steps = (step("look", ("keep.old@",), ("look.x",)), step("keep", ("keep.old@",), ("keep.old", "keep.more")))
+    found = schedule(expansion(*steps, image="look.x", keep_old="history"))
+    assert order(found) == ["keep", "look"]
+    assert found.peak_bytes == found.lower_bound_bytes == (2 + 1) * MIB
+
+
 def test_nothing_unwanted_runs() -> None:
     steps = (
         step("a", (), ("a.x",)),
