@@ -241,7 +241,7 @@ def test_only_what_the_shading_model_reads_is_drawn() -> None:
     ],
 )
 def test_only_what_a_material_has_is_drawn(tmp_path: Path, material: str, more: str, found: set[str]) -> None:
-    text = f"objects: {{box: {{shape: box, material: m}}}}\nmaterials: {{m: {{{material}}}}}\n"
+    text = f"scene: 1\nobjects: {{box: {{shape: box, material: m}}}}\nmaterials: {{m: {{{material}}}}}\n"
     (tmp_path / "s.yaml").write_text(text + "lights: {sun: {type: directional}}\n" + more)
     assert drawn(scene=tmp_path / "s.yaml") == {"depth", "albedo", "normal", "material"} | found
 
