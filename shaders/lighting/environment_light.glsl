@@ -23,7 +23,8 @@ vec3 mirrored_light(vec3 d, float roughness) {
     int sharp = textureQueryLevels(specular), last = sharp + textureQueryLevels(rough) - 1;
     float place = 2.0 * float(last) * roughness;  // even numbers are levels, odd ones lie between
     int below = min(int(place), 2 * last - 1), even = (below + 1) / 2, odd = below / 2;
-    vec3 at_even = even < sharp ? textureLod(specular, d, float(even)).rgb : textureLod(rough, d, float(even - sharp)).rgb;
+    vec3 at_even =
+        even < sharp ? textureLod(specular, d, float(even)).rgb : textureLod(rough, d, float(even - sharp)).rgb;
     vec3 at_odd =
         odd < sharp ? textureLod(between, d, float(odd)).rgb : textureLod(rough_between, d, float(odd - sharp)).rgb;
     float share = place - float(below);

@@ -55,7 +55,7 @@ def test_what_a_lighting_step_may_use() -> None:
 
 
 def test_what_a_geometry_step_may_use() -> None:
-    found = scope_of(rg.load("forward"), "light")
+    found = scope_of(rg.load("forward", scene="cornell_box"), "light")
     assert found["float shadow(int light, vec3 position, vec3 normal)"] == "node 'shadows'"
     assert found["uniform sampler2DArrayShadow shadows_shadow_map"] == "sun.shadow_map, for a function"
     assert any(source == "parameter 'bias' of 'shadows': 1" or "of 'shadows'" in source for source in found.values())
