@@ -108,6 +108,7 @@ at_option = click.option(
 )
 @title_option
 @note_option
+@options.executor_options
 @options.json_option
 @options.device_option
 def command(
@@ -121,6 +122,9 @@ def command(
     thresholds: tuple[Threshold, ...],
     title: str,
     note: str,
+    executor: str | None,
+    devices: tuple[int, ...],
+    timeout: float | None,
     as_json: bool,
     device: int | None,
     select: options.Select,
@@ -178,6 +182,9 @@ def command(
             frame=frame,
             device=device,
             progress=on_terminal(),
+            executor=executor or "serial",
+            devices=devices,
+            timeout=timeout,
         )
     warn(found.warnings)
     for note in found.notes:
@@ -212,7 +219,7 @@ def _as_they_are(names: Sequence[str], reference: str | None, select: options.Se
     from rendergraph.session.made import is_picture
 
     source, context = click.core.ParameterSource, click.get_current_context()
-    drawn = {"frames", "frame", "device"} & {
+    drawn = {"frames", "frame", "device", "executor"} & {
         name for name in context.params if context.get_parameter_source(name) is source.COMMANDLINE
     }
     changed = select("") != Selection("", plugins=select("").plugins)

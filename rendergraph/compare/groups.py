@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph import metrics
 from rendergraph.compare.batches import Batch, draw, fitting, measure
-from rendergraph.compare.pictures import light_error
 from rendergraph.compare.runs import Run, picture_bytes
 from rendergraph.compare.sources import sources_digest
 from rendergraph.compare.timing import Times
-from rendergraph.compare.values import Pixels, machine, not_finite_pixels
+from rendergraph.compare.values import Pixels, light_error, machine, not_finite_pixels
 from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.farm.bundle import at_home, placed
@@ -23,6 +22,7 @@ from rendergraph.session.frame import figures_of
 from rendergraph.session.pipeline import Pipeline
 
 if TYPE_CHECKING:
+    from rendergraph.catalog import Catalog
     from rendergraph.session.selection import Selection
     from rendergraph.session.values import Planned
 
@@ -56,32 +56,34 @@ class Variant:
     @classmethod
     def of(cls, run: Run, number: int, *, drawn: bool) -> Variant:
         """A run as a worker has to know it."""
-        selection, digest = run.planned.linked.selection, _drawn_from(run.planned)
+        selection, digest = run.planned.linked.selection, drawn_from(run.planned)
         ending, metadata = run.picture.suffix, run.metadata
         return cls(number, run.name, selection, digest, run.output, ending, metadata, drawn, run.planned)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "planned": None}
 
-    def plan(self, worker: Worker) -> Planned:
+    def plan(self, worker: Worker, catalog: Catalog | None = None) -> Planned:
         """The pipeline with order and memory.
+
+        Args:
+            worker: where it is to be drawn.
+            catalog: that of another variant, which takes a while to make.
 
         Raises:
             InputError: it is not what it was when the sweep began.
         """
         if self.planned is not None:
             return self.planned
-        catalog = worker.kept.get("catalog")
         pipeline = Pipeline(placed(self.selection, worker.root), catalog)
-        worker.kept["catalog"] = pipeline.resolve().catalog
         planned = stages.plan(stages.expand(pipeline.link()))
-        if _drawn_from(planned) != self.digest:
+        if drawn_from(planned) != self.digest:
             text = f"what '{self.name}' is drawn from is not the same on worker '{worker.name}' as when the work began"
             raise InputError(Problem("RG642", f"{text}: a file has changed, or another version is installed there"))
         return planned
 
 
-def _drawn_from(planned: Planned) -> str:
+def drawn_from(planned: Planned) -> str:
     """What decides the picture and its figures beside the resolved file."""
     metrics = sorted(metric.name for metric in planned.linked.catalog.extensions.metrics())
     return f"{sources_digest(planned)} {' '.join(metrics)}"
@@ -199,9 +201,11 @@ class Group(Task):
             RenderError: likewise, or the worker lacks memory or its device.
         """
         planned: list[Planned | None] = []
+        catalog: Catalog | None = None
         for variant in self.variants:
             try:
-                planned.append(variant.plan(worker))
+                planned.append(variant.plan(worker, catalog))
+                catalog = planned[-1].linked.catalog if planned[-1] is not None else None
             except InputError as error:
                 if self.against is None:
                     raise

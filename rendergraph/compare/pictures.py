@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rendergraph import metrics
 from rendergraph.compare.divergence import every_output, first_difference, passes
+from rendergraph.compare.elsewhere import compared
 from rendergraph.compare.reference import (
     compared_output,
     measured_at,
@@ -18,11 +19,14 @@ from rendergraph.compare.reference import (
     unique_names,
 )
 from rendergraph.compare.timing import Times, times_of
-from rendergraph.compare.values import Comparison, Difference, Pixels, Reference, Result, not_finite_pixels
+from rendergraph.compare.values import Comparison, Difference, Reference, Result, light_error, not_finite_pixels
 from rendergraph.diff import diff
+from rendergraph.farm.bundle import bundled
+from rendergraph.farm.choose import Where, chosen
 from rendergraph.link import Graph
 from rendergraph.session import stages
 from rendergraph.session.progress import Progress, shown
+from rendergraph.stamps import looking
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
@@ -58,6 +62,9 @@ def compare(
     session: Gpu | None = None,
     device: int | None = None,
     progress: Progress | bool | None = None,
+    executor: Where = "serial",
+    devices: Sequence[int] = (),
+    timeout: float | None = None,
 ) -> Comparison:
     """Draw pipelines on one scene, with one camera and at one size, and compare what comes out.
 
@@ -71,6 +78,8 @@ def compare(
         session: where to draw; a private one by default.
         device: GL device number where no session is given.
         progress: told how many parts of the work are done, and of how many; True shows a bar on stderr.
+        executor: who draws, as for `sweep`; in this process the pipelines take turns, elsewhere each is measured alone.
+        devices, timeout: as for `sweep`.
 
     Raises:
         InputError: a mistake in a file, or the pictures cannot be compared.
@@ -80,55 +89,70 @@ def compare(
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
     own = [] if reference is None or isinstance(reference, Path) else [reference]
-    staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*pipelines, *own]])
-    planned = [stages.plan(pipeline.expand()) for pipeline in staged]
+    with looking() as files:
+        staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*pipelines, *own]])
+        planned = [stages.plan(pipeline.expand()) for pipeline in staged]
     first_one = planned[0].linked
     names = unique_names(names or [each.linked.graph.name for each in planned[: len(pipelines)]])
     picture = read_picture(reference, first_one.graph.size, names[0]) if isinstance(reference, Path) else None
     output, encoding = compared_output(staged, picture[1] if picture else None, measured=metric is not None)
-    with opened(session, device) as gpu, shown(progress, "steps") as tell:
-        step = _Steps(len(staged) + frames + 2 * len(pipelines), tell)
-        drawn = []
-        for each in planned:
-            drawn.append(_Drawn(each, stages.draw_last(each.for_frames(range(1, frame + 1)), gpu)))
-            step()
-        variants = drawn[: len(pipelines)]
-        base = drawn[-1] if own else drawn[0]
-        base_name = base.graph.name if own else names[0]
-        if picture:
-            against = Reference(str(reference), "file", picture[0], encoding, output)
-        else:
-            against = Reference(base_name, "pipeline" if own else "variant", base.frame[output], encoding, output)
-        times = _times(gpu, [variant.planned for variant in variants], frames, step)
-        tapped = every_output(gpu, base.planned, frame)
-        results = []
-        for name, variant, taken in zip(names, variants, times, strict=True):
-            first = None
-            if variant is not base:
-                seen = every_output(gpu, variant.planned, frame)
-                difference = diff(base.graph, variant.graph)
-                first = first_difference(tapped, seen, variant.planned.plan, variant.graph, difference)
-            step()
-            results.append(_result(name, variant, base, against, taken, first))
-            step()
+    if executor not in (None, "serial"):
+        measured = Reference(str(reference), "file", picture[0], encoding, output) if picture else None
+        travels, modules = all(each.catalog is None for each in [*pipelines, *own]), _modules(planned)
+        who = chosen(executor, None, device, tasks=len(pipelines), devices=devices, timeout=timeout, travels=travels)
+        with who as farm, shown(progress, "pipelines") as tell:
+            farm.bring(lambda: bundled(files, pipelines[0].selection.plugins, modules))
+            step = _Steps(len(pipelines), tell)
+            against, results, noticed, drew = compared(
+                farm, planned, names, bool(own), measured, output, encoding, frame, frames, step
+            )
+        base_name, base_graph = against.name if own else names[0], planned[-1 if own else 0].linked.graph
+    else:
+        with opened(session, device) as gpu, shown(progress, "steps") as tell:
+            step = _Steps(len(staged) + frames + 2 * len(pipelines), tell)
+            drawn = []
+            for each in planned:
+                drawn.append(_Drawn(each, stages.draw_last(each.for_frames(range(1, frame + 1)), gpu)))
+                step()
+            variants = drawn[: len(pipelines)]
+            base = drawn[-1] if own else drawn[0]
+            base_name = base.graph.name if own else names[0]
+            if picture:
+                against = Reference(str(reference), "file", picture[0], encoding, output)
+            else:
+                against = Reference(base_name, "pipeline" if own else "variant", base.frame[output], encoding, output)
+            times = _times(gpu, [variant.planned for variant in variants], frames, step)
+            tapped = every_output(gpu, base.planned, frame)
+            results = []
+            for name, variant, taken in zip(names, variants, times, strict=True):
+                first = None
+                if variant is not base:
+                    seen = every_output(gpu, variant.planned, frame)
+                    difference = diff(base.graph, variant.graph)
+                    first = first_difference(tapped, seen, variant.planned.plan, variant.graph, difference)
+                step()
+                results.append(_result(name, variant, base, against, taken, first))
+                step()
+        noticed, drew, base_graph = (
+            [one for each in drawn for one in each.frame.warnings],
+            drawn[0].frame.device,
+            base.graph,
+        )
     return Comparison(
         results=tuple(results),
         reference=against,
-        base=(base_name, base.graph),
+        base=(base_name, base_graph),
         scene=scene_name(first_one),
         camera=first_one.selection.camera,
         size=first_one.graph.size,
         frame=frame,
         metric=metric,
-        device=drawn[0].frame.device,
+        device=drew,
         notes=tuple(notes),
         warnings=tuple(
             dict.fromkeys(
-                [
-                    problem
-                    for each in drawn
-                    for problem in (*each.frame.warnings, *each.planned.linked.catalog.extensions.warnings)
-                ]
+                noticed
+                + [problem for each in planned for problem in each.linked.catalog.extensions.warnings]
                 + [problem for result in results for problem in result.warnings]
             )
         ),
@@ -168,11 +192,9 @@ def _result(
     )
 
 
-def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
-    """RMSE of scene-linear light, None where either picture has none."""
-    if light is None or reference is None:
-        return None
-    return metrics.rmse(metrics.colors(light), metrics.colors(reference))
+def _modules(planned: Sequence[Planned]) -> set[str]:
+    """The modules of the node classes in use."""
+    return {type(node.node).__module__ for each in planned for node in each.linked.graph.nodes}
 
 
 def _times(gpu: Gpu, variants: Sequence[Planned], frames: int, step: Callable[[], None]) -> list[Times]:

@@ -14,7 +14,7 @@ from rendergraph.compare.axes import typed
 from rendergraph.compare.timing import Times
 from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Place, Problem
-from rendergraph.metrics import Encoding, Metrics, description
+from rendergraph.metrics import Encoding, Metrics, colors, description, rmse
 from rendergraph.session.frame import not_finite
 
 if TYPE_CHECKING:
@@ -260,6 +260,13 @@ class Comparison:
             "variants": [result.as_json() for result in self.results],
             "notes": list(self.notes),
         }
+
+
+def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
+    """RMSE of scene-linear light, None where either picture has none."""
+    if light is None or reference is None:
+        return None
+    return rmse(colors(light), colors(reference))
 
 
 def not_finite_pixels(graph: Graph, arrays: Mapping[str, Pixels]) -> int:

@@ -17,6 +17,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.compare.ledger import Ledger
+from rendergraph.compare.pictures import compare
 from rendergraph.compare.product import Sweep, sweep
 from rendergraph.compare.study import RESULTS
 from rendergraph.errors import InputError, RenderError, UsageError
@@ -199,6 +200,25 @@ def test_a_file_that_changes_meanwhile_is_told(base: rg.Pipeline, tmp_path: Path
         told = sweep(base.set("bend.gain", 2), FEW, tmp_path / "b", frames=1, executor=farm, events=change)
     assert told.failures
     assert all("RG642" in failure.text and "a file has changed" in failure.text for failure in told.failures)
+
+
+def test_pipelines_are_compared_elsewhere_as_here(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    others = [base, base.set("bend.power", 2), base.set("make.wave", 3)]
+    truth = base.set("bend.gain", 2)
+    for reference in (None, truth):
+        here = compare(others, reference, frames=2, session=gl)
+        there = compare(others, reference, frames=2, executor="processes:2")
+        measured = {"frame_ms", "gpu_ms", "cpu_ms", "passes", "repeats"}
+        told = [
+            [{key: value for key, value in each.as_json().items() if key not in measured} for each in found.results]
+            for found in (here, there)
+        ]
+        assert told[0] == told[1]
+        assert there.results[2].first is not None
+        assert there.results[2].first.node == "make"
+        assert here.reference.as_json() == there.reference.as_json()
+        assert [result.times.frames for result in there.results] == [2, 2, 2]
+        assert there.device["renderer"] == here.device["renderer"]
 
 
 def test_node_classes_at_hand_are_drawn_here_alone(make: Any, tmp_path: Path) -> None:
