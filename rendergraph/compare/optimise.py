@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rendergraph.compare.axes import Axes, Axis, Space, typed
 from rendergraph.compare.goals import OBJECTIVES, Search, front_of, values_of
@@ -253,7 +253,8 @@ def _study(objectives: int, seed: int) -> Any:
 
     with _hushed():
         sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
-        return optuna.create_study(sampler=sampler, directions=["minimize"] * objectives)
+        directions: list[Literal["minimize"]] = ["minimize"] * objectives
+        return optuna.create_study(sampler=sampler, directions=directions)
 
 
 def _tell(study: Any, trial: Any, values: Sequence[float] | None) -> None:
