@@ -94,9 +94,9 @@ def work(pipe: int, name: str, device: int | None, root: str | None = None, home
         root: the folder beneath which files lie that were sent here.
         home: the current folder, as it is called where they came from.
     """
-    from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError
-    from rendergraph.farm.bundle import at_home
-    from rendergraph.farm.tasks import Handle, Worker
+    from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError  # in the process itself alone
+    from rendergraph.farm.bundle import at_home  # likewise
+    from rendergraph.farm.tasks import Handle, Worker  # likewise
 
     worker = Worker(name, device=device)
     if root is not None and home is not None:

@@ -127,7 +127,7 @@ class Dask(Executor):
         Raises:
             InputError: one lacks a plugin that is needed, or has another version of something.
         """
-        from rendergraph.farm.dask_worker import Station, fitness
+        from rendergraph.farm.dask_worker import Station, fitness  # needs the extra
 
         bundle = make()
         paths = {digest: path for path, digest in bundle.files.items()}
@@ -172,7 +172,7 @@ class Dask(Executor):
 
     def submit(self, task: Task) -> None:
         """One more task."""
-        from rendergraph.farm.dask_worker import perform
+        from rendergraph.farm.dask_worker import perform  # needs the extra
 
         if self._bundle is None:
             self.bring(lambda: bundled((), ()))
