@@ -123,8 +123,9 @@ class ResourcePlan:
         return self.schedule.resources
 
     def bytes(self, id: str) -> int:
-        """Bytes of a resource by formula: of both textures where it has two."""
-        return sum(self.physicals[place].bytes for place in self.placement[id])
+        """Bytes of a resource by formula: of both textures where it has two; none of what is the scene's."""
+        resource = self.resources[id]
+        return 0 if resource.role == "scene" else resource.desc.bytes * len(self.placement[id])
 
 
 def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap: bool = False) -> ResourcePlan:

@@ -180,6 +180,7 @@ def _lifetimes_text(plan: ResourcePlan) -> str:
 
 def _home(plan: ResourcePlan, id: str) -> str:
     word = "texture" if isinstance(plan.resources[id].desc, TextureDesc) else "buffer"
+    word = "block" if plan.physicals[plan.placement[id][0]].block else word
     return f"{word} {'+'.join(str(index) for index in plan.placement[id])}"
 
 

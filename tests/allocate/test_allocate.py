@@ -169,6 +169,7 @@ def test_in_a_heap_textures_of_any_description_take_turns() -> None:
     assert plan.memory.tier == "heap"
     assert plan.memory.next_tier is None
     assert [physical.block for physical in plan.physicals] == [True, False, False]
+    assert [plan.bytes(f"n{number}.x") for number in range(5)] == [2 * UNIT, UNIT, UNIT, 4 * UNIT, UNIT]
     assert plan.reasons["n3.x"].startswith("shares block 0 with n0.x, dead after")
 
 

@@ -1,8 +1,8 @@
 """How long scheduling takes and how good it is: `python tests/bench/bench_schedule.py`.
 
 Prints a table; nothing is asserted. Sizes are in MiB at 1920×1080. `optimum` is the least peak of live bytes over all
-orders (with `?` where it is not proven: the least that was found), `file` the peak of the file's order, `pool` what is allocated, `heap` what
-placing bytes would need.
+orders (with `?` where it is not proven: the least that was found), `file` the peak of the file's order, `pool` what is
+allocated, `heap` what blocks of memory for textures of any description would be.
 """
 
 from __future__ import annotations
