@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -200,6 +201,27 @@ def test_a_file_that_changes_meanwhile_is_told(base: rg.Pipeline, tmp_path: Path
         told = sweep(base.set("bend.gain", 2), FEW, tmp_path / "b", frames=1, executor=farm, events=change)
     assert told.failures
     assert all("RG642" in failure.text and "a file has changed" in failure.text for failure in told.failures)
+
+
+def test_a_full_disk_keeps_what_is_there(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    """A file that may grow no further is what a disk without room is to whoever writes it."""
+    words = ["sweep", "p.yaml", "-x", "make.wave=1:12:1", "-n", "1", "-o", "out", "--executor", "processes:2"]
+    ended = subprocess.run(
+        [sys.executable, "-m", "rendergraph", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (9000, resource.RLIM_INFINITY)),
+    )
+    assert ended.returncode == 1, ended.stderr
+    assert "RG507 the results cannot be kept" in ended.stderr
+    records, _ = Ledger(tmp_path / "out" / RESULTS).read()
+    assert 1 <= len(records) < 12
+    again = sweep(
+        rg.load(tmp_path / "p.yaml"), ["make.wave=1:12:1"], tmp_path / "out", frames=1, resume=True, session=gl
+    )
+    assert (again.resumed >= len(records), len(again.comparison.results)) == (True, 12)
+    assert len({record["key"] for record in Ledger(tmp_path / "out" / RESULTS).read()[0]}) == 12
 
 
 def test_pipelines_are_compared_elsewhere_as_here(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
