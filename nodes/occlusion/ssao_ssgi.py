@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Steps
+from rendergraph.api import Steps, param
 
 from ._combined import Combined
 
@@ -14,6 +14,8 @@ class SSAOSSGI(Combined):
     so that near half of them lie within the radius of occlusion, a fifth of that of light. This node adds ambient light
     itself, scaled by its occlusion; the lighting's own is to be 0.
     """
+
+    thickness: float = param(default=0.6, min=0, max=1e6, doc="How far what is seen goes on behind, in radii.")
 
     def record(self, steps: Steps) -> None:
         """Surfaces, light and occlusion, the neighbours' mean, full size; then what is made of it."""

@@ -7,11 +7,8 @@
 #endif
 
 #ifndef STEPS
-#if ANIMATED  // other arms follow, but what lies between steps is never seen
+// Steps before arms: what lies between steps is never seen, while neighbours have other arms.
 #define STEPS (SAMPLES < 16 ? 4 : 8)
-#else
-#define STEPS (SAMPLES < 32 ? 4 : 8)
-#endif
 #endif
 #define ARMS (SAMPLES / STEPS / 2 * 2)
 

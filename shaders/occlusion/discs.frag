@@ -1,19 +1,25 @@
-// Samples in the disc that the radius covers on the screen, along arms from near to far. The surface seen at each is a
-// disc in space that hides some of the sky (OPEN) and sends light (LIGHT).
+// Samples in the disc that the radius covers on the screen, along arms from near to far. The surface seen at each hides
+// some of the sky (OPEN), as a strip of the arm's slice or with BUNNELL as a disc in space, and sends light (LIGHT) as a
+// disc.
 #include "surfaces.glsl"
 #include "arms.glsl"
+#if defined(OPEN) && !defined(BUNNELL)
+#define STRIPS
+#include "slice.glsl"
+#include "strip.glsl"
+uniform float thickness;  // in radii
+#endif
 #include "quad.glsl"
 #include "value.glsl"
 #include <disc_to_disc.glsl>
 uniform sampler2D surfaces;
 uniform ivec2 screen;
 uniform float radius;  // metres
+#ifdef BUNNELL
+#include "discs_hide.glsl"
+#endif
 #ifdef LIGHT
 uniform sampler2D diffuse;
-#ifdef BACK
-uniform sampler2D back_surfaces;
-uniform sampler2D back_diffuse;
-#endif
 #ifdef BEYOND
 #include "beyond.glsl"
 #endif
@@ -23,40 +29,11 @@ const float wider = 1.0;
 #endif
 out Value unfiltered;
 
-// A large disc hides less than its parts would. All are as large as if there were this many of them, so that how dark
-// it is does not depend on how many samples are taken.
-const float DISCS = 2048.0;
-
 // Light from discs close by is limited by their size, or single ones would glow: these are larger.
 const float SENDING_DISCS = 512.0;
 
-// More than this no arm hides, though discs that stand close add up to more.
-const float MOST = 2.0;
-
-// What a disc at `offset` hides; nothing from beyond the radius or below the horizon.
-float hiding(View v, vec3 offset, vec3 normal, float far_off, float area, float facing) {
-    float apart = length(offset);
-    if (apart > radius || !rises(v, offset, normal, far_off)) return 0.0;
-    return disc_occlusion(apart, area, facing, dot(normal, offset) / apart);
-}
-
 #ifdef BACK
-// Light of the far side of what is seen, where the picture of back faces has one: an offset, and its share of the disc.
-vec3 light_from_behind(View v, ivec2 there, vec3 position, vec4 here, float w, float region, float share) {
-    ivec2 size = textureSize(back_surfaces, 0);
-    vec4 seen = texelFetch(back_surfaces, there, 0);
-    if (seen.w == 0.0) return vec3(0.0);
-    vec3 at = view_position(v, place_for(there, size, screen), seen.w);
-    vec3 offset = at - position;
-    vec3 sight = v.projection[2][3] == 0.0 ? vec3(0.0, 0.0, -1.0) : at / seen.w;
-    float apart = length(offset);
-    float facing = -dot(seen.xyz, offset) / apart;
-    if (facing <= 0.0 || apart > region || !rises(v, offset, here.xyz, max(here.w, seen.w))) return vec3(0.0);
-    float scale = clip_w(v, seen.w) / w;
-    float area = share * scale * scale / max(abs(dot(seen.xyz, sight)), 0.05);
-    vec3 sent = texelFetch(back_diffuse, texel_for(there, size, screen), 0).rgb;
-    return sent * disc_transfer(apart, area / SENDING_DISCS, facing, dot(here.xyz, offset) / apart);
-}
+#include "behind.glsl"
 #endif
 
 // Light in xyz, irradiance over pi, and openness in w.
@@ -68,16 +45,28 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     vec2 along = first_arm(texel, ARMS);
     vec3 eye = to_eye(v, position);
     float blocked = 0.0;
+    float whole = 0.0;  // what could be, of all arms
     vec3 light = vec3(0.0);
     for (int arm = 0; arm < ARMS; ++arm) {
         float stretch = stretch_of(texel, arm);
         float horizon = -1.0;  // cosine of the angle to the eye; what lies below is hidden already
         float hidden = 0.0;
+#ifdef STRIPS
+        Slice s = slice_along(along, eye, here.xyz);
+        float skyline = tangent_plane(s, 1.0);  // the same of what lies within the radius, with its rims
+        Sights sights = sights_along(v, middle, reach * along);
+        float looked = 0.0;  // how far out, as a share of the region
+#endif
         for (int i = 0; i < STEPS; ++i) {
             float u = (float(i) + stretch) / float(STEPS);
             vec2 place = middle + u * u * reach * along;
             ivec2 there = ivec2(floor(place * vec2(size)));
             if (there == texel) continue;
+#ifdef STRIPS
+            float from = looked;
+            float outer = u + 0.5 / float(STEPS);
+            looked = outer * outer;
+#endif
             bool inside = there == clamp(there, ivec2(0), size - 1);
             float share = 4.0 * PI * u * u * u * region * region;
             vec4 seen;
@@ -120,23 +109,28 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
                 light += sent * disc_transfer(apart, ring / SENDING_DISCS / slant, facing, towards);
             }
 #endif
-#ifdef OPEN
-            float hides = 0.0;
-            if (in_sight) hides = hiding(v, offset, here.xyz, far_off, ring / DISCS / slant, abs(facing));
-            if (facing < 0.0) {
-                // The far side of something solid. Its near side is not seen: a disc that faces the receiver stands for
-                // it, behind what is seen, where the line of sight comes nearest.
-                sight = normalize(sight);
-                offset += sight * clamp(-dot(offset, sight), 0.0, radius);
-                hides = max(hides, hiding(v, offset, here.xyz, far_off, ring / DISCS, 1.0));
-            }
-            hidden += hides;
+#ifdef BUNNELL
+            hidden += hidden_by(v, in_sight, offset, here.xyz, far_off, seen.xyz, sight, ring);
+#endif
+#ifdef STRIPS
+            if (apart > radius || !rises(v, offset, here.xyz, far_off)) continue;
+            vec2 strip = strip_of(sights, from, looked, position, offset, seen.xyz, eye, thickness * radius);
+            strip = clamp(strip, skyline, 1.0);
+            hidden += arc(s, strip.x, 1.0) - arc(s, strip.y, 1.0);
+            skyline = strip.y;
 #endif
         }
-        blocked += min(hidden * DISCS / float(STEPS), MOST);
+#ifdef BUNNELL
+        blocked += min(hidden, MOST);
+        whole += 1.0;
+#endif
+#ifdef STRIPS
+        blocked += s.share * hidden;
+        whole += s.share * whole_side(s, 1.0);
+#endif
         along = turned(along, ARMS);
     }
-    return vec4(light * SENDING_DISCS / float(ARMS * STEPS), 1.0 - blocked / float(ARMS));
+    return vec4(light * SENDING_DISCS / float(ARMS * STEPS), whole > 0.0 ? 1.0 - blocked / whole : 1.0);
 }
 
 void main() {

@@ -31,6 +31,11 @@ float horizon_along(
     return clamp(horizon, -1.0, 1.0);
 }
 
+// Light of a side that a horizon takes away: none where nothing rises above the tangent plane.
+float below(Slice s, float horizon, float side) {
+    return horizon > tangent_plane(s, side) ? whole_side(s, side) - arc(s, horizon, side) : 0.0;
+}
+
 // Openness in w; in xyz, with FOUR, the direction of what is open.
 vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     vec2 reach = covered(v, radius, clip_w(v, here.w));
@@ -42,14 +47,15 @@ vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     for (int number = 0; number < ARMS / 2; ++number) {
         Slice s = slice_along(along, eye, here.xyz);
         float stretch = stretch_of(texel, number);
-        float low = sin(s.lean);
-        float after = acos(horizon_along(v, texel, middle, reach * along, position, here, -low, stretch));
-        float before = -acos(horizon_along(v, texel, middle, -reach * along, position, here, low, 1.0 - stretch));
-        blocked += s.share * (arc(s, acos(-low)) - arc(s, after) + arc(s, -acos(low)) - arc(s, before));
+        float after = horizon_along(
+            v, texel, middle, reach * along, position, here, tangent_plane(s, 1.0), stretch);
+        float before = horizon_along(
+            v, texel, middle, -reach * along, position, here, tangent_plane(s, -1.0), 1.0 - stretch);
+        blocked += s.share * (below(s, after, 1.0) + below(s, before, -1.0));
 #ifdef FOUR
-        open += s.share * arc_direction(s, before, after);
+        open += s.share * arc_direction(s, -acos(before), acos(after));
 #endif
-        whole += s.share * whole_arc(s);
+        whole += s.share * s.whole;
         along = turned(along, ARMS);
     }
     return vec4(open / whole, 1.0 - blocked / whole);

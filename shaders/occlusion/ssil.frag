@@ -4,6 +4,7 @@
 #include "surfaces.glsl"
 #include "arms.glsl"
 #include "slice.glsl"
+#include "strip.glsl"
 #include "quad.glsl"
 uniform sampler2D surfaces;
 uniform sampler2D diffuse;
@@ -13,11 +14,10 @@ uniform float wider;      // light comes from this many times as far
 uniform float thickness;  // metres
 out vec4 unfiltered;
 
-// The share of a slice's light from below an angle, 0 to 1.
-float share_below(Slice s, float angle) {
-    angle = clamp(angle, s.lean - 0.5 * PI, s.lean + 0.5 * PI);
-    float below = arc(s, s.lean - 0.5 * PI) + sign(angle) * arc(s, angle);
-    return clamp(below / whole_arc(s), 0.0, 1.0);
+// The share of a slice's light from before a cosine on a side, 0 to 1: from the tangent plane opposite the arm on.
+float share_before(Slice s, float rise, float side) {
+    float before = whole_side(s, -1.0) + side * arc(s, max(rise, tangent_plane(s, side)), side);
+    return clamp(before / s.whole, 0.0, 1.0);
 }
 
 // The sectors between two shares.
@@ -25,23 +25,6 @@ uint sectors(float from, float to) {
     int first = int(round(from * 32.0));
     int count = int(round(to * 32.0)) - first;
     return count < 32 ? bitfieldInsert(0u, 0xFFFFFFFFu, first, max(count, 0)) : 0xFFFFFFFFu;
-}
-
-// Where a surface, extended, is seen at another place of the window: an offset from the pixel, for one of its own. No
-// farther along it than the pixel is away.
-vec3 extended(View v, vec2 place, vec3 position, vec3 offset, vec3 normal) {
-    bool orthographic = v.projection[2][3] == 0.0;
-    vec3 start = orthographic ? view_position(v, place, 0.0) : vec3(0.0);
-    vec3 sight = orthographic ? vec3(0.0, 0.0, -1.0) : view_position(v, place, 1.0);
-    float slope = dot(normal, sight);
-    vec3 there = start + sight * (dot(normal, position + offset - start) / slope) - position;
-    vec3 along = there - offset;
-    return abs(slope) > 1e-4 && dot(along, along) < dot(offset, offset) ? there : offset;
-}
-
-// The angle of an offset to the eye.
-float angle_of(vec3 offset, vec3 eye) {
-    return acos(clamp(dot(offset, eye) * inversesqrt(max(dot(offset, offset), 1e-20)), -1.0, 1.0));
 }
 
 // Irradiance over pi in xyz, openness in w.
@@ -56,8 +39,9 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     float whole = 0.0;
     for (int number = 0; number < ARMS / 2; ++number) {
         Slice s = slice_along(along, eye, here.xyz);
-        float weight = s.share * whole_arc(s) / 32.0;
+        float weight = s.share * s.whole / 32.0;
         float stretch = stretch_of(texel, number);
+        Sights sights = sights_along(v, middle, reach * along);
         uint filled = 0u;    // by all in the region
         uint occluded = 0u;  // by what is within the radius
         for (int i = 0; i < 2 * STEPS; ++i) {
@@ -75,14 +59,12 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
             // Each stands for the part of its surface half-way to the samples before and after it.
             float inner = u - 0.5 / float(STEPS);
             float outer = u + 0.5 / float(STEPS);
-            vec3 after = extended(v, middle + outer * outer * reach * way, position, offset, seen.xyz);
-            vec3 before = extended(v, middle + inner * abs(inner) * reach * way, position, offset, seen.xyz);
-            vec3 behind = offset - to_eye(v, at) * thickness;
-            float middling = angle_of(offset, eye);
-            float front = min(middling, angle_of(after, eye));
-            float rear = max(max(middling, angle_of(before, eye)), angle_of(behind, eye));
-            uint fills = back ? sectors(share_below(s, -rear), share_below(s, -front))
-                              : sectors(share_below(s, front), share_below(s, rear));
+            float side = back ? -1.0 : 1.0;
+            vec2 strip = strip_of(sights, side * inner * abs(inner), side * outer * outer, position, offset, seen.xyz, eye,
+                                  thickness);
+            float front = share_before(s, strip.y, side);
+            float rear = share_before(s, strip.x, side);
+            uint fills = sectors(min(front, rear), max(front, rear));
             if (dot(seen.xyz, offset) < 0.0) {
                 vec3 sent = texelFetch(diffuse, texel_for(there, size, screen), 0).rgb;
                 light += weight * float(bitCount(fills & ~filled)) * sent;

@@ -3,10 +3,11 @@
 // the surface of one of the screen's, not a mean of several.
 
 // The texel of a picture of size `screen` that a texel of a picture of size `small` stands for; without REDUCED they
-// are of one size, and whole numbers need not be divided.
+// are of one size. Not whole numbers are divided: processors without an instruction for many at once do that one by one.
 ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
 #ifdef REDUCED
-    return ((2 * texel + 1) * screen) / (2 * small);
+    vec2 step = vec2(screen) / vec2(small);
+    return ivec2((vec2(texel) + 0.5) * step + 0.25 / vec2(small));
 #else
     return texel;
 #endif

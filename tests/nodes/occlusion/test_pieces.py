@@ -114,7 +114,7 @@ nodes:
     type: shown_occlusion
     inputs: {{depth: g.depth, normal: g.normal}}
     params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, samples: {SAMPLES}}}
-  disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}}}}}
+  disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}, form: disc}}}}
 outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, unfiltered: ao.unfiltered, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
 """)
         pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
