@@ -12,6 +12,7 @@ from ._image_lighting import ImageLighting, samples_stored
 from .deferred_lighting import DeferredLighting
 
 _EDGE = 1
+_TILE = 4
 
 
 def half_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
@@ -19,6 +20,13 @@ def half_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
     depth = facts.input("depth").desc
     assert depth is not None
     return depth.mip_size(1)
+
+
+def tiles_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
+    """How many tiles cover the picture."""
+    depth = facts.input("depth").desc
+    assert depth is not None
+    return -(-depth.width // _TILE), -(-depth.height // _TILE)
 
 
 class DeferredMultisampled(DeferredLighting):
@@ -37,6 +45,7 @@ class DeferredMultisampled(DeferredLighting):
     edge_share = Output(AnyTexel, format="r32f", size=(1, 1), doc="The share of pixels with samples lit one by one.")
     marks = Internal(Depth, format="depth24_stencil8", samples=samples_stored, clear=0.0)
     lit_share = Internal(format="r8", samples=samples_stored)
+    tiles = Internal(format="r8", size=tiles_of_depth)
     means = Internal(format="r32f", size=half_of_depth, mips=0)
 
     normal_angle: float = param(
@@ -83,11 +92,19 @@ class DeferredMultisampled(DeferredLighting):
         steps.fullscreen("mark_edges.frag", out=self.marks, edges=self.edges, state=marking, label="marks")
         marked = Stencil(StencilFace(func="equal", reference=_EDGE))
         steps.fullscreen(
+            "marked_tiles.frag", out=self.tiles, edges=self.edges, defines={"TILE": _TILE}, label="marked tiles"
+        )
+        columns, rows = steps.desc(self.tiles).size
+        steps.draw(
             "deferred_lighting.frag",
+            vertex="marked_tiles.vert",
+            vertices=6 * columns * rows,
             out={**self.pictures(steps), "marks": self.marks},
-            defines=self.per_sample(steps),
-            state=State(depth_test=False, depth_write=False, stencil=marked),
+            defines={**self.per_sample(steps), "TILE": _TILE},
+            state=State(depth_test=False, depth_write=False, cull="none", stencil=marked),
             label="samples",
+            tiles=self.tiles,
+            screen=steps.desc(self.edges).size,
             **reads,
         )
         self.blend_over(steps)
