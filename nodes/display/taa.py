@@ -8,6 +8,10 @@ from rendergraph.api import Depth, DisplayColor, History, Input, Node, Output, S
 
 from ..geometry._velocity import Velocity
 
+_START = 1897
+"""Of the first 2,500 places to start at, that where the first 8 and 16 frames, with the one in the middle, cover half
+planes across a pixel with the least error."""
+
 
 class Taa(Node):
     """Smooth edges from pictures of many frames, each taken at other places within its pixels.
@@ -45,8 +49,8 @@ class Taa(Node):
         steps.fullscreen("taa.frag", out={"color": self.color, "gathered": self.gathered}, before=before, **reads)
 
     def camera_jitter(self, frame: int) -> tuple[float, float]:
-        """The frame's place in its pixels: the middle, then Halton's numbers, without two that crowd the middle."""
-        return (_halton(frame + 2, 2), _halton(frame + 2, 3)) if frame else (0.0, 0.0)
+        """The frame's place in its pixels: the middle, then Halton's numbers."""
+        return (_halton(frame + _START, 2), _halton(frame + _START, 3)) if frame else (0.0, 0.0)
 
 
 def _halton(index: int, base: int) -> float:

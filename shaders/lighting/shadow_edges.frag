@@ -23,5 +23,6 @@ void main() {
     float d = texelFetch(depth, texel, 0).r;
     edges = 0.0;
     if (is_nothing(d)) return;
-    if (bends(texel, ivec2(1, 0), d) || bends(texel, ivec2(0, 1), d)) edges = 1.0;
+    if (bends(texel, ivec2(1, 0), d) || bends(texel, ivec2(0, 1), d) || bends(texel, ivec2(1, 1), d) ||
+        bends(texel, ivec2(1, -1), d)) edges = 1.0;
 }

@@ -37,7 +37,7 @@ def test_one_frame_is_the_picture_as_it_is(session: rg.Session) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", ["cornell_box", "stairs"])
+@pytest.mark.parametrize("scene", ["cornell_box", "stairs", "shadow_study", "spheres"])
 def test_sixteen_still_frames_are_a_supersampled_picture(session: rg.Session, scene: str) -> None:
     size = (160, 90)
     exact = supersampled(session, rg.load("deferred", scene=scene), size, 8)
