@@ -18,8 +18,8 @@ class SSAODisc(ArmOcclusion):
     a strip before has hidden already counts once.
 
     With `form: disc` it is a disc in space instead (Bunnell, "Dynamic Ambient Occlusion and Indirect Lighting", 2005).
-    Discs that lie behind nearer ones of the arm hide nothing more; what is low over the horizon hides too much, and what
-    is large and near is cut off.
+    Discs that lie behind nearer ones of the arm hide nothing more; what is low over the horizon hides too much, and
+    what is large and near is cut off.
     """
 
     samples: int = define(default=16, min=8, max=128, doc="Surfaces looked at; rounded down to whole arms.")
