@@ -1,6 +1,6 @@
 // Samples in the disc that the radius covers on the screen, along arms from near to far. The surface seen at each hides
-// some of the sky (OPEN), as a strip of the arm's slice or with BUNNELL as a disc in space, and sends light (LIGHT) as a
-// disc.
+// some of the sky (OPEN), as a strip of the arm's slice or with BUNNELL as a disc in space, and sends light (LIGHT) as
+// a disc.
 #include "surfaces.glsl"
 #include "arms.glsl"
 #if defined(OPEN) && !defined(BUNNELL)

@@ -60,8 +60,8 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
             float inner = u - 0.5 / float(STEPS);
             float outer = u + 0.5 / float(STEPS);
             float side = back ? -1.0 : 1.0;
-            vec2 strip = strip_of(sights, side * inner * abs(inner), side * outer * outer, position, offset, seen.xyz, eye,
-                                  thickness);
+            vec2 ends = side * vec2(inner * abs(inner), outer * outer);
+            vec2 strip = strip_of(sights, ends.x, ends.y, position, offset, seen.xyz, eye, thickness);
             float front = share_before(s, strip.y, side);
             float rear = share_before(s, strip.x, side);
             uint fills = sectors(min(front, rear), max(front, rear));

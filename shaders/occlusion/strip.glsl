@@ -1,4 +1,4 @@
-// What a sample stands for in its arm's slice: the strip of its surface half-way to the samples before and after it, and
+// What a sample stands for in its arm's slice: the strip of its surface half-way to those before and after it, and
 // what is taken to lie behind (O. Therrien, Y. Levesque and G. Gilet, "Screen Space Indirect Lighting with Visibility
 // Bitmask", 2023).
 
@@ -36,8 +36,8 @@ float rise_of(vec3 offset, vec3 eye) {
 
 // The cosines to the eye between which the strip lies, seen from a pixel: of its rear and of its front.
 //
-// Args: the shares of the reach that it goes from and to, the pixel's position, the sample's offset from it, its normal,
-// and how thick it is in metres.
+// Args: the shares of the reach that it goes from and to, the pixel's position, the sample's offset from it and its
+// normal, and how thick it is in metres.
 vec2 strip_of(Sights s, float from, float to, vec3 position, vec3 offset, vec3 normal, vec3 eye, float thickness) {
     vec3 at = position + offset;
     vec3 sight = s.way_change == vec3(0.0) ? s.way : at * inversesqrt(dot(at, at));

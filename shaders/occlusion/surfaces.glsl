@@ -3,7 +3,7 @@
 // the surface of one of the screen's, not a mean of several.
 
 // The texel of a picture of size `screen` that a texel of a picture of size `small` stands for; without REDUCED they
-// are of one size. Not whole numbers are divided: processors without an instruction for many at once do that one by one.
+// are of one size. Numbers with a point are divided: whole ones some processors can only divide one by one.
 ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
 #ifdef REDUCED
     vec2 step = vec2(screen) / vec2(small);
