@@ -185,8 +185,8 @@ class Group(Task):
     @property
     def name(self) -> str:  # type: ignore[override]  # a value, said once
         """The first variant's, and how many more there are."""
-        more = f" and {len(self.variants) - 1} more" if len(self.variants) > 1 else ""
-        return f"{self.variants[0].name}{more}"
+        first, *more = self.variants
+        return f"{first.name} and {len(more)} more" if more else first.name
 
     @property
     def needs(self) -> tuple[Handle, ...]:  # type: ignore[override]  # see above
@@ -232,7 +232,7 @@ class Group(Task):
                 elif against is None or of_the_worker(error):
                     raise
                 else:
-                    yield Unable(own[batch.numbers[0]].number, _at_home(error, worker))
+                    yield Unable(own[next(iter(batch.numbers))].number, _at_home(error, worker))
 
     def _batch(
         self, worker: Worker, batch: Batch, variants: Sequence[Planned], own: Sequence[Variant], against: Against | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -84,7 +85,7 @@ class Film:
 
     def _write(self, pixels: npt.NDArray[Any]) -> None:
         if self._writer is None:
-            import imageio_ffmpeg  # type: ignore[import-untyped]  # an extra
+            imageio_ffmpeg: Any = import_module("imageio_ffmpeg")  # an extra, of which little is typed
 
             height, width = pixels.shape[:2]
             self._writer = imageio_ffmpeg.write_frames(

@@ -141,6 +141,8 @@ def test_sweep_draws_keeps_and_resumes(cli: Any, tmp_path: Path) -> None:
     words = (
         "sweep",
         "forward",
+        "--scene",
+        "cornell_box",
         *SMALL,
         "-x",
         "shadows.taps=1,3",
