@@ -358,8 +358,8 @@ def _frustum_edges_inside(planes: Points, box: Points) -> list[Points]:
     first, second = np.triu_indices(len(planes), 1)
     along = np.cross(planes[first, :3], planes[second, :3])
     length = np.linalg.norm(along, axis=1)
-    first, second, along = (each[length >= 1e-9] for each in (first, second, along))
-    along /= length[length >= 1e-9, None]
+    cross = length >= 1e-9
+    first, second, along = first[cross], second[cross], along[cross] / length[cross, None]
     systems = np.stack([planes[first, :3], planes[second, :3], along], axis=1)
     origins = np.linalg.solve(
         systems, np.column_stack([-planes[first, 3], -planes[second, 3], along @ middle])[..., None]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NoReturn, overload
+from typing import Annotated, Any, NoReturn, Optional, overload
 
 from rendergraph import textures
 from rendergraph.annotations import fits, quoted, words_for
@@ -53,7 +53,8 @@ CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
 DEFAULT_FORMAT = "rgba16f"
 _LIGHTS = Annotated[Sequence[Count], "the indices of lights"]
-_TEXEL, _COUNT, _SAMPLES, _FORMATNAME = Texel | None, Count | None, Samples | None, FormatName | None
+_TEXEL, _FORMATNAME = Texel | None, FormatName | None
+_COUNT, _SAMPLES = Optional[Count], Optional[Samples]  # noqa: UP045  # pyright knows no `|` of Annotated
 
 
 class _Unknown(Exception):

@@ -100,13 +100,13 @@ class Asks(Node):
 )
 def test_what_does_not_move_is_found_once(bench: Any, monkeypatch: pytest.MonkeyPatch, moving: str, found: int) -> None:
     asked: list[FrameScene] = []
-    bounds = FrameScene.bounds.func  # type: ignore[attr-defined]  # a cached property
+    bounds = FrameScene._bounds.func  # type: ignore[attr-defined]  # a cached property
 
     def ask(scene: FrameScene) -> object:
         asked.append(scene)
         return bounds(scene)
 
-    monkeypatch.setattr(FrameScene.bounds, "func", ask)
+    monkeypatch.setattr(FrameScene._bounds, "func", ask)
     values = "{0: 1, 1: 2}" if "intensity" in moving else "{0: [0, 0, 3], 1: [30, 0, 3]}"
     scene = "objects: {box: {shape: box}}\ncameras: {c: {eye: [0, 0, 4]}}\nlights: {l: {type: point}}\n"
     scene += f"keyframes: {{{moving}: {values}}}\n" if moving != "nothing" else ""
