@@ -53,8 +53,9 @@ CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}
 DEFAULT_FORMAT = "rgba16f"
 _LIGHTS = Annotated[Sequence[Count], "the indices of lights"]
-_TEXEL, _FORMATNAME = Texel | None, FormatName | None
-_COUNT, _SAMPLES = Optional[Count], Optional[Samples]  # noqa: UP045  # pyright knows no `|` of Annotated
+# pyright knows no `|` of Annotated
+_TEXEL, _FORMATNAME = Optional[Texel], Optional[FormatName]  # noqa: UP045
+_COUNT, _SAMPLES = Optional[Count], Optional[Samples]  # noqa: UP045
 
 
 class _Unknown(Exception):
