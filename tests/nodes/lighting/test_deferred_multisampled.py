@@ -39,11 +39,16 @@ def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str
     np.testing.assert_allclose(marked["edge_share"], edges.mean(), rtol=1e-6)
 
 
-@pytest.mark.parametrize(("scene", "taps"), [("shadow_study", 1), ("stairs", 4)])
-def test_edges_of_shadows_within_a_surface_are_lit_sample_by_sample(session: rg.Session, scene: str, taps: int) -> None:
+@pytest.mark.parametrize(
+    ("scene", "taps", "size"),
+    [("shadow_study", 1, (240, 135)), ("stairs", 4, (240, 135)), ("stairs", 1, (160, 90))],
+)
+def test_edges_of_shadows_within_a_surface_are_lit_sample_by_sample(
+    session: rg.Session, scene: str, taps: int, size: tuple[int, int]
+) -> None:
     """Hard ones, of one lookup, and soft ones, of 4 × 4."""
     sets = ["light.environment=null", f"shadows.taps={taps}"]
-    pipeline = rg.load("deferred-msaa", scene=scene, size=(240, 135), sets=sets)
+    pipeline = rg.load("deferred-msaa", scene=scene, size=size, sets=sets)
     every = session.render(every_sample(pipeline))
     assert (steps_apart(session.render(pipeline), every) > 1).mean() <= 0.001
     blind = session.render(pipeline.set("light.shadow_change", 2))
