@@ -1,8 +1,10 @@
 """Ends the process where a signal cannot: while a driver draws or compiles, Python hears of none.
 
 A second process waits for the byte that Python's own handler writes in the kernel's moment, gives the first one time to
-end by itself, and kills it then. It costs a fork before anything is imported, half a millisecond. Where `--executor` names
-other processes, this one never is in a driver, and ends them and itself at once; the watch is for what is drawn here.
+end by itself, and kills it then. It costs a fork before anything is imported, half a millisecond.
+
+Where `--executor` names other processes, this one never is in a driver, and ends them and itself at once: the watch is
+for what is drawn here.
 """
 
 from __future__ import annotations
