@@ -65,8 +65,8 @@ def test_surfaces_and_camera_that_move(session: rg.Session, moving: Any, camera:
     depth = frame["depth"][..., 0].astype(np.float64)
     y, x = np.nonzero(depth)
     assert len(x) > 100
-    # The picture was moved by the third of the places that frames are taken at.
-    jitter = np.array([(halton(4, 2), halton(4, 3))])
+    # The picture was moved by the third of the places that frames are taken at, from the 1897th of the sequence on.
+    jitter = np.array([(halton(1900, 2), halton(1900, 3))])
     place = np.stack([x + 0.5, height - y - 0.5], axis=1) - jitter
     ndc = np.column_stack([place / SIZE * 2 - 1, 1 - 2 * depth[y, x], np.ones(len(x))])
     world = ndc @ np.linalg.inv(seen.projection @ seen.view).T
@@ -97,7 +97,7 @@ def test_a_wider_view_knows_how_far_it_is_jittered(session: rg.Session, view: st
     patch = {"nodes": nodes, "outputs": {"velocity": "seen.velocity"}}
     pipeline = rg.load("taa", size=SIZE, patches=[patch])
     for frame in session.frames(pipeline, frames=range(1, 4), outputs=["velocity", "image"]):
-        assert np.abs(frame["velocity"]).max() < 1e-6
+        assert np.abs(frame["velocity"]).max() < 3e-6  # of the picture; it is moved by up to 1e-2
 
 
 def test_a_cropped_velocity_is_that_of_the_picture(session: rg.Session, moving: Any) -> None:
