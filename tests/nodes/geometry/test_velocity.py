@@ -66,7 +66,7 @@ def test_surfaces_and_camera_that_move(session: rg.Session, moving: Any, camera:
     y, x = np.nonzero(depth)
     assert len(x) > 100
     # The picture was moved by the third of the places that frames are taken at, from the 1897th of the sequence on.
-    jitter = np.array([(halton(1900, 2), halton(1900, 3))])
+    jitter = np.array([(halton(1899, 2), halton(1899, 3))])
     place = np.stack([x + 0.5, height - y - 0.5], axis=1) - jitter
     ndc = np.column_stack([place / SIZE * 2 - 1, 1 - 2 * depth[y, x], np.ones(len(x))])
     world = ndc @ np.linalg.inv(seen.projection @ seen.view).T

@@ -297,7 +297,9 @@ def test_one_pass_finds_what_two_find(draw: Draw, session: rg.Session) -> None:
     assert np.sqrt(np.mean((both["came"] - alone["came"]) ** 2)) < 0.02 * alone["came"].mean()
     patch = {"outputs": {"open": "ao.occlusion"}}
     disc = session.render(
-        rg.load("ssao-disc", scene="cornell_box", size=(121, 121), sets=["ao.samples=64"], patches=[patch])
+        rg.load(
+            "ssao-disc", scene="cornell_box", size=(121, 121), sets=["ao.samples=64", "ao.form=disc"], patches=[patch]
+        )
     )["open"]
     difference = both["open"][..., 0] - np.asarray(disc, np.float64)[..., 0]
     assert disc.min() < 0.5
