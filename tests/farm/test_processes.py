@@ -66,9 +66,10 @@ def test_processes_without_a_device_say_so(chore: Chores) -> None:
 
 
 CLIENT = """
-import sys
+import signal
 from chores import Chore
 from rendergraph.farm.processes import Processes
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which whoever runs the tests in the background ignores
 with Processes(2) as farm:
     for number in range(2):
         farm.submit(Chore(str(number), "hangs"))
