@@ -113,7 +113,7 @@ class ImageBasedLight(Node):
         doc="Light from around a direction.",
     )
 
-    size: int = structural(default=128, min=16, max=2048, unit="texels", doc="Side of the cube map's faces.")
+    size: int = structural(default=128, min=16, max=1024, unit="texels", doc="Side of the cube map's faces.")
     mips: int = structural(
         default=6, min=3, max=12, doc="Levels of roughness from 0 to 1; as many less one lie between."
     )
