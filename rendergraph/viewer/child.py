@@ -7,15 +7,11 @@ server says what happened, keeps what was changed, and the next question starts 
 from __future__ import annotations
 
 import contextlib
-import json
-import signal
-import socket
-import subprocess
-import sys
 import threading
 from multiprocessing.connection import Connection
 
 from rendergraph.errors import Problem, RenderError, RendergraphError
+from rendergraph.farm import child as farm
 from rendergraph.viewer.questions import Answer, Question
 
 PATIENCE = 30.0
@@ -29,19 +25,18 @@ class Child:
     def __init__(self, device: int | None = None, patience: float = PATIENCE) -> None:
         self._device, self._patience = device, patience
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._pipe: Connection | None = None
+        self._child: farm.Child | None = None
         self._answered = False
 
     @property
     def pid(self) -> int | None:
         """Of the process that runs, None where none does."""
-        return self._process.pid if self._process is not None else None
+        return self._child.process.pid if self._child is not None else None
 
     def start(self) -> None:
         """Start the process, which takes a while, before it is asked."""
         with self._lock:
-            self._pipe = self._pipe or self._start()
+            self._started()
 
     def ask(self, question: Question) -> Answer:
         """Its answer.
@@ -50,20 +45,20 @@ class Child:
             RenderError: the process took too long, or died; the next question starts another.
         """
         with self._lock:
-            pipe = self._pipe or self._start()
+            child = self._started()
             patience = self._patience if self._answered else max(FIRST, self._patience)
             try:
-                pipe.send(question)
-                if not pipe.poll(patience):
+                child.pipe.send(question)
+                if not child.pipe.poll(patience):
                     self._end()
                     text = (
                         f"the render process did not answer within {patience:.0f} s and was ended; "
                         "undo the last change, or allow more by --timeout"
                     )
                     raise RenderError(Problem("RG630", text))
-                answer = pipe.recv()
+                answer = child.pipe.recv()
             except (EOFError, OSError):
-                code = self._ended_by()
+                code = child.ended_by()
                 self._end()
                 text = f"the render process ended ({code}); a driver that crashes, or memory that runs out, does that"
                 raise RenderError(Problem("RG630", text)) from None
@@ -79,41 +74,16 @@ class Child:
         with self._lock:
             self._end()
 
-    def _start(self) -> Connection:
-        # Not by `multiprocessing`: it would run the caller's script once more, which need not be written for that.
-        ours, theirs = socket.socketpair()
-        words = json.dumps({"pipe": theirs.fileno(), "path": sys.path, "device": self._device})
-        program = "import json, sys; words = json.loads(sys.argv[1]); sys.path[:] = words['path']\n"
-        program += "from rendergraph.viewer.child import main; main(words['pipe'], words['device'])"
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", program, words],
-                pass_fds=(theirs.fileno(),),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,  # ours is data; what a plugin prints is none
-                start_new_session=True,  # Ctrl-C is the server's, which ends this process
-            )
-        self._answered, self._pipe = False, Connection(ours.detach())
-        return self._pipe
-
-    def _ended_by(self) -> str:
-        assert self._process is not None  # it was asked
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(1.0)
-        code = self._process.returncode
-        if code is not None and code < 0:
-            with contextlib.suppress(ValueError):
-                return signal.Signals(-code).name
-        return f"exit code {code}"
+    def _started(self) -> farm.Child:
+        if self._child is None:
+            self._answered = False
+            self._child = farm.started("rendergraph.viewer.child:main", {"device": self._device})
+        return self._child
 
     def _end(self) -> None:
-        process, pipe = self._process, self._pipe
-        self._process = self._pipe = None
-        if process is not None:
-            process.kill()
-            process.wait()
-        if pipe is not None:
-            pipe.close()
+        child, self._child = self._child, None
+        if child is not None:
+            child.end()
 
 
 def main(pipe: int, device: int | None) -> None:
