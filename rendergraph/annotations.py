@@ -10,9 +10,11 @@ import math
 import re
 import types
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from msgspec import Struct
 
 from rendergraph.errors import Mistake, Misuse, suggestion
 
@@ -26,8 +28,7 @@ LARGEST = 3.4028235e38
 """What 32 bits hold of a number; GPUs compute with those."""
 
 
-@dataclass(frozen=True)
-class Range:
+class Range(Struct, frozen=True):
     """Limits of a number, which is then finite; `above` leaves `low` itself out."""
 
     low: float | None = None
@@ -58,8 +59,7 @@ class Range:
         return self.beyond(value) is None
 
 
-@dataclass(frozen=True)
-class Length:
+class Length(Struct, frozen=True):
     """How many entries a list or letters a text has; a single value counts as one."""
 
     low: int
@@ -70,8 +70,7 @@ class Length:
         return self.low <= (len(value) if isinstance(value, str | Sequence) else 1) <= self.high
 
 
-@dataclass(frozen=True)
-class Known:
+class Known(Struct, frozen=True):
     """A word that stands in a table."""
 
     words: Collection[str]
@@ -81,8 +80,7 @@ class Known:
         return value in self.words
 
 
-@dataclass(frozen=True)
-class Matching:
+class Matching(Struct, frozen=True):
     """A text that a regular expression matches from its first letter to its last."""
 
     pattern: str

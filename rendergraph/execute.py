@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
 from typing import Annotated, Any, Optional, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct, field
 
 from rendergraph.annotations import Range
 from rendergraph.api.viewing import shifted
@@ -38,8 +39,7 @@ _Part: TypeAlias = Annotated[float, Range(-1, 1)]
 _Offset: TypeAlias = Annotated[tuple[_Part, _Part], "x and y in texels, from -1 to 1"]
 
 
-@dataclass(frozen=True)
-class StepTime:
+class StepTime(Struct, frozen=True):
     """Milliseconds of one step in one frame; `gpu_ms` is None where the driver has no timer.
 
     A node's `update` counts as part of its first step. `index` is the step's number in its node, -1 where there is only
@@ -53,8 +53,7 @@ class StepTime:
     label: str = ""
 
 
-@dataclass(frozen=True)
-class FrameTimes:
+class FrameTimes(Struct, frozen=True):
     """What one frame took: wall time until the device was done, each step in order where steps were measured, and how
     many steps were run of those that there are."""
 
@@ -63,8 +62,7 @@ class FrameTimes:
     ran: int = 0
 
 
-@dataclass(eq=False)
-class FrameContext:
+class FrameContext(Struct, eq=False):
     """What a node's `update` sees and does in one frame (`steps.Frame`)."""
 
     executable: Executable
@@ -135,8 +133,7 @@ class FrameContext:
             self.executable.touched.add(source_of_buffer(name))
 
 
-@dataclass(eq=False)
-class Runner:
+class Runner(Struct, eq=False):
     """Runs an executable frame by frame.
 
     Attributes:

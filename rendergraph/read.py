@@ -7,9 +7,10 @@ again what kind of value they hold.
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from rendergraph.document import Document, Value, YamlLimits, parse, read_text
 from rendergraph.errors import InputError

@@ -8,10 +8,11 @@ is believed only where the user stands in that project, so that a downloaded fol
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
+
+from msgspec import Struct
 
 from rendergraph.document import Source, from_plain, read_bytes, shown
 from rendergraph.errors import InputError, Place, Problem
@@ -41,8 +42,7 @@ _CODES = Codes(unknown="RG017", wrong="RG017", name="RG017", file="RG017")
 _MOST_BYTES = 100_000
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(Struct, frozen=True):
     """One `rendergraph.toml`.
 
     Attributes:
@@ -97,8 +97,7 @@ def load(file: Path) -> Settings:
     return Settings(file, **paths)
 
 
-@dataclass(frozen=True)
-class Roots:
+class Roots(Struct, frozen=True):
     """The folders that files may be read from, links followed.
 
     Attributes:

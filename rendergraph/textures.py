@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from msgspec import Struct
+
 Kind = Literal["texture2d", "texture2d_array", "texture_cube", "buffer", "view", "function"]
 MOST_SIDE = 16_384
 """Largest width or height of a picture or texture."""
@@ -18,8 +20,7 @@ Filter = Literal["nearest", "linear", "trilinear"]
 Wrap = Literal["clamp", "repeat", "mirror", "border"]
 
 
-@dataclass(frozen=True)
-class Format:
+class Format(Struct, frozen=True):
     """One texel format.
 
     Attributes:
@@ -208,8 +209,7 @@ class Sampler:
     anisotropy: int = 1
 
 
-@dataclass(frozen=True)
-class TextureDesc:
+class TextureDesc(Struct, frozen=True):
     """What a texture is allocated from; equal descriptions can share one texture.
 
     Attributes:
@@ -261,8 +261,7 @@ class TextureDesc:
         return FORMATS[self.format].view_class, *made
 
 
-@dataclass(frozen=True)
-class BufferDesc:
+class BufferDesc(Struct, frozen=True):
     """A buffer of `bytes` bytes."""
 
     bytes: int

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import Literal, TypeAlias
+
+from msgspec import Struct
+from msgspec.structs import asdict
 
 from rendergraph.allocate.heap import Item, share_blocks
 from rendergraph.schedule import Schedule, step_names
@@ -29,16 +31,14 @@ Tier: TypeAlias = Literal["descriptor", "view", "heap"]
 """How textures share memory: equal descriptions, equal texel classes through views, or blocks of a heap."""
 
 
-@dataclass(frozen=True)
-class Lifetime:
+class Lifetime(Struct, frozen=True):
     """First and last position in the schedule at which a resource must hold its values, inclusive."""
 
     first: int
     last: int
 
 
-@dataclass(frozen=True)
-class Physical:
+class Physical(Struct, frozen=True):
     """One texture or buffer that is really allocated.
 
     Attributes:
@@ -57,8 +57,7 @@ class Physical:
     block: bool = False
 
 
-@dataclass(frozen=True)
-class MemoryFigures:
+class MemoryFigures(Struct, frozen=True):
     """The figures of `run --json` and `plan --json`.
 
     Attributes:
@@ -85,11 +84,10 @@ class MemoryFigures:
 
     def as_json(self) -> dict[str, object]:
         """Plain JSON values."""
-        return dict(vars(self))
+        return asdict(self)
 
 
-@dataclass(frozen=True)
-class ResourcePlan:
+class ResourcePlan(Struct, frozen=True):
     """Where every resource lives.
 
     Attributes:

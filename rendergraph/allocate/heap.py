@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 # Comparisons of pairs, not seconds: the same blocks on every machine. 40 textures get 6 restarts, 10 get 100.
 WORK = 10_000
 RESTARTS = 100
 
 
-@dataclass(frozen=True)
-class Item:
+class Item(Struct, frozen=True):
     """What lies in a block: bytes, first and last position in the schedule, and what it is alike with."""
 
     bytes: int

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from rendergraph.catalog import find, modules
 from rendergraph.catalog.configured import Named, configured, plain, projects
@@ -70,7 +72,7 @@ class Catalog:
             except InputError as error:
                 if not plugin.where or plugin.path.exists():
                     raise
-                notes += [replace(problem, severity="warning") for problem in error.problems]
+                notes += [dataclasses.replace(problem, severity="warning") for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         return cls(listed, extensions=extensions(folders, installed=installed, without=own), notes=tuple(notes))
 

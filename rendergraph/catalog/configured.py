@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 from rendergraph.errors import Place, shown_file
 from rendergraph.settings import at_home, nearest
@@ -18,8 +19,7 @@ VARIABLE = "RENDERGRAPH_PATH"
 """Folders and files with nodes, separated as in PATH."""
 
 
-@dataclass(frozen=True)
-class Named:
+class Named(Struct, frozen=True):
     """A plugin by path.
 
     Attributes:

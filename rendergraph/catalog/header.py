@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.document import Document, Value, parse
 from rendergraph.errors import InputError, Place, Problem
@@ -22,8 +24,7 @@ _ALMOST = re.compile(r"[ \t]*/\*[ \t]+---[ \t]*\Z")
 _NAME = re.compile(r"[A-Za-z]\w*\Z", re.ASCII)
 
 
-@dataclass(frozen=True, eq=False)
-class Header:
+class Header(Struct, frozen=True, eq=False):
     """A header as it is written, without what is wrong in it.
 
     Attributes:

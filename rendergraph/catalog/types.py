@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
+from msgspec import Struct
+
 from rendergraph.declare import Node
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import folder
@@ -98,8 +100,7 @@ def node_word(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]", "_", PurePath(name).stem)
 
 
-@dataclass(frozen=True)
-class Listed:
+class Listed(Struct, frozen=True):
     """A module, or a shader file, that has been seen but not loaded; `module` is empty for a shader file.
 
     `named` says in words where its plugin is named by path.

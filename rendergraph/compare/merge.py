@@ -11,9 +11,11 @@ drawn as in the graph it came from.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import TypeAlias
+
+from msgspec.structs import replace
 
 from rendergraph.declare import InOut, TextureInfo
 from rendergraph.link import Endpoint, Graph, GraphNode
@@ -22,7 +24,7 @@ Key: TypeAlias = "tuple[int, str]"
 """Number of a graph and id of one of its nodes."""
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Merged:
     """The one graph, and where each node of each graph is in it.
 
@@ -53,7 +55,7 @@ def merge(graphs: Sequence[Graph]) -> Merged:
             inputs = {port: tuple(_moved(end, own) for end in ends) for port, ends in node.inputs.items()}
             nodes.setdefault(own[node.id], replace(node, id=own[node.id], inputs=inputs))
         for end, info in graph.textures.items():
-            textures.setdefault(_moved(end, own), replace(info, view=_view(info.view, own)))
+            textures.setdefault(_moved(end, own), dataclasses.replace(info, view=_view(info.view, own)))
     outputs = {
         f"{number}/{name}": _moved(end, names[number])
         for number, graph in enumerate(graphs)

@@ -8,11 +8,11 @@ each view that has moved, in NumPy over all objects; a list of draw commands is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct, field
 
 from rendergraph.compile.views import ViewBuffers
 from rendergraph.scene.pack import Bools, Doubles, PackedScene, Records, reversed_projection
@@ -63,8 +63,7 @@ def seen(packed: PackedScene, view: ViewMatrices, *, clamped: bool = False) -> B
     return np.asarray((inside + _ROUNDING * slack >= 0).all(axis=1))
 
 
-@dataclass(eq=False)
-class DrawList:
+class DrawList(Struct, eq=False):
     """Draw commands of some objects, of which those that are seen stand at the front of a buffer.
 
     Attributes:
@@ -98,8 +97,7 @@ class DrawList:
             self.changed(objects)
 
 
-@dataclass(eq=False)
-class SceneView:
+class SceneView(Struct, eq=False):
     """The lists that are drawn with one view, or with all views of a table where a shader chooses the layer.
 
     Attributes:

@@ -7,9 +7,10 @@ written by each draw. A changed parameter assembles the lists anew: no GL object
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct, field
 
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
 from rendergraph.compile.memory import Call
@@ -38,8 +39,7 @@ _MOST_PARTS = 64
 """Lists of some of the steps that are remembered."""
 
 
-@dataclass(eq=False)
-class Draw:
+class Draw(Struct, eq=False):
     """One draw call or dispatch with what must be set before it.
 
     Attributes:
@@ -61,8 +61,7 @@ class Draw:
     textures: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
-@dataclass(eq=False)
-class SortedDraws:
+class SortedDraws(Struct, eq=False):
     """Draws whose order is the eye's: each part is compiled once, and runs of neighbours are found anew as it moves.
 
     Attributes:
@@ -84,8 +83,7 @@ class SortedDraws:
             self.render(part, first, count)
 
 
-@dataclass(eq=False)
-class CompiledStep:
+class CompiledStep(Struct, eq=False):
     """A step of one parity.
 
     Attributes:
@@ -115,8 +113,7 @@ class CompiledStep:
         return {name: value for name, value in step_uniforms(step).items() if name in seen}
 
 
-@dataclass(frozen=True, eq=False)
-class FrameStep:
+class FrameStep(Struct, frozen=True, eq=False):
     """A step as a frame runs it: all its calls, flat, and what measures it.
 
     What is set before a draw depends on the steps before it, so the calls of another list may differ.
@@ -127,8 +124,7 @@ class FrameStep:
     timer: Timer
 
 
-@dataclass(eq=False)
-class Executable:
+class Executable(Struct, eq=False, dict=True):
     """A compiled pipeline of one size.
 
     Attributes:

@@ -7,12 +7,12 @@ objects must be told apart depends on what the step's shader looks at: a depth p
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import moderngl
 import numpy as np
+from msgspec import Struct, field
 
 from rendergraph.compile.culling import COMMAND, DrawList, Objects, SceneView
 from rendergraph.compile.executable import Draw, SortedDraws
@@ -24,8 +24,7 @@ from rendergraph.scene.model import Texture
 from rendergraph.steps import Step
 
 
-@dataclass(frozen=True)
-class MultiDrawKey:
+class MultiDrawKey(Struct, frozen=True):
     """What makes two objects drawable together."""
 
     defines: tuple[tuple[str, str], ...]
@@ -34,8 +33,7 @@ class MultiDrawKey:
     clockwise: bool
 
 
-@dataclass(eq=False)
-class MultiDraw:
+class MultiDraw(Struct, eq=False):
     """Objects drawn by one indirect multi-draw.
 
     Attributes:
@@ -65,8 +63,7 @@ class MultiDraw:
         return call
 
 
-@dataclass(eq=False)
-class GeometryCompiler:
+class GeometryCompiler(Struct, eq=False):
     """Multi-draws of a scene's objects, and the views that decide what they draw."""
 
     scene: GpuScene

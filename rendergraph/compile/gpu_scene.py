@@ -11,6 +11,7 @@ from typing import Any
 import moderngl
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
@@ -69,8 +70,7 @@ _MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what li
 _PADDING = {"4f": "16x", "2i": "8x"}
 
 
-@dataclass(frozen=True, eq=False)
-class MeshIndices:
+class MeshIndices(Struct, frozen=True, eq=False):
     """The indices of all meshes, for one kind of primitive.
 
     Attributes:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import moderngl
 import numpy as np
+from msgspec import Struct, field
 
 from rendergraph.allocate import Physical, ResourcePlan
 from rendergraph.errors import Problem, RenderError
@@ -32,8 +32,7 @@ _STATUS = {
 }
 
 
-@dataclass(frozen=True)
-class Attachment:
+class Attachment(Struct, frozen=True):
     """A texture level and layer a framebuffer draws to; `layer` None attaches all layers."""
 
     texture: GpuTexture
@@ -47,8 +46,7 @@ class Attachment:
         return f"a {desc.format} {kind} ({desc.width}×{desc.height}{samples})"
 
 
-@dataclass(eq=False)
-class Region:
+class Region(Struct, eq=False):
     """A part of the picture that a node's `update` sets, and steps are drawn in.
 
     Attributes:
@@ -69,8 +67,7 @@ class Region:
         raw.glDepthBoundsEXT(*self.depth_bounds)
 
 
-@dataclass(eq=False)
-class Memory:
+class Memory(Struct, eq=False, dict=True):
     """Everything a pipeline allocates for one size.
 
     `parity` is the frame number's: history textures swap their two copies with it. `regions` are those that steps are

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass, field
 from typing import Any
+
+from msgspec import Struct, field
 
 from rendergraph.errors import InputError
 from rendergraph.gl import programs
@@ -15,8 +16,7 @@ from rendergraph.program import StageText, compile_problems, link_problems
 from rendergraph.resources import folder
 
 
-@dataclass(eq=False)
-class ProgramCache:
+class ProgramCache(Struct, eq=False):
     """Programs by their text, their outputs and the binding points of their blocks."""
 
     device: Device

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
+
+from msgspec import Struct, field
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.schedule.dependencies import Versions, continues, is_filled_by_update
@@ -32,16 +33,14 @@ _MOST_KNOWN = 512
 """Moves from state to state that are remembered."""
 
 
-@dataclass(frozen=True)
-class _Touched:
+class _Touched(Struct, frozen=True):
     """What a step starts from and what it leaves, and where that lies."""
 
     needs: tuple[tuple[_Slot, Value], ...]
     leaves: tuple[tuple[_Slot, Value], ...]
 
 
-@dataclass(eq=False)
-class Reuse:
+class Reuse(Struct, eq=False, dict=True):
     """What of a plan has to run, frame after frame.
 
     Attributes:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
+
+from msgspec.structs import replace
 
 from rendergraph.compile.memory import Call, Memory
 from rendergraph.gl.device import Device

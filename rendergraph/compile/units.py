@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
+
+from msgspec import Struct, field
 
 from rendergraph.gl.device import Device
 
 SHARED_UNITS = 24
 
 
-@dataclass(eq=False)
-class Units:
+class Units(Struct, eq=False):
     """Units handed out while compiling, then bound by one call a frame."""
 
     device: Device

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
+
+from msgspec import Struct
 
 from rendergraph.declare.blame import raised_at, told
 from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
@@ -20,8 +22,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-@dataclass(frozen=True)
-class Added(Generic[T]):
+class Added(Struct, Generic[T], frozen=True):
     """One thing that a plugin adds.
 
     Attributes:
@@ -56,8 +57,7 @@ class Added(Generic[T]):
             raise InputError(Problem(code, f"{doing}: {told(error)} (plugin '{self.plugin}')", place)) from error
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(Struct, frozen=True):
     """One extension, or what is wrong with it.
 
     Attributes:

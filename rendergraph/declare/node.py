@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import Any, ClassVar
 
+from msgspec.structs import replace
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 
 from rendergraph.declare.parameters import Parameter

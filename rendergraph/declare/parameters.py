@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args, get_origin
 
+from msgspec import Struct
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
@@ -14,8 +14,7 @@ from rendergraph.annotations import Range, fits, words_for
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 
 
-@dataclass(frozen=True)
-class Parameter:
+class Parameter(Struct, frozen=True):
     """What a node declares of one parameter; `Node.parameters()` has them by name.
 
     Attributes:

@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from msgspec import Struct
+
 from rendergraph.errors import InputError, Place, Problem
 
 Scalar: TypeAlias = "str | int | float | bool | None"
@@ -155,8 +157,7 @@ def _plain(value: Value, seen: dict[int, Any]) -> Any:
     return seen[id(data)]
 
 
-@dataclass(frozen=True, eq=False)
-class Document:
+class Document(Struct, frozen=True, eq=False, dict=True):
     """The values of one YAML file.
 
     Attributes:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field
 
 from rendergraph.declare import TextureInfo
 from rendergraph.link import Endpoint
@@ -14,16 +15,14 @@ ENVIRONMENT = Endpoint("", "the scene's environment")
 """What an input of an environment is linked to that the file links to nothing."""
 
 
-@dataclass(frozen=True)
-class ViewTable:
+class ViewTable(Struct, frozen=True):
     """A table of views: how many, and the scene's light index of each (empty where views are not lights')."""
 
     count: int = 1
     lights: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
-class Versioned:
+class Versioned(Struct, frozen=True):
     """What was recorded, with resources and versions in place of ports.
 
     Attributes:
@@ -47,8 +46,7 @@ class Versioned:
     views: Mapping[str, ViewTable]
 
 
-@dataclass(frozen=True)
-class Expansion:
+class Expansion(Struct, frozen=True):
     """All steps of a graph with the resources they touch.
 
     Attributes:

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
@@ -19,8 +20,7 @@ from rendergraph.textures import TextureDesc
 _DEVICE_UUID, _HANDLE_TYPE_OPAQUE_FD = 0x9597, 0x9586
 
 
-@dataclass(eq=False)
-class Block:
+class Block(Struct, eq=False):
     """A memory object with its textures, by description."""
 
     device: Device

@@ -6,11 +6,11 @@ import ctypes
 import os
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any
 
 import moderngl
+from msgspec import Struct, field
 
 from rendergraph.errors import DeviceError, Problem
 from rendergraph.gl.raw import RawGL
@@ -21,8 +21,7 @@ TIME_ELAPSED = 0x88BF
 SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 
 
-@dataclass(eq=False)
-class Device:
+class Device(Struct, eq=False, dict=True):
     """An OpenGL context with its raw functions.
 
     Attributes:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from rendergraph.gl.device import Device
 
 _ANY_SAMPLES_PASSED, _QUERY_WAIT = 0x8C2F, 0x8E13
 
 
-@dataclass(eq=False)
-class Passed:
+class Passed(Struct, eq=False):
     """Whether any sample of what is drawn between `start` and `stop` passed; nobody on the CPU waits for the answer."""
 
     device: Device

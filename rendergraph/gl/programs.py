@@ -9,12 +9,12 @@ from __future__ import annotations
 import ctypes
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import moderngl
 import numpy as np
+from msgspec import Struct, field
 
 from rendergraph.gl.device import Device
 from rendergraph.gl.raw import RawGL
@@ -94,8 +94,7 @@ _GLSL = {
 ProgramError = moderngl.Error
 
 
-@dataclass(frozen=True)
-class Uniform:
+class Uniform(Struct, frozen=True):
     """One active uniform of the default block."""
 
     name: str
@@ -124,8 +123,7 @@ class Uniform:
         return self.type not in _WRITERS
 
 
-@dataclass(eq=False)
-class Program:
+class Program(Struct, eq=False):
     """A linked program with its active interface.
 
     Attributes:

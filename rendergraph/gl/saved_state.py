@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
 
 from rendergraph.errors import Problem, RenderError
 
@@ -54,8 +55,7 @@ _INDEXED = ((0x0BE2, _DRAW_BUFFERS), (0x0C11, _VIEWPORTS))
 """Capabilities of each draw buffer or viewport, which steps and framebuffers state: BLEND, SCISSOR_TEST."""
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(Struct, frozen=True):
     """A function that sets state, and how what it takes is found.
 
     Attributes:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device
@@ -29,8 +30,7 @@ _FLOAT, _UINT, _INT, _UBYTE = 0x1406, 0x1405, 0x1404, 0x1401
 _DEPTH_COMPONENT, _DEPTH_STENCIL, _FLOAT_32_UNSIGNED_INT_24_8_REV = 0x1902, 0x84F9, 0x8DAD
 
 
-@dataclass(frozen=True)
-class GpuTexture:
+class GpuTexture(Struct, frozen=True):
     """A GL texture name with what it was created from."""
 
     glo: int

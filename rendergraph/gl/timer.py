@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from rendergraph.gl.device import TIME_ELAPSED, Device
 
@@ -12,8 +13,7 @@ _NO_ANSWER = 1 << 40
 """Nanoseconds, 18 minutes: a driver that has nothing to say answers with its largest number."""
 
 
-@dataclass(eq=False)
-class Timer:
+class Timer(Struct, eq=False):
     """Measures what is drawn between `start` and `stop`; its query is made when it is first started."""
 
     device: Device

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
 from itertools import pairwise
 from math import prod
 from pathlib import Path
+
+from msgspec import Struct
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.glsl.source import Origin, SourceText
@@ -69,8 +70,7 @@ def _error(source: SourceText, at: int, text: str) -> InputError:
 # --- reading ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Definition:
+class _Definition(Struct, frozen=True):
     name: str
     parameters: tuple[str, ...] | None
     body: tuple[str, ...]
@@ -111,8 +111,7 @@ def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
 # --- weighing --------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Growth:
+class _Growth(Struct, frozen=True):
     """What one use of a macro makes at most.
 
     Attributes:

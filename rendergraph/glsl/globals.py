@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field
 
 from rendergraph.glsl.names import TOKEN, Storage, declarators, head, statements, without_directives
 
@@ -24,8 +25,7 @@ class Word(str):
     """Its first character's number in the text."""
 
 
-@dataclass(frozen=True)
-class Global:
+class Global(Struct, frozen=True):
     """One declaration at the top level.
 
     Attributes:
@@ -49,8 +49,7 @@ class Global:
     initialiser: str = ""
 
 
-@dataclass(frozen=True)
-class Globals:
+class Globals(Struct, frozen=True):
     """What a text declares towards the outside.
 
     Attributes:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
+
+from msgspec import Struct, field
 
 Storage: TypeAlias = Literal["uniform", "in", "out", "buffer"]
 
@@ -46,8 +47,7 @@ _DEFINE = re.compile(r"^\s*#\s*define\s+([A-Za-z_]\w*)", re.MULTILINE)
 _CLOSES = {"(": ")", "[": "]", "{": "}"}
 
 
-@dataclass(frozen=True)
-class Head:
+class Head(Struct, frozen=True):
     """How a statement begins, and the tokens behind that.
 
     Attributes:

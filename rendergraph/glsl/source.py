@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.stamps import Stamp, look, stamp
@@ -18,8 +20,7 @@ MAX_DEPTH = 32
 """Includes inside each other."""
 
 
-@dataclass(frozen=True)
-class Origin:
+class Origin(Struct, frozen=True):
     """Where a line of program text comes from.
 
     Attributes:
@@ -47,8 +48,7 @@ class Origin:
         return Place(shown_file(self.file), self.line, max(1, column - self.column))
 
 
-@dataclass(frozen=True)
-class SourceText:
+class SourceText(Struct, frozen=True):
     """Lines of GLSL, comments blanked out, with an origin each."""
 
     lines: tuple[str, ...] = ()

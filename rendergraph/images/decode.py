@@ -11,11 +11,11 @@ import os
 import stat
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
+from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
@@ -130,8 +130,7 @@ def read_metadata(path: Path | str) -> dict[str, str]:
 # --- opening ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass
-class _Image:
+class _Image(Struct):
     source: ImageSource
     kind: str
     path: str

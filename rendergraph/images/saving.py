@@ -6,12 +6,12 @@ import os
 import re
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
 from rendergraph.images.encode import EXTENSIONS, Job, write_all
@@ -40,8 +40,7 @@ class Described(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class PictureInfo:
+class PictureInfo(Struct, frozen=True):
     """What an array's values are, where no frame says it; see `Described`."""
 
     semantic: str = "any"

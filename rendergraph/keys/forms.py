@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.annotations import Range
 from rendergraph.document import Value
@@ -19,8 +21,7 @@ MOST = 1e12
 """Beyond this no number that a person writes makes sense, and products of a few would leave single precision."""
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(Struct, frozen=True):
     """One kind of value. Null stands for what is not there, so it is of none but `ANYTHING`.
 
     Attributes:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeAlias
+
+from msgspec import Struct, field
 
 from rendergraph.document import Value
 from rendergraph.keys.forms import Form, Schema, regular
 
 
-@dataclass(frozen=True)
-class Key:
+class Key(Struct, frozen=True):
     """One key of a table.
 
     Attributes:
@@ -42,8 +42,7 @@ Variant: TypeAlias = "tuple[Key, ...] | Mapping[str, tuple[Key, ...]]"
 """The keys that a key brings with it, whatever its value, or by its value."""
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(Struct, frozen=True, dict=True):
     """A mapping of known keys.
 
     Attributes:
@@ -94,8 +93,7 @@ class Table:
                 yield from inner.sections(f"{name} ({one.name})" if name else one.name)
 
 
-@dataclass(frozen=True)
-class Naming:
+class Naming(Struct, frozen=True):
     """Which names are good.
 
     Attributes:
@@ -110,8 +108,7 @@ class Naming:
 FREE = Naming(re.compile(r"[^\x00-\x1f\x7f-\x9f]+\Z"), "names are text")
 
 
-@dataclass(frozen=True)
-class Names:
+class Names(Struct, frozen=True):
     """A mapping of free names.
 
     Attributes:
@@ -131,8 +128,7 @@ class Names:
     least: int = 0
 
 
-@dataclass(frozen=True)
-class Later:
+class Later(Struct, frozen=True):
     """A table that holds itself, or a value in its place.
 
     Attributes:

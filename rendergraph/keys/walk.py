@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from rendergraph.document import BROKEN, Value, said, shown
 from rendergraph.errors import InputError, Problem, suggestion
@@ -14,8 +15,7 @@ MOST_PROBLEMS = 100
 """Mistakes after which nobody reads on; finding the nearest name for each of a million takes hours."""
 
 
-@dataclass(frozen=True)
-class Codes:
+class Codes(Struct, frozen=True):
     """The codes of what can be wrong with one kind of file.
 
     Attributes:

@@ -6,7 +6,8 @@ Whoever read an output reads what went into the node instead.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from rendergraph.declare import Function, InOut, Input, Port, WrittenPort
 from rendergraph.errors import Problem

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+from msgspec import Struct, field
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import LightFacts, Node, Texel, TextureInfo
@@ -35,8 +36,7 @@ class Endpoint(NamedTuple):
         return self._replace(previous=False) if self.previous else self
 
 
-@dataclass(frozen=True)
-class GraphNode:
+class GraphNode(Struct, frozen=True):
     """A node with its validated parameters and its links.
 
     Attributes:
@@ -60,8 +60,7 @@ class GraphNode:
     clears: Mapping[str, Texel | None] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Graph:
+class Graph(Struct, frozen=True, dict=True):
     """A checked pipeline.
 
     Attributes:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import InOut, Input, Node, Port
@@ -19,8 +21,7 @@ _ID = NAME.pattern.removesuffix(r"\Z")
 _LINK = re.compile(rf"({_ID}(?:/{_ID})*)(?:\.({_ID}))?(@previous)?\Z")
 
 
-@dataclass(frozen=True, eq=False)
-class Crossing:
+class Crossing(Struct, frozen=True, eq=False):
     """An input of a sub-pipeline that a link passes through.
 
     Attributes:
@@ -34,8 +35,7 @@ class Crossing:
     given: Value
 
 
-@dataclass(frozen=True, eq=False)
-class Link:
+class Link(Struct, frozen=True, eq=False):
     """One link as it was written, with what it leads to.
 
     Attributes:
@@ -49,8 +49,7 @@ class Link:
     declared: tuple[Crossing, ...] = ()
 
 
-@dataclass(eq=False)
-class Draft:
+class Draft(Struct, eq=False):
     """A node with its type, while it is being linked.
 
     Attributes:

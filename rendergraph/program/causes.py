@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from difflib import get_close_matches
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.glsl.source import SourceText
 
@@ -44,8 +46,7 @@ gl_SampleID gl_VertexID gl_WorkGroupID EmitVertex EndPrimitive
 """Names of GLSL 4.50 that are misspelt most."""
 
 
-@dataclass(frozen=True)
-class Said:
+class Said(Struct, frozen=True):
     """One message of a driver: where in the stage's text, a column of 0 where it names none, and what."""
 
     text: str

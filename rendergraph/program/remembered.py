@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Generic, TypeVar
+
+from msgspec.structs import replace
 
 from rendergraph import stamps
 from rendergraph.catalog import NodeType
@@ -55,7 +57,9 @@ def text_key(
 
     return (
         made_of(step.node),
-        replace(step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None),
+        dataclasses.replace(
+            step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None
+        ),
         tuple(
             (
                 replace(each, reads=(), uniforms=tuple((name, 0) for name, _ in each.uniforms)),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Function, Input
@@ -23,8 +25,7 @@ VERSION = "#version 450 core"
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
 
 
-@dataclass(frozen=True)
-class StageText:
+class StageText(Struct, frozen=True):
     """The final text of one stage.
 
     Attributes:
@@ -34,7 +35,7 @@ class StageText:
     """
 
     stage: str
-    source: SourceText = field(repr=False)
+    source: SourceText
     node: str = ""
 
     @property
@@ -110,8 +111,7 @@ def stage_texts(
     return texts
 
 
-@dataclass(eq=False)
-class StepTexts:
+class StepTexts(Struct, eq=False):
     """Program texts of many steps; those of steps that differ in nothing a text depends on are put together once.
 
     Attributes:

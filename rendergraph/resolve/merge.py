@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Set
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
+
+from msgspec import Struct
 
 from rendergraph.document import Value
 from rendergraph.errors import Problem
 from rendergraph.read import entries, word
 
 
-@dataclass(frozen=True)
-class TypeNames:
+class TypeNames(Struct, frozen=True):
     """What a node type takes and makes, as far as merging asks; `optional` are inputs it can do without."""
 
     params: frozenset[str]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from rendergraph.document import Source, Value, from_plain, parse, shown
 from rendergraph.errors import InputError, Problem, UsageError, nearest, suggestion
@@ -15,8 +16,7 @@ _ID = "[A-Za-z_][A-Za-z0-9_-]*"
 _PATH = re.compile(rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z")
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(Struct, frozen=True):
     """One assignment.
 
     Attributes:

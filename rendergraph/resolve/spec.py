@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from msgspec import Struct
+
 from rendergraph.catalog import Catalog
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Place, Problem
@@ -17,8 +19,7 @@ DEFAULT_SIZE = (1280, 720)
 """Width and height where nothing says otherwise."""
 
 
-@dataclass(frozen=True, eq=False)
-class NodeSpec:
+class NodeSpec(Struct, frozen=True, eq=False):
     """One node, sub-pipelines unfolded.
 
     Attributes:
@@ -45,8 +46,7 @@ class NodeSpec:
         return self.value.key_place
 
 
-@dataclass(frozen=True, eq=False)
-class Scope:
+class Scope(Struct, frozen=True, eq=False):
     """A sub-pipeline in its place.
 
     Attributes:
@@ -66,8 +66,7 @@ class Scope:
     disabled: Value | None = None
 
 
-@dataclass(frozen=True)
-class PipelineParameter:
+class PipelineParameter(Struct, frozen=True):
     """A knob of the whole pipeline."""
 
     name: str

@@ -9,9 +9,11 @@ from __future__ import annotations
 import re
 import stat
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
+
+from msgspec import Struct, field
 
 from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
 from rendergraph.document import shown
@@ -87,8 +89,7 @@ class UniqueNames:
         return name
 
 
-@dataclass
-class Reading:
+class Reading(Struct):
     """One file being read: its path, the root rule, the limits, what plugins read, and the warnings so far."""
 
     path: Path

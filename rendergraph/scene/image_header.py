@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 HEAD_BYTES = 1 << 20
 READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"
@@ -25,8 +26,7 @@ class ChannelsError(ValueError):
     """The image holds no colour that can be used."""
 
 
-@dataclass(frozen=True)
-class Header:
+class Header(Struct, frozen=True):
     """What the first bytes say; sizes are None where they do not.
 
     Attributes:

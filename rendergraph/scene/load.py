@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from rendergraph.declare import NO_EXTENSIONS, Extensions
 from rendergraph.document import shown

@@ -7,13 +7,13 @@ the origin at the image's top left.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct, field
 
 from rendergraph.declare import Added
 from rendergraph.declare.extension import ImageLoader
@@ -33,8 +33,7 @@ _MOST_CONVEX = 10_000_000
 """Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
 
 
-@dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     """Triangles with their vertex attributes, one material's worth of geometry.
 
     Attributes:
@@ -105,8 +104,7 @@ class Mesh:
         return find_edges(self.positions, self.indices)
 
 
-@dataclass(frozen=True)
-class ImageSource:
+class ImageSource(Struct, frozen=True):
     """An image not yet decoded: a file, or bytes inside another file.
 
     Attributes:
@@ -122,8 +120,7 @@ class ImageSource:
     loader: Added[ImageLoader] | None = None
 
 
-@dataclass(frozen=True)
-class MadeImage:
+class MadeImage(Struct, frozen=True):
     """An image that is made in code.
 
     Attributes:
@@ -137,8 +134,7 @@ class MadeImage:
     make: Callable[[], npt.NDArray[Any]]
 
 
-@dataclass(frozen=True)
-class Texture:
+class Texture(Struct, frozen=True):
     """An image with its sampling and coordinates.
 
     Attributes:
@@ -161,8 +157,7 @@ class Texture:
     transform: tuple[float, float, float, float, float, float] | None = None
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(Struct, frozen=True):
     """A surface, glTF's names in snake case.
 
     Attributes:
@@ -203,8 +198,7 @@ class Material:
     shininess: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Object:
+class Object(Struct, frozen=True, eq=False):
     """One placed mesh.
 
     Attributes:
@@ -227,8 +221,7 @@ class Object:
     node: str = ""
 
 
-@dataclass(frozen=True)
-class Light:
+class Light(Struct, frozen=True):
     """A punctual light (KHR_lights_punctual).
 
     Attributes:
@@ -254,8 +247,7 @@ class Light:
     casts_shadow: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class Camera:
+class Camera(Struct, frozen=True, eq=False):
     """A camera.
 
     Attributes:
@@ -280,8 +272,7 @@ class Camera:
     target: Vec3 | None = None
 
 
-@dataclass(frozen=True)
-class Environment:
+class Environment(Struct, frozen=True):
     """An equirectangular image around the scene.
 
     Attributes:
@@ -297,16 +288,14 @@ class Environment:
     rotate: float = 0.0
 
 
-@dataclass(frozen=True)
-class Orbit:
+class Orbit(Struct, frozen=True):
     """A camera that turns about its target, counter-clockwise seen from above; the default one where unnamed."""
 
     camera: str
     degrees_per_second: float
 
 
-@dataclass(frozen=True, eq=False)
-class Placement:
+class Placement(Struct, frozen=True, eq=False):
     """What a scene file's object placed: the parts of a shape or file, where they stand within it.
 
     Attributes:
@@ -319,8 +308,7 @@ class Placement:
     cameras: tuple[tuple[str, Matrix], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     """Everything that can be drawn, with what lights and sees it.
 
     Attributes:

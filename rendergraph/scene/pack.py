@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import compress, count
 from operator import is_not
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
+from msgspec.structs import asdict, replace
 
 from rendergraph.scene.edges import find_edges
 from rendergraph.scene.model import Environment, Floats, Light, Material, Matrix, Mesh, Scene
@@ -89,8 +90,7 @@ _FARTHEST_EYE = 1e9  # metres; one that is farther off is a direction, whatever 
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
 
-@dataclass(frozen=True, eq=False)
-class PackedScene:
+class PackedScene(Struct, frozen=True, eq=False):
     """The arrays of a scene. v vertices, i indices, n objects, m materials.
 
     Attributes:
@@ -242,7 +242,7 @@ def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:
     """What objects are packed to of which some have moved: their records are made anew, those of the others copied."""
     was, now = before.objects, scene.objects
     moved = changed_objects(before, scene)
-    if any(vars(was[number]) | {"transform": 0} != vars(now[number]) | {"transform": 0} for number in moved):
+    if any(asdict(was[number]) | {"transform": 0} != asdict(now[number]) | {"transform": 0} for number in moved):
         return _placed(scene, packed.meshes)
     made = _placed(replace(scene, objects=tuple(now[number] for number in moved)), packed.meshes)
     made["instances"]["ids"][:, 1] = moved

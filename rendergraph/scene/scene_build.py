@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
+from msgspec.structs import replace
+
 from rendergraph.api.viewing import look_at, unit
 from rendergraph.scene.geometry import euler_matrix, placement, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
@@ -120,7 +122,5 @@ def light_matrix(found: Light) -> Matrix:
 def moved_light(found: Light, matrix: Matrix) -> Light:
     """A light with the place and direction of a transform; scale does not count."""
     direction = unit(-matrix[:3, 2])
-    values = {**found.__dict__, "position": vec3(matrix[:3, 3])}
-    if direction.any():
-        values["direction"] = vec3(direction)
-    return Light(**values)
+    moved = replace(found, position=vec3(matrix[:3, 3]))
+    return replace(moved, direction=vec3(direction)) if direction.any() else moved

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from rendergraph.keys import Codes, Form, Key, Names, Schema, Table, schema
 from rendergraph.keys.forms import FILE, FLAG, TEXT, choice, color, number, scale, vector, version

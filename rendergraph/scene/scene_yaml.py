@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
@@ -51,8 +53,7 @@ def read_scene(path: Path, reading: Reading) -> Scene:
     return scene
 
 
-@dataclass
-class _File:
+class _File(Struct):
     """A mesh file already read: where its meshes and materials lie in the scene."""
 
     scene: Scene
@@ -60,8 +61,7 @@ class _File:
     first_material: int
 
 
-@dataclass
-class _Made:
+class _Made(Struct):
     """What the objects have made so far."""
 
     objects: list[Object] = field(default_factory=list)

@@ -8,11 +8,11 @@ bit.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from rendergraph.api.viewing import unit
 from rendergraph.keys import Key
@@ -24,8 +24,7 @@ from rendergraph.scene.polygons import clip_ears
 Doubles = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class ShapePart:
+class ShapePart(Struct, frozen=True, eq=False):
     """One mesh of a shape.
 
     Attributes:
@@ -41,8 +40,7 @@ class ShapePart:
     changes: tuple[tuple[str, float], ...] = ()
 
 
-@dataclass(frozen=True)
-class Shape:
+class Shape(Struct, frozen=True):
     """A kind of shape: what makes it and its parameters; `vertices` estimates their number beforehand."""
 
     doc: str

@@ -8,9 +8,11 @@ as what a heap of bytes could reach. So an order above that peak is taken only w
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
@@ -41,8 +43,7 @@ TOUCHES_PER_SECOND = 100_000
 MOST_SEARCHED = 1_000
 
 
-@dataclass(frozen=True)
-class Schedule:
+class Schedule(Struct, frozen=True, dict=True):
     """Steps culled and ordered.
 
     Attributes:
@@ -71,7 +72,7 @@ class Schedule:
     lower_bound_bytes: int
     reasons: Mapping[tuple[str, int], str] = field(default_factory=dict)
     whole_frame: frozenset[str] = frozenset()
-    waits: Waits = field(default_factory=dict, compare=False, repr=False)
+    waits: Waits = field(default_factory=dict)
 
     @property
     def proven(self) -> bool:
@@ -178,8 +179,7 @@ def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> li
     return [step for step in finals if step is not None]
 
 
-@dataclass(frozen=True)
-class _Found:
+class _Found(Struct, frozen=True):
     """An order that allocates little, what it waited for, the least peak found, and one that no order is below."""
 
     cost: Cost

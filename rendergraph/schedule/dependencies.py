@@ -5,10 +5,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import islice, pairwise, permutations
 from typing import TypeAlias
+
+from msgspec import Struct
 
 from rendergraph.errors import InputError, Mistake, Problem
 from rendergraph.steps import Resource, Step, Write
@@ -29,8 +30,7 @@ def touched_ids(step: Step) -> dict[str, None]:
     return dict.fromkeys([*(read.resource for read in step.all_reads), *(write.resource for write in step.writes)])
 
 
-@dataclass(frozen=True)
-class Versions:
+class Versions(Struct, frozen=True):
     """Who writes and who reads each version of each resource.
 
     Attributes:

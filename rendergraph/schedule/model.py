@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from rendergraph.schedule.dependencies import StepKey, Versions, Waits, is_filled_by_update, touched_ids
 from rendergraph.steps import Resource, Step
@@ -14,8 +15,7 @@ from rendergraph.textures import TextureDesc
 MUST_LIVE_VISITS = 20_000
 
 
-@dataclass(frozen=True)
-class Cost:
+class Cost(Struct, frozen=True):
     """What an order costs, compared from the first field to the last.
 
     Attributes:
@@ -34,8 +34,7 @@ class Cost:
         return self.pool, self.peak, self.area
 
 
-@dataclass(frozen=True)
-class Model:
+class Model(Struct, frozen=True):
     """Steps numbered in the reading order: depth first from the outputs, inputs in the order of their ports.
 
     The numbering depends on links and port declarations alone, never on the order of nodes in a file or of keys in a

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from heapq import heappop, heappush, nsmallest
 from typing import NamedTuple
+
+from msgspec import Struct
 
 from rendergraph.schedule.model import Model
 
@@ -14,8 +15,7 @@ BEAM, LAST_BEAM = 64, 256
 """States that a beam keeps after each step, before the search and when its budget has ended."""
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(Struct, frozen=True):
     """What a search came to.
 
     Attributes:

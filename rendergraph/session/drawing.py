@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
+
+from msgspec import Struct, field
 
 from rendergraph.compile import Executable, GpuScene
 from rendergraph.errors import Place, Problem, RenderError
@@ -22,8 +23,7 @@ from rendergraph.textures import FORMATS, Semantic, TextureDesc
 from rendergraph.version import __version__
 
 
-@dataclass(eq=False)
-class Drawing:
+class Drawing(Struct, eq=False, dict=True):
     """What `stages.compile` makes; to be used inside `with gpu.current()`, until something else is drawn there.
 
     Attributes:

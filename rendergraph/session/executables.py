@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.compile import Executable
 from rendergraph.declare import Node
@@ -21,8 +24,7 @@ MOST_BYTES = 1 << 30
 """Bytes of their textures and buffers together; what was drawn last is kept whatever it takes."""
 
 
-@dataclass(eq=False)
-class _Entry:
+class _Entry(Struct, eq=False):
     executable: Executable
     files: Mapping[Path, Stamp]
 
@@ -31,8 +33,7 @@ class _Entry:
         return self.executable.plan.memory.allocated_bytes
 
 
-@dataclass(eq=False)
-class ExecutableCache:
+class ExecutableCache(Struct, eq=False):
     """The last few that were drawn, as long as their shader files stay as they were.
 
     Attributes:
@@ -98,7 +99,7 @@ def _declared(cls: type[Node]) -> tuple[Any, ...]:
 def _structure(expansion: Expansion) -> tuple[Any, ...]:
     """An expansion without the values that can change in a compiled pipeline."""
     steps = tuple(
-        replace(
+        dataclasses.replace(
             step,
             uniforms=tuple((name, None) for name, _ in step.uniforms),  # type: ignore[misc]
             functions=tuple(replace(f, uniforms=()) for f in step.functions),

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
+
+from msgspec.structs import replace
 
 from rendergraph import stamps
 from rendergraph.declare import Extensions

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cache, wraps
 from typing import Annotated, Any, ParamSpec, TypeAlias
+
+from msgspec.structs import replace
 
 from rendergraph.annotations import Length, Range, fits, hints_of, may_be, mistakes_in, quoted
 from rendergraph.errors import Misuse, nearest, suggestion

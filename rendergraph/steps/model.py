@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from msgspec import Struct
+
 from rendergraph.errors import Mistake, Place, Problem, node_named, shown_file
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
@@ -21,8 +23,7 @@ MOST_STEPS = 10_000
 """Of one pipeline."""
 
 
-@dataclass(frozen=True)
-class Read:
+class Read(Struct, frozen=True):
     """A resource a step reads, and how.
 
     Attributes:
@@ -48,8 +49,7 @@ class Read:
     kind: str = "texture2d"
 
 
-@dataclass(frozen=True)
-class Write:
+class Write(Struct, frozen=True):
     """A resource a step writes: version `version` comes into being.
 
     Attributes:
@@ -72,8 +72,7 @@ class Write:
     layer: int | None = None
 
 
-@dataclass(frozen=True)
-class FunctionBinding:
+class FunctionBinding(Struct, frozen=True):
     """One provider of a function a step's shader calls; its text's names get the provider node's prefix.
 
     Attributes:
@@ -190,8 +189,7 @@ class Step:
 Role = Literal["transient", "internal", "output", "history", "kept", "scene"]
 
 
-@dataclass(frozen=True)
-class Resource:
+class Resource(Struct, frozen=True):
     """A texture or buffer of the pipeline before it has memory.
 
     Attributes:

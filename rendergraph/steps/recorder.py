@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from types import FrameType
 from typing import Annotated, Any, Literal, Protocol, TypeAlias
+
+from msgspec import Struct, field
 
 from rendergraph.annotations import quoted
 from rendergraph.errors import Misuse, is_framework
@@ -41,8 +42,7 @@ class Recorder(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class StepRequest:
+class StepRequest(Struct, frozen=True):
     """What a node asked for, before its ports are mapped to resources.
 
     `caller` is the author's file and line of the call, None where the framework recorded the step by itself.

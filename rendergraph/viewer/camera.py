@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
 from rendergraph.api.viewing import look_at, unit
 from rendergraph.scene.geometry import vec3

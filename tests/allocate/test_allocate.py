@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import dataclasses
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace
 
 from rendergraph.allocate import Physical, ResourcePlan, allocate
 from rendergraph.schedule import Schedule
@@ -121,7 +122,7 @@ def with_history(reader: int, written: int) -> ResourcePlan:
     found = chain(RGBA8, RGBA8, RGBA8, RGBA8, roles={written: "history"})
     steps = list(found.steps)
     old = Read("old", f"n{written}.x", 1, previous=True)
-    steps[reader] = replace(steps[reader], reads=(*steps[reader].reads, old))
+    steps[reader] = dataclasses.replace(steps[reader], reads=(*steps[reader].reads, old))
     return allocate(replace(found, steps=tuple(steps)))
 
 

@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 import rendergraph as rg
@@ -110,7 +111,7 @@ HOSTILE = "</script><script>alert(1)</script>\"'&<b>"
 def test_names_are_text_everywhere(comparison: Comparison) -> None:
     assert comparison.base is not None
     results = [replace(result, name=f"{HOSTILE}{number}") for number, result in enumerate(comparison.results)]
-    graph = replace(comparison.base[1], name=HOSTILE)
+    graph = msgspec.structs.replace(comparison.base[1], name=HOSTILE)
     hostile = replace(
         comparison,
         results=tuple(results),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from rendergraph.compile import gpu_scene
 from rendergraph.compile.gpu_scene import GpuScene

@@ -6,12 +6,12 @@ a view is one matrix.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from msgspec.structs import replace
 
 import rendergraph as rg
 from rendergraph.errors import InputError

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 
 from rendergraph.scene.frame_scene import FrameScene
 from rendergraph.scene.model import Mesh, Object, Scene

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from rendergraph.nodes.shadows import _light_views as views
 from rendergraph.nodes.shadows.shadow_map import ShadowMapNode
 
