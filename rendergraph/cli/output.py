@@ -126,7 +126,8 @@ def say_summary(report: dict[str, Any]) -> None:
         say(f"{name}: {', '.join(f'{number:.6g}' for number in (value if isinstance(value, list) else [value]))}")
     device, (width, height) = report["device"], report["size"]
     passes = amount(len(report["passes"]), "pass", "passes")
-    text = f"{width}×{height}, {passes}, {report['frame_ms']['median']:.1f} ms a frame"
+    took = f"{report['frame_ms']['median']:.1f} ms"
+    text = f"{width}×{height}, {passes}, {f'drawn in {took}' if len(report['steps_run']) == 1 else f'{took} a frame'}"
     say(f"{text} on {device['renderer']}" + (" (software: no measure of a GPU)" if device["software"] else ""))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from importlib.metadata import version
 from time import perf_counter
 
 from msgspec import Struct, field
@@ -54,7 +55,7 @@ class Drawing(Struct, eq=False, dict=True):
     def begin(self) -> None:
         """Warm up where that is asked for, and start history afresh."""
         options = self.expanded.options
-        if options.warm_up:
+        if options.warms_up:
             self._draw(options.frames[0])
             self.gpu.device.ctx.finish()
             self.executable.reuse.forget()  # what is measured is done
@@ -155,12 +156,7 @@ class Drawing(Struct, eq=False, dict=True):
 
     @cached_property
     def _metadata(self) -> Mapping[str, str]:
-        import moderngl
-        import numpy
-        import OpenImageIO
-
-        libraries = (moderngl, numpy, OpenImageIO)  # they know; asking for their metadata takes 20 ms
-        versions = {"rendergraph": __version__} | {library.__name__: library.__version__ for library in libraries}
+        versions = {"rendergraph": __version__} | {name: version(name) for name in ("moderngl", "numpy", "OpenImageIO")}
         device = self.gpu.device
         return {
             **described(self.expanded.linked),

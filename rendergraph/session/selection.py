@@ -103,7 +103,7 @@ class RenderKeywords(TypedDict, total=False):
     heap: bool
     poison: bool
     shuffle: int | None
-    warm_up: bool
+    warm_up: bool | None
     timed: bool
     reuse: bool | None
     cull: bool
@@ -121,7 +121,8 @@ class RenderOptions:
         alias, poison, shuffle: test modes: no sharing of memory, poisoned released textures, the seed of a random legal
             order instead of the best one.
         heap: let textures of any size and format share blocks of memory; the device must have memory objects.
-        warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it.
+        warm_up: draw the first frame once more beforehand, unmeasured, and start history afresh after it. By default
+            that is done where steps are timed.
         timed: measure each step, which takes longer than many small ones do.
         reuse: leave out the steps whose values are still there from the frame before and would be the same; no bit of a
             picture depends on it. By default that is done unless steps are timed, as those left out take no time.
@@ -140,7 +141,7 @@ class RenderOptions:
     heap: bool = False
     poison: bool = False
     shuffle: int | None = None
-    warm_up: bool = True
+    warm_up: bool | None = None
     timed: bool = False
     reuse: bool | None = None
     cull: bool = True
@@ -154,6 +155,11 @@ class RenderOptions:
             raise UsageError(Problem("RG500", text))
         if not self.fps > 0:
             raise UsageError(Problem("RG500", f"fps is {self.fps}; it is a number above 0"))
+
+    @property
+    def warms_up(self) -> bool:
+        """Whether a frame is drawn before the first, so that what a driver does once is not measured."""
+        return self.timed if self.warm_up is None else self.warm_up
 
     @property
     def reuses(self) -> bool:

@@ -106,6 +106,7 @@ class FakeFrame:
             "size": [6, 4],
             "passes": [],
             "frame_ms": {"median": 1.0, "min": 1.0, "max": 1.0},
+            "steps_run": [0],
             "memory": {},
             "culled": {"idle": "nobody reads it"},
             "figures": {"share": 0.25, "pair": [1.0, 2.0]},

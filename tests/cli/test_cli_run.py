@@ -17,7 +17,7 @@ def test_without_a_file_the_picture_is_named_after_the_pipeline(cli: Any, fake: 
     assert result.code == 0
     assert result.out == "where.png\n"
     assert "not drawn: idle: nobody reads it" in result.err
-    assert "6×4, 0 passes, 1.0 ms a frame on none (software: no measure of a GPU)" in result.err
+    assert "6×4, 0 passes, drawn in 1.0 ms on none (software: no measure of a GPU)" in result.err
     assert images.read("where.png").shape == (4, 6, 3)
     assert fake.calls["outputs"] == ("image",)
     assert fake.calls["frames"] == range(1, 2)
@@ -32,6 +32,7 @@ def test_json_is_one_document_with_the_paths(cli: Any, fake: Any) -> None:
         "size",
         "passes",
         "frame_ms",
+        "steps_run",
         "memory",
         "culled",
         "figures",
@@ -172,10 +173,18 @@ def test_one_pass_is_a_pass(capsys: pytest.CaptureFixture[str]) -> None:
     from rendergraph.cli.output import say_summary
 
     device = {"renderer": "none", "software": False}
-    say_summary(
-        {"culled": {}, "figures": {}, "device": device, "size": (6, 4), "passes": [{}], "frame_ms": {"median": 1.0}}
-    )
-    assert capsys.readouterr().err == "6×4, 1 pass, 1.0 ms a frame on none\n"
+    report: dict[str, Any] = {
+        "culled": {},
+        "figures": {},
+        "device": device,
+        "size": (6, 4),
+        "passes": [{}],
+        "frame_ms": {"median": 1.0},
+    }
+    for ran in ([1], [1, 0]):
+        say_summary(report | {"steps_run": ran})
+    one, two = "drawn in 1.0 ms", "1.0 ms a frame"
+    assert capsys.readouterr().err == f"6×4, 1 pass, {one} on none\n6×4, 1 pass, {two} on none\n"
 
 
 def test_no_picture_takes_the_place_of_a_texture_that_is_read(cli: Any, tmp_path: Path) -> None:
