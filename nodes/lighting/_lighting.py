@@ -187,6 +187,7 @@ class SurfaceLighting(Lighting):
                 view=view,
                 state=State(blend=UNDER, cull="none"),
                 environment=self.environment,
+                defines={"BLURRED": 1} if self.backdrop_blur > 0 else {},
                 label="backdrop",
             )
 

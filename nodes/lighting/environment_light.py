@@ -14,6 +14,7 @@ from rendergraph.api import (
     IrradianceSH,
     Node,
     Output,
+    Part,
     Radiance,
     Steps,
     define,
@@ -21,11 +22,22 @@ from rendergraph.api import (
     structural,
 )
 
+_COARSE = 2  # bits of the side of the coarsest cells, as in the shader
+_MOST_CELLS = 256  # along a side of a face
 _HARMONICS_SIDE = 64  # of the faces that harmonics are projected from: those of 16 texels misplace a sun by 25 %
 
 
 def _cube_size(node: Any, facts: Facts) -> tuple[int, int]:
     return node.size, node.size
+
+
+def _cells_side(node: Any) -> int:
+    """A power of two, so that four cells are one of the level below."""
+    return 1 << min(int(node.size), _MOST_CELLS).bit_length() - 1
+
+
+def _cells_size(node: Any, facts: Facts) -> tuple[int, int]:
+    return _cells_side(node), _cells_side(node)
 
 
 def _levels(node: Any) -> int:
@@ -54,14 +66,27 @@ class ImageBasedLight(Node):
     map = Input(
         EnvironmentMap, size="any", filter="trilinear", wrap="repeat", doc="The picture; unconnected, the scene's."
     )
-    cube = Internal(kind="texture_cube", format="rgba16f", size=_cube_size, mips=0, kept=True, doc="As a cube map.")
-    leaning = Internal(
-        kind="texture_cube",
+    cells = Internal(
+        kind="texture2d_array",
         format="rgba16f",
-        size=_cube_size,
-        mips=0,
+        layers=6,
+        size=_cells_size,
+        mips=lambda node, facts: _cells_side(node).bit_length() - _COARSE,
         kept=True,
-        doc="Directions weighted by luminance: a level's texels say where in them the light is, such as a sun.",
+        doc="Mean radiance of the cells of a cube, level by level.",
+    )
+    leaning = Internal(
+        kind="texture2d_array",
+        format="rgba32f",
+        layers=6,
+        size=_cells_size,
+        mips=lambda node, facts: _cells_side(node).bit_length() - _COARSE,
+        kept=True,
+        doc="Directions weighted by luminance: a cell's says where in it the light is, such as a sun, finer than half "
+        "floats do beside a narrow lobe.",
+    )
+    cube = Internal(
+        kind="texture_cube", format="rgba16f", size=_cube_size, mips=0, kept=True, doc="What lobes are sampled in."
     )
     specular = Output(
         Radiance,
@@ -101,10 +126,10 @@ class ImageBasedLight(Node):
     )
     harmonics = Output(
         IrradianceSH,
-        kind="buffer",
-        bytes=256,
+        format="rgba32f",
+        size=(16, 1),
         kept=True,
-        doc="16 vec4: the radiance's nine harmonics, then the constants of a diffuse surface's light.",
+        doc="The radiance's nine harmonics, a texel each, then seven of constants of a diffuse surface's light.",
     )
     light: ClassVar[Function] = Function(
         EnvironmentLight,
@@ -119,8 +144,8 @@ class ImageBasedLight(Node):
     )
     samples: int = define(default=64, min=8, max=1024, doc="Directions that a texel averages where lobes are sampled.")
     integrated_from: float = structural(
-        default=0.25,
-        min=0.1,
+        default=0.05,
+        min=0.05,
         max=2,
         doc="Roughness from which on a lobe is integrated over all of the picture, and not sampled; 2 for none.",
     )
@@ -137,42 +162,67 @@ class ImageBasedLight(Node):
     )
 
     def record(self, steps: Steps) -> None:
-        """The cube with its levels, harmonics of one level, and a dispatch for each roughness."""
+        """Cells, harmonics of one level of theirs, and a dispatch for each roughness."""
+        side = _cells_side(self)
+        pictures = {"cells": self.cells, "leaning": self.leaning}
         steps.compute(
-            "environment_cube.comp",
-            over=(self.size, self.size, 6),
+            "environment_cells.comp",
+            over=(side, side, 6),
             map=self.map,
-            out={"cube": self.cube, "leaning": self.leaning},
-            label="cube",
+            out={name: picture.mip(0) for name, picture in pictures.items()},
+            label="cells",
         )
-        steps.mipmaps(self.cube)
-        steps.mipmaps(self.leaning)
-        level = max(0, self.size.bit_length() - _HARMONICS_SIDE.bit_length())
+        for level in range(1, steps.desc(self.cells).mips):
+            steps.compute(
+                "environment_halve.comp",
+                over=(side >> level, side >> level, 6),
+                cells=self.cells.mip(level - 1),
+                leaning=self.leaning.mip(level - 1),
+                out={f"fewer_{name}": picture.mip(level) for name, picture in pictures.items()},
+                label=f"{side >> level} cells",
+            )
         steps.compute(
             "environment_harmonics.comp",
             over=(256, 1, 1),
-            cube=self.cube.sampled("trilinear"),
-            level=level,
+            cells=self.cells,
+            level=max(0, side.bit_length() - _HARMONICS_SIDE.bit_length()),
             out=self.harmonics,
             label="harmonics",
         )
+        self._to_cube(steps, self.specular.mip(0), "roughness 0")
+        if self.integrated_from > 0.5 / (_levels(self) - 1):
+            self._to_cube(steps, self.cube.mip(0), "cube")
+            steps.mipmaps(self.cube)
         last = _levels(self) - 1
         for cubes, after in (((self.specular, self.rough), 0.0), ((self.between, self.rough_between), 0.5)):
             levels = [(cube, mip) for cube in cubes for mip in range(steps.desc(cube).mips)]
             for level, (cube, mip) in enumerate(levels):
-                self._filter(steps, cube, mip, (level + after) / last)
+                if level + after > 0:
+                    self._filter(steps, cube, mip, (level + after) / last)
+
+    def _to_cube(self, steps: Steps, level: Part, label: str) -> None:
+        """The picture as the finest level of a cube map."""
+        out = {"cube": level}
+        steps.compute("environment_cube.comp", over=(self.size, self.size, 6), map=self.map, out=out, label=label)
 
     def _filter(self, steps: Steps, cube: Output, mip: int, roughness: float) -> None:
         """One level of a prefiltered cube map."""
         side = steps.desc(cube).mip_size(mip)[0]
-        integrated = roughness >= self.integrated_from
-        reads: dict[str, Any] = {"leaning": self.leaning.sampled("trilinear")} if integrated else {}
+        label, out = f"roughness {roughness:.2g}", {"specular": cube.mip(mip)}
+        if roughness < self.integrated_from:
+            source = self.cube.sampled("trilinear")
+            over = (side, side, 6)
+            steps.compute(
+                "environment_specular.comp", over=over, cube=source, roughness=roughness, out=out, label=label
+            )
+            return
+        over = (-(-side // 2), -(-side // 2), 6)  # four texels each
         steps.compute(
-            "environment_integral.comp" if integrated else "environment_specular.comp",
-            over=(side, side, 6),
-            cube=self.cube.sampled("trilinear"),
+            "environment_integral.comp",
+            over=over,
+            cells=self.cells,
+            leaning=self.leaning,
             roughness=roughness,
-            out={"specular": cube.mip(mip)},
-            label=f"roughness {roughness:.2g}",
-            **reads,
+            out=out,
+            label=label,
         )

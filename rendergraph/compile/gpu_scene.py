@@ -18,6 +18,7 @@ from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.views import FIXED_BLOCKS
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
+from rendergraph.gl.mips import fill_mips
 from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.variants import light_macros, scene_macros, storage_blocks
@@ -257,7 +258,10 @@ class GpuScene:
             textures.upload_bytes(self.device, made, pixels)
         else:
             textures.upload(self.device, made, pixels)
-        self.device.raw.glGenerateTextureMipmap(made.glo)
+        if pixels.dtype == np.uint8:
+            self.device.raw.glGenerateTextureMipmap(made.glo)
+        else:
+            fill_mips(self.device, made)
         return made
 
     def release(self, programs: ProgramCache) -> None:

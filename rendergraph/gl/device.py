@@ -30,6 +30,7 @@ class Device(Struct, eq=False, dict=True):
         owned: whether `release` ends the context; a borrowed one stays its owner's.
         limits: what the driver offers at most.
         textures_made: how many textures have been allocated so far.
+        mips: the program of `fill_mips`, where it has been needed.
     """
 
     ctx: moderngl.Context
@@ -37,6 +38,7 @@ class Device(Struct, eq=False, dict=True):
     owned: bool = True
     limits: dict[str, int] = field(default_factory=dict)
     textures_made: int = 0
+    mips: moderngl.ComputeShader | None = None
     _idle: moderngl.Framebuffer | None = None
     _sample_positions: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
 
@@ -121,6 +123,10 @@ class Device(Struct, eq=False, dict=True):
 
     def release(self) -> None:
         """End the context if it is ours."""
+        if self.mips is not None:
+            with self.current():
+                self.mips.release()
+            self.mips = None
         if self._idle is not None:
             with self.current():  # names of another context that is current would be freed otherwise
                 for attachment in self._idle.color_attachments:

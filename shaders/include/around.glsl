@@ -32,7 +32,8 @@ Reflected light_around(Surface s) {
 #ifdef MIRRORS_ENVIRONMENT
     float n_v = clamp(dot(s.normal, s.to_viewer), 0.0, 1.0);
     vec2 mirrored = textureLod(brdf_table, vec2(sqrt(n_v), s.roughness), 0.0).xy;
-    around.specular = light_from(mirror_direction(s), s.roughness) * (s.f0 * mirrored.x + s.f90 * mirrored.y);
+    float lobe = clamp(s.roughness, 0.0, 1.0);  // a compiler that sees its range leaves out all other lobes
+    around.specular = light_from(mirror_direction(s), lobe) * (s.f0 * mirrored.x + s.f90 * mirrored.y);
 #if MULTIPLE_SCATTERING
     // Light that leaves a rough surface after more than one reflection (Turquin 2019).
     around.specular *= 1.0 + s.f0 * (1.0 / max(mirrored.x + mirrored.y, 1e-3) - 1.0);

@@ -1,7 +1,9 @@
 // The environment as it is seen behind everything: laid under what the picture covers.
 #include <pass_view.glsl>
 
+#ifdef BLURRED
 uniform float backdrop_blur;
+#endif
 in vec2 v_uv;
 out vec4 radiance;
 #ifdef WRITES_DIFFUSE
@@ -13,8 +15,12 @@ void main() {
     vec4 ahead = view.inverse_projection * vec4(v_uv * 2.0 - 1.0, 0.5, 1.0);
     vec3 seen = view.eye.w > 0.0 ? ahead.xyz / ahead.w : vec3(0.0, 0.0, -1.0);
     vec3 direction = normalize(mat3(view.inverse_view) * seen);
-    float pixel = max(max(length(dFdx(direction)), length(dFdy(direction))), 1e-6);
-    radiance = vec4(light_from(direction, backdrop_blur > 0.0 ? backdrop_blur : -pixel), 0.0);
+#ifdef BLURRED
+    float lobe = clamp(backdrop_blur, 0.0, 1.0);
+#else
+    float lobe = -max(max(length(dFdx(direction)), length(dFdy(direction))), 1e-6);
+#endif
+    radiance = vec4(light_from(direction, lobe), 0.0);
 #ifdef WRITES_DIFFUSE
     diffuse = radiance;
 #endif

@@ -1,28 +1,20 @@
 // A picture of everything around, as a cube map.
 #include <cube.glsl>
 #include <equirectangular.glsl>
-#include <luminance.glsl>
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform sampler2D map;  // equirectangular
 uniform writeonly imageCube cube;
-uniform writeonly imageCube leaning;
 
 void main() {
     ivec3 texel = ivec3(gl_GlobalInvocationID);
     int side = imageSize(cube).x;
     if (any(greaterThanEqual(texel.xy, ivec2(side)))) return;
     // Four samples a texel: a sun of one texel of the picture would otherwise count too much or too little.
-    vec3 sum = vec3(0.0), lean = vec3(0.0);
+    vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
         vec2 place = cube_place(2 * texel.xy + ivec2(i & 1, i >> 1), 2 * side);
-        vec3 direction = cube_direction(texel.z, place);
-        vec3 light = picture_radiance(map, direction, sqrt(cube_solid_angle(place, 2 * side)));
-        sum += light;
-        // As places of the face, so that of even light it is the middle; in the dark, too.
-        vec3 away = abs(direction);
-        lean += (luminance_of(light) + 1e-3) * direction / max(away.x, max(away.y, away.z));
+        sum += picture_radiance(map, cube_direction(texel.z, place), sqrt(cube_solid_angle(place, 2 * side)));
     }
     imageStore(cube, texel, vec4(0.25 * sum, 1.0));
-    imageStore(leaning, texel, vec4(0.25 * lean, 0.0));
 }

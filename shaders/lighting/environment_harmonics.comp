@@ -5,11 +5,9 @@
 #include <math.glsl>
 layout(local_size_x = 256) in;
 
-uniform samplerCube cube;
-uniform int level;     // of the cube that is read
-layout(std430) writeonly buffer harmonics {
-    vec4 bands[16];  // the radiance's 00, 1-1, 10, 11, 2-2, 2-1, 20, 21, 22; then 7 of the polynomial
-};
+uniform sampler2DArray cells;  // radiance, six faces
+uniform int level;
+uniform writeonly image2D harmonics;  // 00, 1-1, 10, 11, 2-2, 2-1, 20, 21, 22 of the radiance; 7 of the polynomial
 
 shared vec3 parts[256];
 
@@ -26,14 +24,15 @@ vec3 added_up(vec3 part) {
 }
 
 void main() {
-    int side = textureSize(cube, level).x;
+    int side = textureSize(cells, level).x;
     vec3 sums[9];
     for (int k = 0; k < 9; ++k) sums[k] = vec3(0.0);
     for (int i = int(gl_LocalInvocationIndex); i < 6 * side * side; i += 256) {
         int face = i / (side * side);
-        vec2 place = cube_place(ivec2(i % side, i / side % side), side);
+        ivec2 texel = ivec2(i % side, i / side % side);
+        vec2 place = cube_place(texel, side);
         vec3 d = cube_direction(face, place);
-        vec3 light = textureLod(cube, d, float(level)).rgb * cube_solid_angle(place, side);
+        vec3 light = texelFetch(cells, ivec3(texel, face), level).rgb * cube_solid_angle(place, side);
         sums[0] += light * 0.282095;
         sums[1] += light * (0.488603 * d.y);
         sums[2] += light * (0.488603 * d.z);
@@ -67,12 +66,14 @@ void main() {
 #endif
     if (gl_LocalInvocationIndex > 0u) return;
 
-    for (int k = 0; k < 9; ++k) bands[k] = vec4(sums[k], 0.0);
+    for (int k = 0; k < 9; ++k) imageStore(harmonics, ivec2(k, 0), vec4(sums[k], 0.0));
     vec3 constant = 0.282095 * sums[0] - second * 0.315392 * sums[6];
     for (int c = 0; c < 3; ++c) {
-        bands[9 + c] = vec4(first * 0.488603 * vec3(sums[3][c], sums[1][c], sums[2][c]), constant[c]);
-        bands[12 + c] = second * vec4(
+        vec4 linear = vec4(first * 0.488603 * vec3(sums[3][c], sums[1][c], sums[2][c]), constant[c]);
+        vec4 products = second * vec4(
             1.092548 * sums[4][c], 1.092548 * sums[5][c], 3.0 * 0.315392 * sums[6][c], 1.092548 * sums[7][c]);
+        imageStore(harmonics, ivec2(9 + c, 0), linear);
+        imageStore(harmonics, ivec2(12 + c, 0), products);
     }
-    bands[15] = vec4(second * 0.546274 * sums[8], 0.0);
+    imageStore(harmonics, ivec2(15, 0), vec4(second * 0.546274 * sums[8], 0.0));
 }

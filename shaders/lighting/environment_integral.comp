@@ -1,53 +1,93 @@
 // One level of a prefiltered cube map: what `environment_specular.comp` samples, summed over all of the picture. The
 // picture is taken in cells of a cube, the smaller the steeper the lobe is there, and each cell shines from where its
-// light is: a sun stays where it stands, so that cells may be much larger than it.
-#include <brdf.glsl>
+// light is: a sun stays where it stands, so that cells may be much larger than it. Four texels go the same way down
+// through the cells, which are so looked up once for all four.
 #include <cube.glsl>
 layout(local_size_x = 8, local_size_y = 8) in;
 
-uniform samplerCube cube;     // the environment, with all its levels
-uniform samplerCube leaning;  // directions weighted by luminance, likewise
-uniform float roughness;      // perceptual
+uniform sampler2DArray cells;    // mean radiance, with all levels; the last has COARSE cells along a side of a face
+uniform sampler2DArray leaning;  // directions weighted by luminance, likewise
+uniform float roughness;         // perceptual
 uniform writeonly imageCube specular;
 
-const int COARSE = 4;         // cells along a side of a face where the lobe is flat
-const float STEEPNESS = 0.45;  // a cell's side over the angle in which the lobe falls
+const int COARSE = 2;  // bits of the side of the coarsest level
 
-// GGX's lobe around a normal, seen along it, times N.L, for a given part of a face in place of solid angle.
-float lobe(vec3 normal, vec3 light, float alpha) {
-    float n_l = max(dot(normal, light), 0.0);
-    vec3 size = abs(light);
+// GGX's lobe around four normals, seen along them, times N.L; but for a factor.
+vec4 lobes(vec4 n_l, float a2) {
+    n_l = max(n_l, 0.0);
+    vec4 fall = 0.5 * (1.0 + a2) - 0.5 * (1.0 - a2) * n_l;
+    return n_l / (fall * fall);
+}
+
+// A face's area around a direction, over the solid angle.
+float squeezed(vec3 direction) {
+    vec3 size = abs(direction);
     float major = max(size.x, max(size.y, size.z));
-    return distribution_ggx(sqrt(0.5 + 0.5 * n_l), alpha) * n_l * major * major * major;
+    return major * major * major;
+}
+
+// Every second bit.
+int halved_bits(int bits) {
+    bits &= 0x55555555;
+    bits = (bits | bits >> 1) & 0x33333333;
+    bits = (bits | bits >> 2) & 0x0f0f0f0f;
+    bits = (bits | bits >> 4) & 0x00ff00ff;
+    return (bits | bits >> 8) & 0xffff;
 }
 
 void main() {
-    ivec3 texel = ivec3(gl_GlobalInvocationID);
+    ivec3 block = ivec3(gl_GlobalInvocationID);
     int side = imageSize(specular).x;
-    vec3 normal = cube_direction(texel.z, cube_place(texel.xy, side));
-    float alpha = roughness * roughness;
-    int finest = textureSize(cube, 0).x, splits = max(int(round(log2(float(finest) / float(COARSE)))), 0);
-    int least = min(roughness < 0.45 ? 0 : 1, splits);  // levels of wide lobes have few texels, which may take longer
-    vec3 sum = vec3(0.0);
-    float weights = 0.0;
-    for (int i = 0; i < 6 * COARSE * COARSE; ++i) {
-        int face = i / (COARSE * COARSE);
-        ivec2 cell = ivec2(i % COARSE, i / COARSE % COARSE);
-        float cosine = dot(normal, cube_direction(face, cube_place(cell, COARSE)));
-        float width = 0.5 * PI / float(COARSE);
-        if (cosine < -0.75 * width) continue;  // below the horizon
-        // Of the half vector, at the cell's nearest point; the lobe falls within sqrt(alpha^2 + angle^2).
-        float angle = max(0.5 * (acos(clamp(cosine, -1.0, 1.0)) - 0.75 * width), 0.0);
-        float wanted = width / (2.0 * STEEPNESS * sqrt(alpha * alpha + angle * angle));
-        int split = clamp(int(ceil(log2(wanted))), least, splits), parts = 1 << split;
-        int cells = COARSE * parts;
-        float level = log2(float(finest) / float(cells));
-        for (int k = 0; k < parts * parts; ++k) {
-            vec3 middle = cube_direction(face, cube_place(cell * parts + ivec2(k % parts, k / parts), cells));
-            vec3 light = normalize(textureLod(leaning, middle, level).xyz);
-            weights += lobe(normal, middle, alpha) / float(cells * cells);
-            sum += textureLod(cube, middle, level).rgb * (lobe(normal, light, alpha) / float(cells * cells));
+    if (any(greaterThanEqual(2 * block.xy, ivec2(side)))) return;
+    vec3 middle = cube_direction(block.z, (4.0 * vec2(block.xy) + 2.0) / float(side) - 1.0);
+    vec4 x, y, z;
+    for (int k = 0; k < 4; ++k) {
+        vec3 normal = cube_direction(block.z, cube_place(2 * block.xy + ivec2(k & 1, k >> 1), side));
+        x[k] = normal.x;
+        y[k] = normal.y;
+        z[k] = normal.z;
+    }
+    float radius = 1.4 / float(side), a2 = roughness * roughness * roughness * roughness;
+    int finest = textureQueryLevels(cells) - 1 + COARSE;
+    // A cell's side over the angle in which the lobe falls; levels of narrow lobes have many texels.
+    float steepness = roughness < 0.25 ? 0.65 : 0.4;
+    int least = COARSE + (roughness < 0.45 ? 0 : 1);  // levels of wide lobes have few texels, which may take longer
+    vec4 red = vec4(0.0), green = vec4(0.0), blue = vec4(0.0), weights = vec4(0.0);
+    int bits = COARSE, at = 0;  // cells of 1 << bits along a side; the number of one, along a curve of quarters
+    while (at < 6 << (2 * bits)) {
+        int number = at & ((1 << (2 * bits)) - 1), face = at >> (2 * bits);
+        ivec2 cell = ivec2(halved_bits(number), halved_bits(number >> 1));
+        vec3 direction = cube_direction(face, cube_place(cell, 1 << bits));
+        float area = squeezed(direction) / float(1 << (2 * bits));
+        float cosine = dot(middle, direction), width2 = 4.0 * area, reach = 0.75 * sqrt(width2) + radius;
+        bool seen = cosine > -reach;
+        float away = max(sqrt(max(2.0 - 2.0 * cosine, 0.0)) - radius, 0.0);
+        bool coarse = width2 > steepness * steepness * (4.0 * a2 + away * away);
+        if (seen && bits < finest && (coarse || bits < least)) {
+            bits += 1;
+            at <<= 2;
+            continue;
+        }
+        if (seen) {
+            ivec3 texel = ivec3(cell, face);
+            vec3 radiance = texelFetch(cells, texel, finest - bits).rgb;
+            vec3 light = normalize(texelFetch(leaning, texel, finest - bits).xyz);
+            float part = squeezed(light) / float(1 << (2 * bits));
+            vec4 share = lobes(x * light.x + y * light.y + z * light.z, a2) * part;
+            red += share * radiance.r;
+            green += share * radiance.g;
+            blue += share * radiance.b;
+            weights += lobes(x * direction.x + y * direction.y + z * direction.z, a2) * area;
+        }
+        at += 1;
+        while (bits > COARSE && (at & 3) == 0) {
+            at >>= 2;
+            bits -= 1;
         }
     }
-    if (all(lessThan(texel.xy, ivec2(side)))) imageStore(specular, texel, vec4(sum / weights, 1.0));
+    for (int k = 0; k < 4; ++k) {
+        ivec2 texel = 2 * block.xy + ivec2(k & 1, k >> 1);
+        vec3 mean = vec3(red[k], green[k], blue[k]) / weights[k];
+        if (all(lessThan(texel, ivec2(side)))) imageStore(specular, ivec3(texel, block.z), vec4(mean, 1.0));
+    }
 }

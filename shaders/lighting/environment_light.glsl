@@ -8,14 +8,16 @@ uniform samplerCube specular;  // levels of even roughness from 0 on,
 uniform samplerCube rough;     // and on to 1
 uniform samplerCube between;   // levels halfway between those
 uniform samplerCube rough_between;
-layout(std430) readonly buffer harmonics {
-    vec4 bands[16];
-};
+uniform sampler2D harmonics;
+
+vec4 constant(int number) {
+    return texelFetch(harmonics, ivec2(number, 0), 0);
+}
 
 vec3 diffuse_light(vec3 d) {
     vec4 linear = vec4(d, 1.0), products = vec4(d.x * d.y, d.y * d.z, d.z * d.z, d.x * d.z);
-    vec3 sum = bands[15].rgb * (d.x * d.x - d.y * d.y);
-    for (int c = 0; c < 3; ++c) sum[c] += dot(bands[9 + c], linear) + dot(bands[12 + c], products);
+    vec3 sum = constant(15).rgb * (d.x * d.x - d.y * d.y);
+    for (int c = 0; c < 3; ++c) sum[c] += dot(constant(9 + c), linear) + dot(constant(12 + c), products);
     return max(sum, 0.0);
 }
 

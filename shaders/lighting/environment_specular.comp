@@ -7,7 +7,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uniform samplerCube cube;  // the environment, with all its levels
-uniform float roughness;   // perceptual; 0 is a mirror
+uniform float roughness;   // perceptual, above 0
 uniform float level_bias;
 uniform writeonly imageCube specular;
 
@@ -31,20 +31,16 @@ void main() {
     int side = imageSize(specular).x;
     vec3 normal = cube_direction(texel.z, cube_place(texel.xy, side));
     vec3 sum = vec3(0.0);
-    if (roughness == 0.0) {
-        sum = textureLod(cube, normal, log2(float(textureSize(cube, 0).x) / float(side))).rgb;
-    } else {
-        work_out_samples();
-        vec3 tangent = any_tangent(normal);
-        mat3 frame = mat3(tangent, cross(normal, tangent), normal);
-        float weights = 0.0;
-        for (int i = 0; i < SAMPLES; ++i) {
-            vec4 one = samples[i];
-            if (one.z <= 0.0) continue;
-            sum += textureLod(cube, frame * one.xyz, one.w).rgb * one.z;
-            weights += one.z;
-        }
-        sum /= weights;
+    work_out_samples();
+    vec3 tangent = any_tangent(normal);
+    mat3 frame = mat3(tangent, cross(normal, tangent), normal);
+    float weights = 0.0;
+    for (int i = 0; i < SAMPLES; ++i) {
+        vec4 one = samples[i];
+        if (one.z <= 0.0) continue;
+        sum += textureLod(cube, frame * one.xyz, one.w).rgb * one.z;
+        weights += one.z;
     }
+    sum /= weights;
     if (all(lessThan(texel.xy, ivec2(side)))) imageStore(specular, texel, vec4(sum, 1.0));
 }
