@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rendergraph.compile.executable import CompiledStep, Executable
 from rendergraph.compile.gpu_scene import GpuScene
+from rendergraph.compile.kept import KeptValues
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.steps import compile_plan
 
-__all__ = ["CompiledStep", "Executable", "GpuScene", "ProgramCache", "compile_plan"]
+__all__ = ["CompiledStep", "Executable", "GpuScene", "KeptValues", "ProgramCache", "compile_plan"]

@@ -6,7 +6,7 @@ written by each draw. A changed parameter assembles the lists anew: no GL object
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -147,6 +147,7 @@ class Executable(Struct, eq=False, dict=True):
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written and everything bound before the next frame.
         looks_back: a program looks at where things were in the frame before.
+        made_kept: kept steps have run.
     """
 
     device: Device
@@ -166,6 +167,7 @@ class Executable(Struct, eq=False, dict=True):
     vertex_arrays: Call = bool
     fresh: bool = True
     looks_back: bool = False
+    made_kept: bool = False
     filled: dict[str, bytes] = field(default_factory=dict)
     touched: set[str] = field(default_factory=set)
     _steady: list[list[FrameStep]] = field(default_factory=list)
@@ -199,7 +201,13 @@ class Executable(Struct, eq=False, dict=True):
         """A frame has run: go on without the kept steps that were due."""
         self._begun = False
         if self.due:
-            self.due, self.lists = set(), self._steady
+            self.due, self.lists, self.made_kept = set(), self._steady, True
+
+    def have(self, resources: Collection[str]) -> None:
+        """These kept values have been put where they belong: the steps that make nothing else have not to run."""
+        missing = {key for key in self.due if any(w.resource not in resources for w in self.kept[key].writes)}
+        self.due = self._with_dependents(missing)
+        self.assemble()
 
     def break_off(self) -> None:
         """A step was broken off in its middle: leave nothing of it to what is drawn after."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -245,6 +247,13 @@ class GpuScene:
             assert self.scene.environment is not None  # only a scene that has one is asked
             self._environment = self._upload(self.decode_light(self.scene.environment.image), srgb=True)
         return self._environment
+
+    @property
+    def environment_content(self) -> Hashable:
+        """What the picture around the scene is decoded from: equal ones give the same texels, also of two scenes."""
+        assert self.scene.environment is not None  # as above
+        image = self.scene.environment.image
+        return image, None if isinstance(image, MadeImage) else self.scene.files.get(Path(os.path.abspath(image.path)))
 
     def _upload(self, pixels: npt.NDArray[Any], *, srgb: bool) -> GpuTexture:
         height, width = pixels.shape[:2]

@@ -7,6 +7,7 @@ from functools import partial
 from msgspec.structs import replace
 
 from rendergraph.compile.memory import Call, Memory
+from rendergraph.gl import textures
 from rendergraph.gl.device import Device
 from rendergraph.steps import Read, Step, Write
 from rendergraph.textures import FORMATS, BufferDesc
@@ -71,27 +72,7 @@ def _copy(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]
     (read,), (write,) = step.reads, step.writes
     if isinstance(memory.plan.resources[read.resource].desc, BufferDesc):
         return [partial(device.ctx.copy_buffer, memory.buffer(write.resource), memory.buffer(read.resource))]
-    source, target = memory.texture(read.resource, parity), memory.texture(write.resource, parity)
-    return [
-        partial(
-            device.raw.glCopyImageSubData,
-            source.glo,
-            source.target,
-            mip,
-            0,
-            0,
-            0,
-            target.glo,
-            target.target,
-            mip,
-            0,
-            0,
-            0,
-            *source.desc.mip_size(mip),
-            source.desc.layers,
-        )
-        for mip in range(source.desc.mips)
-    ]
+    return list(textures.copies(device, memory.texture(read.resource, parity), memory.texture(write.resource, parity)))
 
 
 def _resolve(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:

@@ -7,7 +7,8 @@ differ and aliased textures would otherwise share filter state.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -110,6 +111,19 @@ def view(
 def delete(device: Device, texture: GpuTexture) -> None:
     """Free it; storage lives until its last view is gone."""
     device.raw.delete("glDeleteTextures", texture.glo)
+
+
+def copies(device: Device, source: GpuTexture, target: GpuTexture) -> list[Callable[[], object]]:
+    """The calls that copy all texels of one texture to another of its description."""
+    return [
+        partial(
+            device.raw.glCopyImageSubData,
+            *(source.glo, source.target, mip, 0, 0, 0),
+            *(target.glo, target.target, mip, 0, 0, 0),
+            *(*source.desc.mip_size(mip), source.desc.layers),
+        )
+        for mip in range(source.desc.mips)
+    ]
 
 
 def transfer_format(format_name: str) -> tuple[int, int, Any, int]:

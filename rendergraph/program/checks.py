@@ -29,6 +29,7 @@ _MOVING = {
     "camera_block": "the camera",
     "frame_block": "the frame's time and number",
     "light_block": "the scene's lights, which may move",
+    "material_block": "the scene's materials, which may change",
     "environment_block": "how bright the environment is and how it is turned, which may move",
     "pass_view_block": "the view it is drawn with",
 }

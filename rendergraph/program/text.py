@@ -205,9 +205,24 @@ def _stage(
         source = with_formats(source, step, resources)
     extensions, source = _hoisted(source)
     body = functions.text + source.text
-    head = generated([VERSION, *extensions]) + _macros(macros)
     declarations = _read_declarations(step.reads, resources, "", body)
-    return StageText(stage, head + view + declarations + functions + source, step.node)
+    text = view + declarations + functions + source
+    head = generated([VERSION, *extensions]) + _macros(_looked_at(macros, text.text))
+    return StageText(stage, head + text, step.node)
+
+
+def _looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
+    """The macros whose names occur in a text or in what such a macro stands for.
+
+    The others would only make different programs of equal ones: a blur is the same however many lights there are.
+    """
+    found: dict[str, str] = {}
+    texts = [text]
+    while texts:
+        new = {name: macros[name] for name in macros if name not in found and any(name in text for text in texts)}
+        found |= new
+        texts = list(new.values())
+    return {name: macros[name] for name in macros if name in found}
 
 
 def _macros(macros: Mapping[str, str]) -> SourceText:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -77,7 +77,13 @@ def shipped(name: str, lights: Sequence[Light] = (), values: Mapping[str, Any] =
         return Environment(MadeImage("studio", SIZE, studio), SIZE)
     directional = next((light.direction for light in lights if light.type == "directional"), DEFAULT_SUN)
     sun, turbidity = values.get("sun", directional), values.get("turbidity", 3.0)
-    return Environment(MadeImage("sky", SIZE, partial(sky, sun, turbidity, shines=not lights)), SIZE)
+    return Environment(_sky(tuple(sun), turbidity, not lights), SIZE)
+
+
+@lru_cache
+def _sky(sun: Vec3, turbidity: float, shines: bool) -> MadeImage:
+    """One for each sky, so that scenes that stand under the same one know it."""
+    return MadeImage("sky", SIZE, partial(sky, sun, turbidity, shines=shines))
 
 
 def studio() -> npt.NDArray[np.float16]:

@@ -6,7 +6,7 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
 from rendergraph import stamps
-from rendergraph.compile import Executable, GpuScene, ProgramCache, compile_plan
+from rendergraph.compile import Executable, GpuScene, KeptValues, ProgramCache, compile_plan
 from rendergraph.errors import Problem
 from rendergraph.gl.device import Device
 from rendergraph.gl.memory import check_memory
@@ -15,6 +15,7 @@ from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene
 from rendergraph.session.executables import ExecutableCache, key_of
 from rendergraph.session.scenes import image_limits
+from rendergraph.session.selection import RenderOptions
 from rendergraph.session.values import Expanded, Linked, Planned
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 
 
 class GpuCache:
-    """Programs live as long as it does; one scene, and the last few pipelines compiled for it, until others come.
+    """Programs, and what kept steps have made, live as long as it does; one scene, and the last few pipelines compiled
+    for it, until others come.
 
     Attributes:
         programs: the programs that were compiled.
@@ -39,8 +41,10 @@ class GpuCache:
         self.image_warnings: list[Problem] = []
         self.active: Executable | None = None
         self.drawing: object = None
+        self._kept = KeptValues(device)
         self._executables = ExecutableCache()
         self._scene: tuple[Scene, GpuScene] | None = None
+        self._shares = False
 
     def upload(self, linked: Linked) -> GpuScene:
         """A pipeline's scene on the GPU, in place of another that was there.
@@ -71,9 +75,11 @@ class GpuCache:
     def take(self, expanded: Expanded) -> tuple[Hashable, Executable | None]:
         """What was compiled of the same before, with the values of these steps, and the key it is kept by."""
         key = key_of(expanded)
+        self._save()
         executable = self._executables.take(key)
         if executable is not None:
             executable.set_uniforms(expanded.expansion.steps)
+            self._restore(expanded.options, executable)
         return key, executable
 
     def make(self, key: Hashable, planned: Planned, scene: GpuScene) -> Executable:
@@ -91,16 +97,30 @@ class GpuCache:
         with stamps.looking() as files:
             executable = compile_plan(self._device, planned.plan, types, views, scene, self.programs, poison=poison)
         self._executables.add(key, executable, files)
+        self._restore(planned.options, executable)
         self.programs.discard(self._executables.unused())
         return executable
 
     def release(self) -> None:
         """Free everything."""
+        self.active = None  # nobody is left to pass anything on to
         self._forget()
+        self._kept.release()
         self.programs.release()
+
+    def _save(self) -> None:
+        """What was drawn last has made, others may want: this comes before anything takes its place."""
+        if self.active is not None and self._shares:
+            self._kept.save(self.active)
+
+    def _restore(self, options: RenderOptions, executable: Executable) -> None:
+        self._shares = options.shares
+        if options.shares:
+            self._kept.restore(executable)
 
     def _forget(self) -> None:
         """Free the scene and all that was compiled for it."""
+        self._save()
         self._executables.clear()
         self.active = self.drawing = None
         scene, self._scene = self._scene, None  # what follows may fail, and a released scene must not be met again

@@ -166,6 +166,11 @@ class RenderOptions:
         """Whether steps are left out; what poison overwrites is never there."""
         return not self.poison and (not self.timed if self.reuse is None else self.reuse)
 
+    @property
+    def shares(self) -> bool:
+        """Whether kept values are taken over from other pipelines; the modes that check one make all of it."""
+        return self.alias and not self.poison and self.shuffle is None
+
     @classmethod
     def of(cls, keywords: RenderKeywords) -> RenderOptions:
         """The options that keywords spell; None is the default."""

@@ -76,6 +76,14 @@ outputs: {image: b.color}
 """
 
 
+@pytest.fixture(autouse=True)
+def nothing_made(gl: rg.Session) -> None:
+    """What another test has made is not taken over."""
+    with gl.device.current():
+        gl.cache._forget()
+        gl.cache._kept.release()
+
+
 @pytest.fixture
 def draw(bench: Any) -> Draw:
     """Draws with each step measured: so the frame knows which ran."""

@@ -30,7 +30,7 @@ FORMS = {
 }
 
 FILES = {
-    "main.frag": '#include "one.glsl"\nout vec4 color;\n\nvoid main() {\n    color = one() + mistake_main;\n}\n',
+    "main.frag": '#include "one.glsl"\nout vec4 color;\n\nvoid main() {\n    color = one() + mistake_main * SAMPLES;\n}\n',
     "one.glsl": '#include "two.glsl"\nvec4 one() { return two() + mistake_one; }\n',
     "two.glsl": "#define TWICE(x) ((x) * mistake_macro)\n\nvec4 two() { return vec4(TWICE(1.0)) + mistake_two; }\n",
     "shadow.glsl": (
@@ -115,7 +115,7 @@ def answer(form: str, text: StageText, fragment: str, name: str) -> Problem:
             "#define SAMPLES 4",
             "SAMPLES",
             "main.frag",
-            1,
+            5,
             "(in what rendergraph writes for the macro SAMPLES: ",
         ),
     ],

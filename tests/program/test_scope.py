@@ -78,7 +78,7 @@ def test_each_run_of_lines_says_where_it_stands() -> None:
     assert [line for line in shown.split("\n") if line and not line.startswith("// ")] == plain
     where = re.search(r"// (display/tonemap\.frag:\d+)\n#if RADIANCE_SAMPLES > 1", shown)
     assert where is not None
-    assert "// macros\n#define PASS_SAMPLES 1\n#define " in shown
+    assert "// macros\n#define RADIANCE_SAMPLES 1\n#define " in shown
     assert "// include/view.glsl:" in shown
 
 

@@ -204,7 +204,21 @@ def test_visibility_is_looked_up_at_the_fragment(folder: Path) -> None:
     text = fragment(folder, step("lamp", visibility=True)).text
     assert "uniform sampler2DArray visibility_0;" in text
     assert "if (light == 2) result = result * texelFetch(visibility_0, ivec3(ivec2(gl_FragCoord.xy), 1), 0).r;" in text
+
+
+def test_macros_are_there_where_they_are_looked_at(folder: Path) -> None:
+    write(
+        folder,
+        count__frag="void main() { int count = VISIBILITY_COUNT; }\n",
+        between__frag="#ifdef OUTER\nconst int first = OUTER;\n#endif\nvoid main() {}\n",
+    )
+    text = fragment(folder, step(shader="count.frag", visibility=True)).text
     assert "#define VISIBILITY_COUNT 1" in text
+    assert "VISIBILITY_LAYERS" not in text
+    defines = (("OUTER", "(2 * INNER)"), ("INNER", "3"), ("OTHER", "4"))
+    text = fragment(folder, replace(step(shader="between.frag"), defines=defines)).text
+    assert "#define OUTER (2 * INNER)\n#define INNER 3\n" in text
+    assert "OTHER" not in text
 
 
 def test_shaders_can_ask_which_lights_have_shadows(folder: Path) -> None:
