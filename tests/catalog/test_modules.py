@@ -40,6 +40,7 @@ class HardShadows(ShadowPCF):
     depth = DROPPED
 '''
 PIPELINE = """extends: forward
+scene: cornell_box
 nodes:
   shadows: {type: hard_shadows}
   light: {type: plain_lighting, params: {evaluate: %s}}
@@ -76,7 +77,9 @@ def test_a_node_finds_the_shaders_of_the_one_it_extends(
     file.write_text(PIPELINE % evaluate)
     settings: Any = {"plugins": [plugin], "size": (40, 30)}
     found = gl.render(rg.load(file, **settings).set("sun.resolution", 64))["image"]
-    shipped = rg.load("forward", size=(40, 30)).set("sun.resolution", 64).set("light.evaluate", evaluate)
+    shipped = (
+        rg.load("forward", size=(40, 30), scene="cornell_box").set("sun.resolution", 64).set("light.evaluate", evaluate)
+    )
     np.testing.assert_array_equal(found, gl.render(shipped)["image"])
 
 

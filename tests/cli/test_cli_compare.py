@@ -178,7 +178,7 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
 
 def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
     words = ("-x", "shadows.taps=1:3:1", "-x", "display.curve=aces,none", "--size", "48x27", "--list")
-    told = cli("sweep", "forward", *words).out.splitlines()
+    told = cli("sweep", "forward", "--scene", "cornell_box", *words).out.splitlines()
     assert told[0] == "6 runs against shadows.taps=1,display.curve=aces: 10 passes to draw, 18 one by one"
     assert [line.split() for line in told[2:6]] == [
         ["sun", "1", "6"],
@@ -187,7 +187,7 @@ def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
         ["group", "shadows.taps", "display.curve"],
     ]
     assert [line.split() for line in told[6:8]] == [["1", "1", "aces"], ["1", "1", "none"]]
-    found = cli("sweep", "forward", *words, "--samples", "4", "--seed", "1", "--json").json
+    found = cli("sweep", "forward", "--scene", "cornell_box", *words, "--samples", "4", "--seed", "1", "--json").json
     assert (len(found["runs"]), found["passes"][0]) == (4, {"node": "sun", "drawn": 1, "one_by_one": 4})
     assert not list(tmp_path.iterdir())
 
@@ -286,7 +286,7 @@ def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> 
 
 
 def test_a_sweep_writes_its_chart_as_a_picture(cli: Any, tmp_path: Path) -> None:
-    words = ("sweep", "forward", *SMALL, "-x", "shadows.taps=1", "-n", "1", "-o", "out")
+    words = ("sweep", "forward", "--scene", "cornell_box", *SMALL, "-x", "shadows.taps=1", "-n", "1", "-o", "out")
     found = cli(*words)
     assert found.out.startswith("1 run against shadows.taps=1: 3 passes drawn")
     assert found.out.splitlines()[-2:] == ["out/quality.svg", "out/report.html"]

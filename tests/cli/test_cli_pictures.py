@@ -13,6 +13,7 @@ from rendergraph import images
 from rendergraph.images import read, read_metadata
 
 SMALL = ("--size", "48x27")
+BOX = (*SMALL, "--scene", "cornell_box")
 TURNING = """
 scene: 1
 objects: {box: {shape: box}, floor: {shape: plane, size: [5, 5]}}
@@ -32,7 +33,7 @@ def turning(tmp_path: Path) -> str:
 
 
 def test_a_picture_draws_itself_again(cli: Any, tmp_path: Path) -> None:
-    assert cli("run", "forward", *SMALL, "-s", "shadows.taps=1", "-o", "light.exr").code == 0
+    assert cli("run", "forward", *BOX, "-s", "shadows.taps=1", "-o", "light.exr").code == 0
     assert cli("run", "light.exr").out == "light-again.exr\n"
     np.testing.assert_array_equal(read(tmp_path / "light.exr"), read(tmp_path / "light-again.exr"))
     assert cli("run", "light.exr", "-s", "light.ambient=0.5", "-o", "other.exr").code == 0
@@ -73,7 +74,7 @@ def test_what_a_picture_says_reaches_nothing_outside(
     images.write(tmp_path / "secret" / "sky.hdr", np.ones((2, 4, 3), np.float32))
     monkeypatch.chdir(tmp_path / "here")
     pipeline = rg.load("forward", size=(8, 8)).resolve().spec.to_yaml()
-    pipeline = pipeline.replace("scene: cornell_box", "scene: ./scene.yaml") if key == "folder" else pipeline
+    pipeline = pipeline.replace("scene: shapes", "scene: ./scene.yaml") if key == "folder" else pipeline
     pixels = np.zeros((2, 2, 3), np.uint8)
     images.write(Path("hostile.png"), pixels, metadata={"rendergraph:pipeline": pipeline, f"rendergraph:{key}": value})
     result = cli("check", "hostile.png") if key in ("frame", "fps") else cli("run", "hostile.png", "-o", "x.png")

@@ -198,7 +198,7 @@ def test_bench_shows_the_steps_of_a_pass(cli: Any) -> None:
 def test_check_and_plan_say_what_they_found(cli: Any) -> None:
     result = cli("check", "forward")
     assert (result.code, result.out) == (0, "")
-    assert result.err == "forward: 4 nodes, 3 links, 1280×720, outputs image, radiance\n"
+    assert result.err == "forward: 5 nodes, 4 links, 1280×720, outputs image, radiance\n"
     told = cli("check", "forward", "--json").json
     assert told["outputs"] == {"image": "display.color", "radiance": "light.radiance"}
     assert told["warnings"] == []

@@ -242,10 +242,10 @@ def test_what_needs_an_environment_is_shown_under_one_and_what_a_step_does_not_b
     shown = cli("explain", "environment_light", "--glsl").out
     assert "input 'map': the scene's environment" in shown
     assert "nothing in this step" not in shown  # what it writes is there for all that
-    shown = cli("explain", "forward_lighting", "--glsl").out
+    shown = cli("explain", "forward_lighting", "--glsl", "--step", "1").out
     assert "//   uniform sampler2D base_color_texture             the scene's materials" in shown
     assert (
-        "//   uniform sampler2D brdf_table                     nothing in this step, which has no use for it" in shown
+        "//   uniform sampler2DArray shadows_edges             nothing in this step, which has no use for it" in shown
     )
 
 

@@ -22,7 +22,7 @@ from rendergraph.errors import InputError
 
 @pytest.fixture
 def base() -> rg.Pipeline:
-    return rg.load("forward", size=(48, 27)).set("sun.resolution", 128)
+    return rg.load("forward", size=(48, 27), scene="cornell_box").set("sun.resolution", 128)
 
 
 def test_types_are_an_axis(base: rg.Pipeline) -> None:

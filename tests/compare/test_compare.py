@@ -57,9 +57,7 @@ def test_variants_are_measured_against_the_first(gl: rg.Session) -> None:
 def test_a_comparison_is_told_in_a_line_and_shown_in_a_notebook(gl: rg.Session) -> None:
     base = rg.load("forward", size=(32, 18))
     found = compare([base, base.set("display.curve", "aces")], frames=1, session=gl)
-    assert repr(found).startswith(
-        "<Comparison on cornell_box, 32×18, FLIP against forward: forward 0.0000, forward-2 0."
-    )
+    assert repr(found).startswith("<Comparison on shapes, 32×18, FLIP against forward: forward 0.0000, forward-2 0.")
     assert all(len(repr(value)) < 100 for value in (found.reference, *found.results, found.results[1].first))
     page = found._repr_html_()
     assert page.count("data:image/png;base64,") == 3  # two pictures, one map
@@ -70,7 +68,7 @@ def test_all_stand_on_the_stage_of_the_first(gl: rg.Session) -> None:
     other = rg.load("forward-prepass", size=(20, 10), scene="spheres")
     found = compare([rg.load("forward", size=SIZE), other], frames=1, session=gl)
     assert found.notes == (
-        "'forward-prepass' is drawn with the scene of 'forward': cornell_box",
+        "'forward-prepass' is drawn with the scene of 'forward': shapes",
         "'forward-prepass' is drawn at the size of 'forward': 48×27",
     )
     assert np.asarray(found.results[1].pixels).shape[:2] == (27, 48)

@@ -157,9 +157,9 @@ def test_little_memory_means_several_batches(make: Any, gl: rg.Session) -> None:
 
 @pytest.mark.slow
 def test_functions_and_views_are_renamed_with_their_nodes(gl: rg.Session) -> None:
-    base = rg.load("forward-prepass", size=(48, 27))
+    base = rg.load("forward-prepass", scene="cornell_box", size=(48, 27))
     variants = [base.set("sun.resolution", size).set("shadows.taps", taps) for size in (64, 256) for taps in (1, 3)]
-    forms = [rg.load("forward", size=(48, 27)).set("sun.resolution", size) for size in (64, 256)]
+    forms = [rg.load("forward", scene="cornell_box", size=(48, 27)).set("sun.resolution", size) for size in (64, 256)]
     variants += [form.set("shadows.taps", 1) for form in forms]
     (batch,) = batches([variant.check() for variant in variants], range(6))
     assert batch.pass_count == 1 + 2 + 4 + 4 + 4 + 2 + 2  # prepass, sun, shadows, light and display twice

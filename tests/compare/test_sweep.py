@@ -34,7 +34,7 @@ AXES = tuple(parse_axis(x) for x in ("shadows.taps=1,3", "light.shading=pbr,phon
 
 @pytest.fixture
 def base() -> rg.Pipeline:
-    return rg.load("forward", size=(48, 27)).set("sun.resolution", 128)
+    return rg.load("forward", size=(48, 27), scene="cornell_box").set("sun.resolution", 128)
 
 
 @pytest.mark.slow

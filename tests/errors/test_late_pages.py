@@ -261,14 +261,14 @@ def test_devices_memory_and_threads(gl: rg.Session, monkeypatch: pytest.MonkeyPa
     monkeypatch.delenv("RENDERGRAPH_DEVICE")
     monkeypatch.setenv("RENDERGRAPH_MEMORY_LIMIT", "1")
     with pytest.raises(RendergraphError, match="RG616") as caught:
-        gl.render(rg.load("forward", size=(32, 32)))
+        gl.render(rg.load("forward", size=(32, 32), scene="cornell_box"))
     assert said(caught.value) == page("RG616")["message"].replace("4352", "16").replace("1024", "1")
     monkeypatch.delenv("RENDERGRAPH_MEMORY_LIMIT")
     errors: list[str] = []
 
     def work() -> None:
         try:
-            gl.render(rg.load("forward", size=(32, 32)))
+            gl.render(rg.load("forward", size=(32, 32), scene="cornell_box"))
         except RendergraphError as error:
             errors.append(str(error))
 

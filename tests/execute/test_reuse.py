@@ -33,7 +33,7 @@ OTHER = Camera("by hand", look_at((2.5, 2.5, 3.5), (0.0, 0.5, 0.0)), fov_y=0.8, 
 
 
 def test_a_still_scene_is_drawn_once(gl: rg.Session) -> None:
-    frames = list(gl.frames("deferred", size=(48, 32), frames=range(1, 4)))
+    frames = list(gl.frames(rg.load("deferred", size=(48, 32), scene="cornell_box"), frames=range(1, 4)))
     assert [times.ran for times in frames[-1].times] == [len(gl.cache.active.steps[0]), 0, 0]  # type: ignore[union-attr]
     for frame in frames:
         np.testing.assert_array_equal(frame["image"], frames[0]["image"])
@@ -53,7 +53,7 @@ def test_a_frame_that_was_broken_off_leaves_nothing(gl: rg.Session, monkeypatch:
     def stop() -> None:
         raise KeyboardInterrupt
 
-    pipeline = rg.load("deferred", size=(48, 32))
+    pipeline = rg.load("deferred", size=(48, 32), scene="cornell_box")
     first = gl.render(pipeline, warm_up=False)
     executable = gl.cache.active
     assert executable is not None

@@ -247,5 +247,5 @@ def test_only_what_a_material_has_is_drawn(tmp_path: Path, material: str, more: 
 
 
 def test_an_unlit_picture_casts_no_shadow() -> None:
-    steps = rg.load("deferred", sets=["light.shading=unlit"]).plan().schedule.steps
+    steps = rg.load("deferred", scene="cornell_box", sets=["light.shading=unlit"]).plan().schedule.steps
     assert {step.node for step in steps} == {"gbuffer", "light", "display"}
