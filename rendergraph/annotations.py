@@ -14,6 +14,7 @@ from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import msgspec
 from msgspec import Struct
 
 from rendergraph.errors import Mistake, Misuse, suggestion
@@ -21,7 +22,7 @@ from rendergraph.errors import Mistake, Misuse, suggestion
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-    T = TypeVar("T", bound=DataclassInstance)
+    T = TypeVar("T", bound=DataclassInstance | Struct)
 
 
 LARGEST = 3.4028235e38
@@ -92,38 +93,38 @@ class Matching(Struct, frozen=True):
 
 def fits(value: object, annotation: Any) -> bool:
     """Whether a value is what an annotation says; a float may be written as a whole number, a number is no switch."""
-    return _test(annotation)(value)
+    return test_of(annotation)(value)
 
 
 @cache
-def _test(annotation: Any) -> Callable[[Any], bool]:
-    """What tells whether a value is what an annotation says."""
+def test_of(annotation: Any) -> Callable[[Any], bool]:
+    """What tells whether a value is what an annotation says, for whoever asks often: see `fits`."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if annotation is Any:
         return lambda value: True
     if annotation is None:
         return lambda value: value is None
     if origin is Annotated:
-        plain = _test(annotation.__origin__)
+        plain = test_of(annotation.__origin__)
         rules = [rule for rule in annotation.__metadata__ if not isinstance(rule, str)]
         return lambda value: plain(value) and all(rule.holds(value) for rule in rules)
     if origin in (Union, types.UnionType):
-        either = [_test(part) for part in arguments]
+        either = [test_of(part) for part in arguments]
         return lambda value: any(test(value) for test in either)
     if origin is Literal:
         return lambda value: any(type(value) is type(choice) and value == choice for choice in arguments)
     if origin is tuple and Ellipsis not in arguments:
-        tests = [_test(part) for part in arguments]
+        tests = [test_of(part) for part in arguments]
         return lambda value: (
             isinstance(value, tuple)
             and len(value) == len(tests)
             and all(test(entry) for test, entry in zip(tests, value, strict=True))
         )
     if origin in (tuple, Sequence):
-        entries = _test(arguments[0])
+        entries = test_of(arguments[0])
         return lambda value: isinstance(value, tuple | list | range) and all(map(entries, value))
     if origin is Mapping:
-        keys, entries = map(_test, arguments)
+        keys, entries = map(test_of, arguments)
         return lambda value: isinstance(value, Mapping) and all(keys(k) and entries(v) for k, v in value.items())
     if Callable in (origin, annotation):
         return callable
@@ -177,7 +178,7 @@ def words_for(annotation: Any, limits: Range = Range(), *, file: bool = False) -
 def quoted(value: object) -> str:
     """A Python value as messages show it: as it is written, and not too long; a port by its name."""
     name = getattr(value, "name", "")
-    if is_dataclass(value) and isinstance(name, str) and name:
+    if (is_dataclass(value) or isinstance(value, Struct)) and isinstance(name, str) and name:
         return f"the {type(value).__name__} '{name}'"
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
@@ -216,36 +217,40 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
     yield Mistake(subject, f"{what} is {quoted(value)}{hint}")
 
 
-def mistakes_of(thing: DataclassInstance, who: str, subject: str = "") -> Iterator[Mistake]:
-    """What is wrong with the fields of a dataclass.
+def mistakes_of(thing: DataclassInstance | Struct, who: str, subject: str = "") -> Iterator[Mistake]:
+    """What is wrong with the fields of a dataclass or struct.
 
     Args:
         thing: an instance.
         who: how messages name it, if at all.
         subject: see `Mistake`; the field by default.
     """
-    for name, default, hint in _given(type(thing)):
+    kind: Any = type(thing)
+    for name, default, hint, _ in _given(kind):
         value = getattr(thing, name)
         if value is not default:
             yield from mistakes_in(f"{who}: {name}" if who else name, value, hint, subject or name)
 
 
 @cache
-def _given(kind: type[DataclassInstance]) -> tuple[tuple[str, Any, Any], ...]:
-    """Names, defaults and annotations of the fields that its constructor takes."""
+def _given(kind: Any) -> tuple[tuple[str, Any, Any, Callable[[Any], bool]], ...]:
+    """Names, defaults, annotations and their tests of the fields that its constructor takes."""
     hints = hints_of(kind)
-    return tuple((entry.name, entry.default, hints[entry.name]) for entry in fields(kind) if entry.init)
+    of_struct = issubclass(kind, Struct)
+    taken = msgspec.structs.fields(kind) if of_struct else [entry for entry in fields(kind) if entry.init]
+    return tuple((each.name, each.default, hints[each.name], test_of(hints[each.name])) for each in taken)
 
 
 def right(thing: T, who: str = "") -> T:
-    """A dataclass's instance, all of whose fields are what their annotations say.
+    """An instance of a dataclass or struct, all of whose fields are what their annotations say.
 
     Raises:
         Misuse: one of them is not.
     """
-    for name, default, hint in _given(type(thing)):
+    kind: Any = type(thing)
+    for name, default, _, test in _given(kind):
         value = getattr(thing, name)
-        if value is not default and not fits(value, hint):
+        if value is not default and not test(value):
             for mistake in mistakes_of(thing, who or type(thing).__name__):
                 raise Misuse(mistake.text)
     return thing

@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+import msgspec
+from msgspec import Struct
+
 from rendergraph.errors import SceneError, suggestion
 from rendergraph.textures import EnvironmentMap, Semantic, TextureDesc
 
@@ -21,8 +24,7 @@ Keyframes change none of this, so that it holds for all frames.
 """
 
 
-@dataclass(frozen=True)
-class LightFacts:
+class LightFacts(Struct, frozen=True):
     """What is known of a light before the schedule: values that move are not.
 
     Attributes:
@@ -141,8 +143,7 @@ class ObjectFacts:
         return gap and f"object '{self.name}' is not closed: in its mesh '{self.mesh}' {gap}"
 
 
-@dataclass(frozen=True)
-class TextureInfo:
+class TextureInfo(Struct, frozen=True):
     """What an output has turned out to be.
 
     Attributes:
@@ -167,8 +168,7 @@ class TextureInfo:
         return self.desc is not None or self.bytes > 0
 
 
-@dataclass(frozen=True)
-class Facts:
+class Facts(Struct, frozen=True):
     """What is known of a node's surroundings before the schedule.
 
     Attributes:
@@ -181,7 +181,7 @@ class Facts:
 
     viewport: tuple[int, int]
     lights: tuple[LightFacts, ...] = ()
-    inputs: Mapping[str, tuple[TextureInfo, ...]] = field(default_factory=dict)
+    inputs: Mapping[str, tuple[TextureInfo, ...]] = msgspec.field(default_factory=dict)
     objects: tuple[ObjectFacts, ...] = ()
     environment: TextureDesc | None = None
 

@@ -7,8 +7,11 @@ such a function may ask, and a link asks it once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.annotations import Known, Length, Range, right
 from rendergraph.facts import Facts
@@ -65,8 +68,7 @@ class Port:
         return Part(self, use="depth_test")
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(Struct, frozen=True):
     """A port's texture, or one mip or layer of it; `previous` is last frame's value of a history texture.
 
     Of an input that takes a list, `link` is the number of one of them.

@@ -199,8 +199,7 @@ EnvironmentLight = Signature(
 SIGNATURES: tuple[Signature, ...] = (ShadowLookup, EnvironmentLight)
 
 
-@dataclass(frozen=True)
-class Sampler:
+class Sampler(Struct, frozen=True):
     """How a reader samples; two readers of one texture may differ, so this becomes a GL sampler object."""
 
     filter: Filter = "nearest"

@@ -37,48 +37,52 @@ def share_blocks(items: Sequence[Item], *, seed: int = 0) -> list[list[int]]:
         seed: of the restarts.
     """
     numbers = range(len(items))
-    best = _placed(items, sorted(numbers, key=lambda n: (-items[n].bytes, items[n].first, n)))
+    alive = [(1 << item.last + 1) - (1 << item.first) for item in items]  # a bit for each position
+    best, least = _placed(items, alive, sorted(numbers, key=lambda n: (-items[n].bytes, items[n].first, n)))
     bound, chooser = least_bytes(items), random.Random(seed)
     for _ in range(min(RESTARTS, WORK // max(1, len(items)) ** 2)):
-        if blocks_bytes(items, best) == bound:
+        if least == bound:
             break
         weights = [item.bytes * chooser.uniform(0.5, 1.5) for item in items]
-        other = _placed(items, sorted(numbers, key=lambda n: (-weights[n], n)))
-        best = min(best, other, key=lambda blocks: blocks_bytes(items, blocks))
+        other, taken = _placed(items, alive, sorted(numbers, key=lambda n: (-weights[n], n)))
+        if taken < least:
+            best, least = other, taken
     return [sorted(block, key=lambda n: items[n].first) for block in best]
 
 
 def least_bytes(items: Sequence[Item]) -> int:
     """Bytes that no blocks are below: the n-th largest block holds the n-th largest item of every moment."""
-    most: list[int] = []
+    most = [0] * len(items)
+    ordered = sorted(items, key=lambda item: -item.bytes)
     for now in {item.first for item in items}:
-        live = sorted((item.bytes for item in items if item.first <= now <= item.last), reverse=True)
-        most += [0] * (len(live) - len(most))
+        live = [item.bytes for item in ordered if item.first <= now <= item.last]
         most[: len(live)] = map(max, most, live)
     return sum(most)
 
 
-def blocks_bytes(items: Sequence[Item], blocks: Sequence[Sequence[int]]) -> int:
-    """Bytes of all blocks."""
-    return sum(max(items[number].bytes for number in block) for block in blocks)
-
-
-def _placed(items: Sequence[Item], order: Sequence[int]) -> list[list[int]]:
+def _placed(items: Sequence[Item], alive: Sequence[int], order: Sequence[int]) -> tuple[list[list[int]], int]:
+    """The blocks that items make when they are placed in that order, and their bytes."""
     blocks: list[list[int]] = []
     sizes: list[int] = []
+    taken: list[int] = []  # of each block the positions at which one of its items is alive
+    kinds: list[set[object]] = []
     for number in order:
-        item = items[number]
+        item, now = items[number], alive[number]
         found, least = -1, (item.bytes, False, 0)
-        for place, block in enumerate(blocks):
-            if all(items[other].last < item.first or item.last < items[other].first for other in block):
-                unlike = all(items[other].kind != item.kind for other in block)
-                cost = (max(0, item.bytes - sizes[place]), unlike, abs(sizes[place] - item.bytes))
+        for place, other in enumerate(taken):
+            if not other & now:
+                size = sizes[place]
+                cost = (max(0, item.bytes - size), item.kind not in kinds[place], abs(size - item.bytes))
                 if cost < least:
                     found, least = place, cost
         if found < 0:
             blocks.append([number])
             sizes.append(item.bytes)
+            taken.append(now)
+            kinds.append({item.kind})
         else:
             blocks[found].append(number)
             sizes[found] = max(sizes[found], item.bytes)
-    return blocks
+            taken[found] |= now
+            kinds[found].add(item.kind)
+    return blocks, sum(sizes)

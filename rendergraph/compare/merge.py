@@ -55,7 +55,7 @@ def merge(graphs: Sequence[Graph]) -> Merged:
             inputs = {port: tuple(_moved(end, own) for end in ends) for port, ends in node.inputs.items()}
             nodes.setdefault(own[node.id], replace(node, id=own[node.id], inputs=inputs))
         for end, info in graph.textures.items():
-            textures.setdefault(_moved(end, own), dataclasses.replace(info, view=_view(info.view, own)))
+            textures.setdefault(_moved(end, own), replace(info, view=_view(info.view, own)))
     outputs = {
         f"{number}/{name}": _moved(end, names[number])
         for number, graph in enumerate(graphs)

@@ -57,7 +57,7 @@ def _check_samples(plan: ResourcePlan, limits: Mapping[str, int]) -> None:
             most = limits[f"{kind}samples"]
             if desc.samples > most:
                 text = f"'{write.resource}' has {desc.samples} samples a texel, which is more than this device's {most}"
-                problems.append(Problem("RG435", text, step.place))
+                problems.append(Problem("RG435", text, step.where.place))
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
 

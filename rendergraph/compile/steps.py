@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import moderngl
+from msgspec.structs import replace
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from typing import Any, ClassVar
 
@@ -111,9 +112,9 @@ class Node(BaseModel):
         return 0.0, 0.0
 
     @classmethod
-    def ports(cls) -> dict[str, Port]:
+    def ports(cls) -> Mapping[str, Port]:
         """Every port by name, in the order of declaration, bases first."""
-        return dict(_ports_of(cls))
+        return _ports_of(cls)
 
     @classmethod
     def inputs(cls) -> dict[str, Input | InOut]:

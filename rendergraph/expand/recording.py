@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port, Views
 from rendergraph.declare.blame import happened

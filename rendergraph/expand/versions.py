@@ -23,7 +23,7 @@ from rendergraph.expand.targets import (
     target_size,
 )
 from rendergraph.link import Endpoint, Graph
-from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Write
+from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Where, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
 
@@ -197,8 +197,7 @@ class _Versions:
             vertices=vertices,
             attributes=tuple(held),
             type=node.type.name,
-            place=node.place,
-            caller=request.caller,
+            where=Where(node.place, request.caller),
             if_drawn=_numbered(recording, options.get("if_drawn", ""), index),
             **{key: options[key] for key in keep if key in options},
         )
@@ -313,7 +312,7 @@ class _Versions:
     def _refused(self, recording: Recording, request: StepRequest, code: str, text: str) -> InputError:
         """A request that cannot be carried out, at the line where the author made it."""
         node = recording.node
-        step = Step(node.id, 0, request.kind, type=node.type.name, place=node.place, caller=request.caller)
+        step = Step(node.id, 0, request.kind, type=node.type.name, where=Where(node.place, request.caller))
         return InputError(step.problem(code, text))
 
     def _view(

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, NoReturn, Optional, overload
 
+import msgspec
+
 from rendergraph import textures
 from rendergraph.annotations import fits, quoted, words_for
 from rendergraph.declare import (
@@ -204,7 +206,7 @@ class Infer:
     def _facts_of(self, draft: Draft) -> Facts:
         found = self._facts.get(draft.spec.id)
         if found is None:
-            found = replace(self.scene, inputs=_Inputs(self, draft))
+            found = msgspec.structs.replace(self.scene, inputs=_Inputs(self, draft))
             self._facts[draft.spec.id] = found
         return found
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -57,9 +56,7 @@ def text_key(
 
     return (
         made_of(step.node),
-        dataclasses.replace(
-            step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None
-        ),
+        replace(step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None),
         tuple(
             (
                 replace(each, reads=(), uniforms=tuple((name, 0) for name, _ in each.uniforms)),

@@ -118,7 +118,7 @@ def contributing(
         elif id not in resources or isinstance(resources[id].desc, TextureDesc):
             text = f"output '{name}' shows '{id}', but no step writes it; write it in the node's `record`"
             maker = next((step for step in steps if step.node == id.rpartition(".")[0]), None)
-            place = maker.place if maker is not None else None
+            place = maker.where.place if maker is not None else None
             problems.append(Problem("RG604", text, place, mistake=Mistake(id, text)))
     while stack:
         step = stack.pop()
@@ -268,10 +268,10 @@ def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str,
     maker = resource.rpartition(".")[0]
     if maker in idle:
         text = f"node '{step.node}' reads '{resource}', but '{maker}' does nothing: {idle[maker]}"
-        return Problem("RG607", text, step.place)
+        return Problem("RG607", text, step.where.place)
     if maker != step.node and not versions.writers.get(resource):
         text = f"node '{step.node}' reads '{resource}', but no step of '{maker}' writes it; write it in its `record`"
-        return Problem("RG604", text, step.place, mistake=Mistake(resource, text))
+        return Problem("RG604", text, step.where.place, mistake=Mistake(resource, text))
     text = (
         f"it reads '{resource}', but no step has written it by then; "
         "write it in an earlier step, or declare it `History` to read last frame's value"

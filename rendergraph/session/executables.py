@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Hashable, Mapping
 from pathlib import Path
 from typing import Any
@@ -99,9 +98,9 @@ def _declared(cls: type[Node]) -> tuple[Any, ...]:
 def _structure(expansion: Expansion) -> tuple[Any, ...]:
     """An expansion without the values that can change in a compiled pipeline."""
     steps = tuple(
-        dataclasses.replace(
+        replace(
             step,
-            uniforms=tuple((name, None) for name, _ in step.uniforms),  # type: ignore[misc]
+            uniforms=tuple((name, None) for name, _ in step.uniforms),
             functions=tuple(replace(f, uniforms=()) for f in step.functions),
         )
         for step in expansion.steps

@@ -8,7 +8,18 @@ from __future__ import annotations
 
 from rendergraph.steps.checks import define_text
 from rendergraph.steps.frame import Frame, FrameScene, ViewMatrices
-from rendergraph.steps.model import MOST_STEPS, FunctionBinding, Read, Resource, Role, Step, UniformValue, Use, Write
+from rendergraph.steps.model import (
+    MOST_STEPS,
+    FunctionBinding,
+    Read,
+    Resource,
+    Role,
+    Step,
+    UniformValue,
+    Use,
+    Where,
+    Write,
+)
 from rendergraph.steps.recorder import Recorder, StepRequest, Steps, Target
 from rendergraph.steps.state import (
     ADD,
@@ -51,6 +62,7 @@ __all__ = [
     "UniformValue",
     "Use",
     "ViewMatrices",
+    "Where",
     "Write",
     "define_text",
 ]

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ParamSpec, TypeAlias
 
 from msgspec.structs import replace
 
-from rendergraph.annotations import Length, Range, fits, hints_of, may_be, mistakes_in, quoted
+from rendergraph.annotations import Length, Range, hints_of, may_be, mistakes_in, quoted, test_of
 from rendergraph.errors import Misuse, nearest, suggestion
 from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
@@ -42,16 +42,16 @@ def checked(method: Callable[P, None]) -> Callable[P, None]:
     """A method whose arguments are looked at first; those that may be ports it looks at itself, knowing the node."""
 
     @cache
-    def looked_at() -> tuple[list[str], dict[str, Any]]:
+    def looked_at() -> tuple[list[str], dict[str, tuple[Any, Callable[[Any], bool]]]]:
         hints = hints_of(method)
-        return list(hints), {name: hint for name, hint in hints.items() if not may_be(hint, Port)}
+        return list(hints), {name: (hint, test_of(hint)) for name, hint in hints.items() if not may_be(hint, Port)}
 
     @wraps(method)
     def call(*arguments: P.args, **named: P.kwargs) -> None:
-        names, hints = looked_at()
+        names, looked = looked_at()
         for name, value in (*zip(names, arguments[1:], strict=False), *named.items()):
-            if name in hints and not fits(value, hints[name]):
-                argument(name, value, hints[name])
+            if name in looked and not looked[name][1](value):
+                argument(name, value, looked[name][0])
         method(*arguments, **named)
 
     return call

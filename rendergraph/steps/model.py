@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -94,8 +93,25 @@ class FunctionBinding(Struct, frozen=True):
     includes: tuple[tuple[str, Path], ...] = ()
 
 
-@dataclass(frozen=True)
-class Step:
+class Where(Struct, frozen=True, eq=False):
+    """Where a step is written. All are equal: steps that do the same are, wherever they come from.
+
+    Attributes:
+        place: where the node stands in the pipeline's file.
+        caller: the author's file and line of the call that recorded it; None where the framework did by itself.
+    """
+
+    place: Place | None = None
+    caller: tuple[str, int] | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Where)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+class Step(Struct, frozen=True):
     """One draw, dispatch, clear or mip chain.
 
     Attributes:
@@ -130,8 +146,7 @@ class Step:
         invocations: what a compute step covers along x, y and z; the groups are then as many as its shader needs.
         label: what the author calls it, or what a copy is for; shown in plans and beside times.
         type: the node's type.
-        place: where the node stands in the pipeline's file.
-        caller: the author's file and line of the call that recorded it; None where the framework did by itself.
+        where: where it is written, in no way part of what it is.
     """
 
     node: str
@@ -165,13 +180,13 @@ class Step:
     invocations: tuple[int, int, int] | None = None
     label: str = ""
     type: str = ""
-    place: Place | None = field(default=None, compare=False)
-    caller: tuple[str, int] | None = field(default=None, compare=False)
+    where: Where = Where()
 
     def problem(self, code: str, text: str, subject: str = "") -> Problem:
         """What is wrong with the step, as `node 'id' (type): file:line: …`, at the node's place in the pipeline."""
-        line = Place(shown_file(self.caller[0]), self.caller[1], 1) if self.caller is not None else None
-        return Mistake(subject, text, place=line).problem(code, node_named(self.node, self.type), self.place)
+        caller = self.where.caller
+        line = Place(shown_file(caller[0]), caller[1], 1) if caller is not None else None
+        return Mistake(subject, text, place=line).problem(code, node_named(self.node, self.type), self.where.place)
 
     @property
     def key(self) -> tuple[str, int]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
+
+from msgspec import Struct
 
 from rendergraph.annotations import Range, right
 
@@ -31,8 +32,7 @@ _Fraction: TypeAlias = Annotated[float, Range(0, 1)]
 DepthBounds: TypeAlias = Annotated[tuple[_Fraction, _Fraction], "the least and the greatest depth, 0 to 1"]
 
 
-@dataclass(frozen=True)
-class Blend:
+class Blend(Struct, frozen=True):
     """Blending of one target: `source × src + destination × dst` with `op` between."""
 
     src: BlendFactor = "one"
@@ -62,8 +62,7 @@ PREMULTIPLIED = Blend("one", "one_minus_src_alpha")
 MULTIPLY = Blend("dst_color", "zero")
 
 
-@dataclass(frozen=True)
-class StencilFace:
+class StencilFace(Struct, frozen=True):
     """Stencil test and operations of one face."""
 
     func: Compare = "always"
@@ -78,8 +77,7 @@ class StencilFace:
         right(self)
 
 
-@dataclass(frozen=True)
-class Stencil:
+class Stencil(Struct, frozen=True):
     """Stencil state; `back` is the front's where None."""
 
     front: StencilFace = StencilFace()
@@ -89,8 +87,7 @@ class Stencil:
         right(self)
 
 
-@dataclass(frozen=True)
-class State:
+class State(Struct, frozen=True):
     """The fixed function of a step.
 
     Attributes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from itertools import pairwise
 
 import pytest
@@ -122,7 +121,7 @@ def with_history(reader: int, written: int) -> ResourcePlan:
     found = chain(RGBA8, RGBA8, RGBA8, RGBA8, roles={written: "history"})
     steps = list(found.steps)
     old = Read("old", f"n{written}.x", 1, previous=True)
-    steps[reader] = dataclasses.replace(steps[reader], reads=(*steps[reader].reads, old))
+    steps[reader] = replace(steps[reader], reads=(*steps[reader].reads, old))
     return allocate(replace(found, steps=tuple(steps)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 
-from rendergraph.allocate.heap import Item, blocks_bytes, least_bytes, share_blocks
+from rendergraph.allocate.heap import Item, least_bytes, share_blocks
 
 
 def ways(items: list[Item]) -> Iterator[list[list[int]]]:
@@ -22,6 +22,10 @@ def ways(items: list[Item]) -> Iterator[list[list[int]]]:
         yield from extend(number + 1, [*blocks, [number]])
 
     return extend(0, [])
+
+
+def blocks_bytes(items: list[Item], blocks: list[list[int]]) -> int:
+    return sum(max(items[number].bytes for number in block) for block in blocks)
 
 
 def drawn(chooser: random.Random) -> list[Item]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -143,17 +142,15 @@ def test_texts_of_equal_steps_are_put_together_once_and_of_others_not(
     texts = StepTexts(types(folder) | {"other": types(folder)["light"]}, resources, VIEWS)
     base = step("sun-soft", visibility=True)
     first = texts.of(base, {"A": "1"})
-    again = texts.of(
-        dataclasses.replace(base, node="other", index=3, reads=(Read("visibility_0", "same", 2),)), {"A": "1"}
-    )
+    again = texts.of(replace(base, node="other", index=3, reads=(Read("visibility_0", "same", 2),)), {"A": "1"})
     assert len(made) == 1
     assert again["fragment"].text == first["fragment"].text
     assert (first["fragment"].node, again["fragment"].node) == ("light", "other")
     for given, defines in (
         (base, {"A": "2"}),
-        (dataclasses.replace(base, defines=(("HAS_MASK", "0"),)), {"A": "1"}),
-        (dataclasses.replace(base, reads=(Read("visibility_0", "wide", 1),)), {"A": "1"}),
-        (dataclasses.replace(base, reads=(Read("visibility_0", "lit", 1),)), {"A": "1"}),
+        (replace(base, defines=(("HAS_MASK", "0"),)), {"A": "1"}),
+        (replace(base, reads=(Read("visibility_0", "wide", 1),)), {"A": "1"}),
+        (replace(base, reads=(Read("visibility_0", "lit", 1),)), {"A": "1"}),
         (step("lamp", visibility=True), {"A": "1"}),
         (step("sun-soft"), {"A": "1"}),
     ):

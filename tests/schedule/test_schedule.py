@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import random
 import time
 from pathlib import Path
@@ -89,7 +88,7 @@ def test_readers_of_a_version_run_before_it_is_continued() -> None:
 
 def test_a_function_s_reads_order_its_caller() -> None:
     binding = FunctionBinding("shadow", "shadows", "shadow.glsl", reads("sun.map"))
-    light = dataclasses.replace(step("light", (), ("light.x",)), functions=(binding,))
+    light = replace(step("light", (), ("light.x",)), functions=(binding,))
     found = schedule(expansion(light, step("sun", (), ("sun.map",)), image="light.x"))
     assert order(found) == ["sun", "light"]
 
@@ -174,8 +173,8 @@ def test_a_node_loses_only_the_steps_nobody_needs() -> None:
 def test_a_whole_clear_needs_nothing_of_before_but_a_part_does() -> None:
     first, second = step("first", (), ("t.x",)), step("second")
     show = step("show", ("t.x:2",), ("show.x",))
-    cleared = dataclasses.replace(second, writes=writes("t.x:2", load="clear"))
-    part = dataclasses.replace(second, writes=writes("t.x:2", load="clear", layer=1))
+    cleared = replace(second, writes=writes("t.x:2", load="clear"))
+    part = replace(second, writes=writes("t.x:2", load="clear", layer=1))
     assert order(schedule(expansion(first, cleared, show))) == ["second", "show"]
     assert order(schedule(expansion(first, part, show))) == ["first", "second", "show"]
 
@@ -185,15 +184,15 @@ def test_order_holds_across_a_culled_version() -> None:
         step("one", (), ("t.x",)),
         step("meter", ("t.x",), ("meter.x",)),
         step("two", (), ("t.x:2",)),
-        dataclasses.replace(step("three"), writes=writes("t.x:3", load="clear")),
+        replace(step("three"), writes=writes("t.x:3", load="clear")),
         step("show", ("t.x:3", "meter.x"), ("show.x",)),
     )
     assert order(schedule(expansion(*steps))) == ["one", "meter", "three", "show"]
 
 
 def test_mips_follow_the_writer_of_the_base_level() -> None:
-    base = dataclasses.replace(step("down"), writes=writes("down.x", mip=0))
-    chain = dataclasses.replace(step("down[1]", ("down.x",)), kind="mipmaps", writes=writes("down.x:2"))
+    base = replace(step("down"), writes=writes("down.x", mip=0))
+    chain = replace(step("down[1]", ("down.x",)), kind="mipmaps", writes=writes("down.x:2"))
     assert order(schedule(expansion(base, chain, step("show", ("down.x:2",), ("show.x",))))) == [
         "down",
         "down[1]",
@@ -353,7 +352,7 @@ def test_the_page_of_a_code_has_its_message(code: str) -> None:
 
 
 def test_a_first_write_that_loads_is_refused() -> None:
-    one = dataclasses.replace(step("a"), writes=writes("a.x", load="load"))
+    one = replace(step("a"), writes=writes("a.x", load="load"))
     with pytest.raises(InputError, match=r"RG603 node 'a': the first step that writes 'a\.x' keeps"):
         schedule(expansion(one))
 
