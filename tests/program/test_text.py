@@ -213,7 +213,7 @@ def test_macros_are_there_where_they_are_looked_at(folder: Path) -> None:
     assert "#define VISIBILITY_COUNT 1" in text
     assert "VISIBILITY_LAYERS" not in text
     defines = (("OUTER", "(2 * INNER)"), ("INNER", "3"), ("OTHER", "4"))
-    text = fragment(folder, dataclasses.replace(step(shader="between.frag"), defines=defines)).text
+    text = fragment(folder, replace(step(shader="between.frag"), defines=defines)).text
     assert "#define OUTER (2 * INNER)\n#define INNER 3\n" in text
     assert "OTHER" not in text
 
