@@ -193,12 +193,12 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
         return
     problems: list[Problem] = []
     for text in texts().values():
-        names = reached(text.text)
+        names, samplers, blocks = _reached(text.text)
         given = {read.name for read in step.reads}
-        for name in sorted((names & _samplers(text.text).keys() & cls.inputs().keys()) - given):
+        for name in sorted((names & samplers & cls.inputs().keys()) - given):
             problem = step.problem("RG439", f"it makes '{kept}', which is kept, but samples '{name}', which is not")
             problems.append(_placed(problem, text, [name]))
-        for block, members in _blocks(text.text):
+        for block, members in blocks:
             used = sorted(names & members)
             if used and (block in _MOVING or block.endswith("_view_block")):
                 what = _MOVING.get(block, "a view, which `update` sets in each frame")
@@ -206,6 +206,12 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
                 problems.append(_placed(problem, text, used))
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
+
+
+@lru_cache(maxsize=256)
+def _reached(text: str) -> tuple[set[str], set[str], list[tuple[str, set[str]]]]:
+    """The names that a text comes to, its samplers, and its blocks: of many kept steps the text is one."""
+    return reached(text), set(_samplers(text)), list(_blocks(text))
 
 
 def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:

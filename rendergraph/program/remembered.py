@@ -12,7 +12,8 @@ from rendergraph import stamps
 from rendergraph.catalog import NodeType
 from rendergraph.expand import ViewTable
 from rendergraph.stamps import Stamp
-from rendergraph.steps import Resource, Step
+from rendergraph.steps import Read, Resource, Step, Write
+from rendergraph.textures import TextureDesc
 
 T = TypeVar("T")
 _MOST = 2048
@@ -45,10 +46,12 @@ def text_key(
 ) -> Hashable:
     """All that `stage_texts` makes a step's texts of beside files: equal keys give equal texts, also of two graphs."""
 
-    def seen(id: str) -> Hashable:
-        resource = resources[id]
+    def seen(use: Read | Write) -> Hashable:
+        resource = resources[use.resource]
         count = resource.view and views.get(resource.view, ViewTable()).count
-        return resource.desc, resource.lights, count
+        desc = resource.desc  # its size is asked by `textureSize` and `imageSize`, and stands in no text
+        what = (desc.kind, desc.format, desc.layers, desc.samples) if isinstance(desc, TextureDesc) else desc
+        return replace(use, resource="", version=0, mip=None), what, resource.lights, count
 
     def made_of(node: str) -> Hashable:
         type = types[node]
@@ -56,15 +59,28 @@ def text_key(
 
     return (
         made_of(step.node),
-        replace(step, node="", index=0, reads=(), writes=(), uniforms=(), functions=(), label="", if_drawn=None),
+        replace(
+            step,
+            node="",
+            index=0,
+            reads=(),
+            writes=(),
+            uniforms=(),
+            functions=(),
+            label="",
+            if_drawn=None,
+            size=(0, 0),
+            groups=(0, 0, 0),
+            invocations=None,
+        ),
         tuple(
             (
                 replace(each, reads=(), uniforms=tuple((name, 0) for name, _ in each.uniforms)),
                 made_of(each.node),
-                tuple((replace(use, resource="", version=0), seen(use.resource)) for use in each.reads),
+                tuple(seen(use) for use in each.reads),
             )
             for each in step.functions
         ),
-        tuple((replace(use, resource="", version=0), seen(use.resource)) for use in step.reads),
-        tuple((replace(use, resource="", version=0), seen(use.resource)) for use in step.writes),
+        tuple(seen(use) for use in step.reads),
+        tuple(seen(use) for use in step.writes),
     )

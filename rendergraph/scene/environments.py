@@ -88,15 +88,18 @@ def _sky(sun: Vec3, turbidity: float, shines: bool) -> MadeImage:
 
 def studio() -> npt.NDArray[np.float16]:
     """A grey room with soft boxes on its walls, (256, 512, 4)."""
-    directions = _directions()
-    wall = directions / np.abs(directions).max(axis=-1, keepdims=True)
-    light = _ROOM * (0.75 + 0.25 * directions[..., 1])  # the floor is darker than the ceiling
+    directions = np.moveaxis(_directions(), -1, 0)
+    light = _ROOM * (0.75 + 0.25 * directions[1])  # the floor is darker than the ceiling
     for (axis, side), middle, half, radiance in _BOXES:
-        across = np.delete(wall, axis, axis=-1)
-        inside = (np.asarray(half, np.float32) - np.abs(across - np.asarray(middle, np.float32))) / _EDGE
-        cover = np.clip(inside, 0, 1).prod(axis=-1) * (wall[..., axis] * side >= 1 - 1e-6)
-        light = light + (radiance - light) * cover
-    return _picture(np.repeat(light[..., None], 3, axis=-1))
+        first, second = (plane for at, plane in enumerate(directions) if at != axis)
+        ahead = side * directions[axis]
+        on_wall = ahead >= np.maximum(abs(first), abs(second))
+        ahead = np.where(on_wall, ahead, 1)
+        cover = on_wall.astype(np.float32)
+        for plane, center, reach in zip((first, second), middle, half, strict=True):
+            cover *= np.clip((reach - abs(plane / ahead - center)) / _EDGE, 0, 1)
+        light += (radiance - light) * cover
+    return _picture(np.broadcast_to(light[..., None], (*light.shape, 3)))
 
 
 def sky(sun: Vec3, turbidity: float, *, shines: bool) -> npt.NDArray[np.float16]:
