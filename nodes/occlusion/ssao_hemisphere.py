@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from rendergraph.api import Frame, Internal, Steps, define, param
+from rendergraph.api import Internal, Steps, define, param
 
 from ._kernel import spread_points
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
@@ -17,17 +15,23 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
     taken to be inside something, and its direction to be blocked; how much falls with the difference of depth, from 1
     to 0 at four radii. Directions are spread by least energy, cosine-weighted, and reflected at a random vector of a
     64×64 noise texture, another at every pixel; along each lie one point within a fifth of the radius and three up to
-    all of it. A blur that stays on its surface takes the noise away again.
+    all of it, or up to where the direction leaves the picture. Four pixels share what they find, and a blur that stays
+    on its surface takes the rest of the noise away.
     """
 
     noise = Internal(format="rgba16_snorm", size=(64, 64), kept=True)
-    kernel = Internal(kind="buffer", bytes=lambda node, facts: 16 * (node.samples // 4))
     across = Internal(format="r16", size=reduced_size)
     blurred = Internal(format="r16", size=reduced_size)
 
     samples: int = define(default=32, min=8, max=128, doc="Points looked at, four a direction; rounded down to fours.")
     animated: bool = define(default=False, doc="Other directions in each frame, for `accumulate` to put together.")
-    blur: int = param(default=4, unit="texels", min=0, max=16, doc="How far the blur reaches to each side, at `scale`.")
+    blur: int = param(
+        default=4,
+        unit="texels",
+        min=0,
+        max=16,
+        doc="How far the blur reaches to each side, at `scale`, in steps of two; 0 leaves each pixel what it found.",
+    )
     nearest: float = param(
         default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."
     )
@@ -42,7 +46,7 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
             out=self.unfiltered,
             surfaces=self.surfaces,
             noise=self.noise,
-            kernel=self.kernel,
+            directions=spread_points(self.samples // 4),
             screen=screen,
             defines=sizes,
         )
@@ -59,8 +63,3 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
             )
         if sizes:
             self.upsample(steps, target, {"occlusion": self.occlusion}, {})
-
-    def update(self, frame: Frame) -> None:
-        """The kernel's directions."""
-        points = spread_points(self.samples // 4)
-        frame.write(self.kernel, np.pad(points, ((0, 0), (0, 1))).astype(np.float32))

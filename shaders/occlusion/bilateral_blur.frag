@@ -1,5 +1,6 @@
 // One axis of a mean over neighbours that lie on the same surface; others do not count (C. Tomasi and R. Manduchi,
-// "Bilateral Filtering for Gray and Color Images", 1998, with the surface in place of the colour).
+// "Bilateral Filtering for Gray and Color Images", 1998, with the surface in place of the colour). Two by two texels
+// hold what they share already: every other one is enough, and both ends are weighted so that the middle is the texel.
 #include "surfaces.glsl"
 uniform sampler2D source;
 uniform sampler2D surfaces;
@@ -12,20 +13,21 @@ out float blurred;
 void main() {
     View v = surfaces_views[0];
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    ivec2 size = textureSize(surfaces, 0);
+    ivec2 last = textureSize(surfaces, 0) - 1;
     vec4 here = texelFetch(surfaces, texel, 0);
-    blurred = 1.0;
-    if (here.w == 0.0) return;
-    vec3 position = view_position(v, place_for(texel, size, screen), here.w);
-    float sum = 0.0;
-    float total = 0.0;
-    for (int i = -blur; i <= blur; ++i) {
-        ivec2 there = texel + i * axis;
-        if (there != clamp(there, ivec2(0), size - 1)) continue;
+    vec3 position = view_position(v, place_for(texel, last + 1, screen), here.w);
+    float tolerance = 0.1 * radius + depth_error(v, here.w);
+    ivec2 odd = texel & axis;
+    int reach = blur >> 1 << 1;
+    float aside = 0.5 - float(odd.x + odd.y);  // from the texel to the middle of its four
+    float total = 1e-3;  // of its own, should no other lie on its surface
+    float sum = total * texelFetch(source, texel, 0).r;
+    for (int i = -reach; i <= reach; i += 2) {
+        ivec2 there = clamp(texel + i * axis, ivec2(0), last);
         vec4 seen = texelFetch(surfaces, there, 0);
-        if (seen.w == 0.0) continue;
-        vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
-        float weight = same_surface(offset, here.xyz, seen.xyz, 0.1 * radius + depth_error(v, here.w));
+        vec3 offset = view_position(v, place_for(there, last + 1, screen), seen.w) - position;
+        float within = clamp(0.5 * (float(reach) + 1.0 - abs(float(i) + aside)), 0.0, 1.0);
+        float weight = within * same_surface(offset, here.xyz, seen.xyz, tolerance);
         sum += weight * texelFetch(source, there, 0).r;
         total += weight;
     }
