@@ -46,7 +46,7 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
             out=self.unfiltered,
             surfaces=self.surfaces,
             noise=self.noise,
-            directions=spread_points(self.samples // 4),
+            directions=spread_points(self.samples // 4).tolist(),
             screen=screen,
             defines=sizes,
         )
