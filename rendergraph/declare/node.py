@@ -67,6 +67,7 @@ class Node(BaseModel):
         extra="forbid",
         ignored_types=(*PORT_TYPES, type(DROPPED)),
         protected_namespaces=(),
+        defer_build=True,  # bases are never made into nodes
     )
 
     def __init_subclass__(cls, **options: Any) -> None:
