@@ -21,9 +21,10 @@ author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, wh
 from __future__ import annotations
 
 from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
+from rendergraph.program.macros import positions_macro
 from rendergraph.program.messages import compile_problems, declared_at, link_problems
 from rendergraph.program.remembered import Remembered, text_key
-from rendergraph.program.text import StageText, StepTexts, positions_macro, prefix, stage_texts
+from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts
 
 __all__ = [
     "Remembered",

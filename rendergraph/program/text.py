@@ -16,6 +16,7 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
 from rendergraph.program.images import with_formats
+from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
 from rendergraph.program.remembered import text_key
 from rendergraph.resources import folder
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
@@ -98,7 +99,7 @@ def stage_texts(
         shaders.setdefault("vertex", "<fullscreen.vert>")
     macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
     if step.kind != "compute":
-        macros = {**dict(_sample_macros("PASS", step.samples)), **macros}
+        macros = {**dict(sample_macros("PASS", step.samples)), **macros}
     wanted = signatures_of(step, types)
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
@@ -133,37 +134,6 @@ class StepTexts(Struct, eq=False):
         if key not in self._made:
             self._made[key] = stage_texts(step, self.types, self.resources, self.views, defines=defines)
         return {stage: replace(text, node=step.node) for stage, text in self._made[key].items()}
-
-
-def read_defines(
-    reads: Iterable[Read], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
-) -> dict[str, str]:
-    """`<X>_LAYERS`, `<X>_SAMPLES` and `<X>_VIEW_COUNT` of every texture read, `<X>_COUNT` of every list of inputs."""
-    macros: dict[str, str] = {}
-    counts: dict[str, int] = {}
-    for read in reads:
-        resource = resources.get(read.resource)
-        if resource is None or not isinstance(resource.desc, TextureDesc) or read.use == "attach":
-            continue
-        name = read.name.upper()
-        macros[f"{name}_LAYERS"] = str(resource.desc.layers)
-        macros |= dict(_sample_macros(name, resource.desc.samples))
-        if resource.view is not None:
-            macros[f"{name}_VIEW_COUNT"] = str(views.get(resource.view, ViewTable()).count)
-        if match := re.match(r"(.+)_(\d+)\Z", name):
-            counts[match[1]] = max(counts.get(match[1], 0), int(match[2]) + 1)
-    return {f"{name}_COUNT": str(count) for name, count in counts.items()} | macros
-
-
-def _sample_macros(name: str, samples: int) -> Iterator[tuple[str, str]]:
-    yield f"{name}_SAMPLES", str(samples)
-    if samples > 1:
-        yield f"{name}_SAMPLE_POSITIONS", positions_macro(samples)
-
-
-def positions_macro(samples: int) -> str:
-    """The macro that holds where a device has so many samples; with GL it is known what it stands for."""
-    return f"SAMPLE_POSITIONS_{samples}"
 
 
 # --- one stage -------------------------------------------------------------------------------------------------------
@@ -207,27 +177,8 @@ def _stage(
     body = functions.text + source.text
     declarations = _read_declarations(step.reads, resources, "", body)
     text = view + declarations + functions + source
-    head = generated([VERSION, *extensions]) + _macros(_looked_at(macros, text.text))
+    head = generated([VERSION, *extensions]) + written(looked_at(macros, text.text))
     return StageText(stage, head + text, step.node)
-
-
-def _looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
-    """The macros whose names occur in a text or in what such a macro stands for.
-
-    The others would only make different programs of equal ones: a blur is the same however many lights there are.
-    """
-    found: dict[str, str] = {}
-    texts = [text]
-    while texts:
-        new = {name: macros[name] for name in macros if name not in found and any(name in text for text in texts)}
-        found |= new
-        texts = list(new.values())
-    return {name: macros[name] for name in macros if name in found}
-
-
-def _macros(macros: Mapping[str, str]) -> SourceText:
-    lines = tuple(f"#define {key} {value}".rstrip() for key, value in macros.items())
-    return SourceText(lines, tuple(Origin(made=f"the macro {key}") for key in macros))
 
 
 def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
@@ -399,7 +350,7 @@ def provider_text(
         for line, origin in _pairs(source)
     ]
     final = SourceText(*_rows(rows))
-    head = _macros({before + key: renamed(value, rename) for key, value in macros.items()})
+    head = written({before + key: renamed(value, rename) for key, value in macros.items()})
     return head + _read_declarations(binding.reads, resources, before, final.text) + final
 
 
