@@ -1,7 +1,7 @@
 """How long `check` and `plan` take: `python tests/bench/bench_check.py`.
 
 A generated pipeline of 40 nodes, read, resolved, linked, expanded, scheduled and allocated with everything made afresh;
-in a new process after its imports, which is what a command pays, and again and again in this one. Goal: 25 ms.
+in a new process after its imports, which is what a command pays, and again and again in this one. Goal: 10 ms again and again.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from measure import options
 from rendergraph.api import Any as AnyTexture
 from rendergraph.api import Depth, Input, Node, Normal, Output, Radiance, define, param
 
-GOAL_MS = 25.0
+GOAL_MS = 10.0
 
 
 class Surfaces(Node):
@@ -196,8 +196,8 @@ def main() -> None:
         return
     low, high = result["cold_range_ms"]
     print(
-        f"new process: {result['cold_ms']:.1f} ms ({low:.1f} to {high:.1f}), goal <= {GOAL_MS:.0f} ms; "
-        f"again: {result['again_ms']:.1f} ms; proven: {result['proven']}"
+        f"new process: {result['cold_ms']:.1f} ms ({low:.1f} to {high:.1f}); "
+        f"again: {result['again_ms']:.1f} ms, goal <= {GOAL_MS:.0f} ms; proven: {result['proven']}"
     )
     for name in result["cold_stages_ms"]:
         print(f"  {name:10} {result['cold_stages_ms'][name]:6.2f} ms   {result['again_stages_ms'][name]:6.2f} ms")
