@@ -20,7 +20,7 @@ from msgspec import Struct
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
 from rendergraph.images.files import is_text
-from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, finite, name_of, not_negative
+from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, check_shape, finite, name_of, not_negative
 from rendergraph.images.plugin_image import decode_by_plugin
 from rendergraph.images.view import from_srgb
 from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, image_kind
@@ -87,6 +87,7 @@ def decode_light(
     if isinstance(source, MadeImage):
         return source.make()
     pixels = decode(source, srgb=True, warn=warn, limits=limits)
+    check_shape(source, pixels, warn)
     if pixels.dtype == np.uint8:
         return np.concatenate([from_srgb(pixels[..., :3]), pixels[..., 3:] / np.float32(255)], axis=-1).astype(
             np.float16

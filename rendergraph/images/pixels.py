@@ -61,6 +61,14 @@ def not_negative(source: ImageSource, pixels: Pixels, warn: Callable[[Problem], 
     return np.maximum(pixels, 0)
 
 
+def check_shape(source: ImageSource, pixels: Pixels, warn: Callable[[Problem], None] | None) -> None:
+    """Warn of a picture that is far from twice as wide as high, as one of everything around is, unless it is even."""
+    height, width = pixels.shape[:2]
+    if warn and not 1.5 <= width / height <= 2.7 and (pixels != pixels[0, 0]).any():
+        text = f"it is {width}×{height}, but a picture of everything around is twice as wide as high; it is stretched"
+        warn(Problem("RG356", text, Place(name_of(source)), severity="warning"))
+
+
 def as_rgba(pixels: Pixels) -> Pixels:
     """Four channels from one to four: grey three times, and an alpha of one."""
     height, width, count = pixels.shape

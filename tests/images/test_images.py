@@ -27,6 +27,7 @@ from rendergraph.images import (
     Saved,
     check_target,
     decode,
+    decode_light,
     from_srgb,
     is_numbered,
     numbered,
@@ -430,6 +431,19 @@ def test_broken_values_are_replaced_and_counted(tmp_path: Path) -> None:
     assert [str(problem) for problem in said] == [
         "sky: warning: RG355 1 pixel is NaN or -inf, taken as 0; 4 pixels are infinite or beyond 65504, taken as 65504"
     ]
+
+
+@pytest.mark.parametrize(("size", "warned"), [((4, 4), True), ((4, 3), True), ((8, 4), False), ((5, 3), False)])
+def test_a_picture_that_is_not_all_around_is_said(tmp_path: Path, size: tuple[int, int], warned: bool) -> None:
+    width, height = size
+    pixels = np.random.default_rng(1).random((height, width, 3)).astype(np.float32)
+    write(tmp_path / "a.exr", pixels)
+    write(tmp_path / "even.exr", np.ones_like(pixels))
+    said: list[Problem] = []
+    for name in ("a", "even"):
+        decode_light(ImageSource(tmp_path / f"{name}.exr", label=name), warn=said.append)
+    wanted = f"a: warning: RG356 it is {width}×{height}, but a picture of everything around is twice as wide as high; "
+    assert [str(problem) for problem in said] == ([f"{wanted}it is stretched"] if warned else [])
 
 
 def test_a_wrong_extension_does_not_matter(tmp_path: Path) -> None:

@@ -125,6 +125,35 @@ def test_a_smooth_surface_is_hidden_less_of_what_it_mirrors(session: rg.Session,
     np.testing.assert_allclose(closed, open_ * wanted[None, :, None], rtol=3e-3, atol=1e-4)
 
 
+def test_a_grain_bends_what_is_mirrored(session: rg.Session, plugins: list[Path]) -> None:
+    """Towards the normal of a cylinder along the grain (Revie 2012, as KHR_materials_anisotropy mixes it)."""
+    roughness, strength = 0.3, 0.8
+    metal = f"{{base_color: [1, 1, 1], metallic: 1, roughness: {roughness}, anisotropy_strength: {strength}}}"
+    scene = FLAT.replace("{base_color: [0.5, 0.25, 0.8], roughness: 0.6}", metal).replace(
+        "height: 3", "fov_y_degrees: 60"
+    )
+    (plugins[0].parent / "flat.yaml").write_text(scene.replace("at: [0.5, 0, 1]", "at: [90, 0, 1]"))
+    sets = ("light.blended=false", "constant.level=[1, 1, 1]")
+    even = drawn(session, plugins, "forward", CONNECTED, "flat.yaml", *sets)[..., :3]
+    (plugins[0].parent / "constant.glsl").write_text(
+        "uniform vec3 level;\nvec3 light_from(vec3 direction, float lobe) { return level * (0.5 + 0.5 * direction); }\n"
+    )
+    found = 2 * drawn(session, plugins, "forward", CONNECTED, "flat.yaml", *sets)[..., :3] / even - 1
+
+    x = ((np.arange(48) + 0.5) / 24 - 1) * 5 * np.tan(np.radians(30)) * 4 / 3
+    y = (1 - (np.arange(36) + 0.5) / 18) * 5 * np.tan(np.radians(30))
+    viewer = np.stack([*np.broadcast_arrays(-x[None], -y[:, None], 5.0)], axis=-1)
+    viewer /= np.linalg.norm(viewer, axis=-1, keepdims=True)
+    across, normal = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+    bent = viewer - (viewer @ across)[..., None] * across
+    bent /= np.linalg.norm(bent, axis=-1, keepdims=True)
+    mixed = bent + (normal - bent) * (1 - strength * (1 - roughness)) ** 4
+    mixed /= np.linalg.norm(mixed, axis=-1, keepdims=True)
+    expected = 2 * (viewer * mixed).sum(axis=-1, keepdims=True) * mixed - viewer
+    np.testing.assert_allclose(found, expected, atol=5e-3)
+    assert np.abs(expected - viewer * [-1, -1, 1]).max() > 0.5  # a mirror without a grain
+
+
 def test_it_goes_under_the_term_ambient(session: rg.Session, plugins: list[Path]) -> None:
     """One by one the terms sum to the whole, the environment behind included."""
     patch = {"around": {"type": "environment_light"}, "light": {"inputs": {"environment": "around.light"}}}

@@ -91,7 +91,7 @@ def test_irradiance_is_that_of_nine_harmonics(asked: Asked, references: Path, na
     assert (np.abs(found - expected) / (np.pi * mean)).max() < 0.01
 
 
-def test_the_window_keeps_light_from_ringing(asked: Asked, references: Path, tmp_path: Path) -> None:
+def test_the_window_keeps_light_from_ringing(session: rg.Session, asked: Asked, tmp_path: Path) -> None:
     """Nine harmonics of one small light fall below 0 behind it, and are cut there; damped they need not be."""
     from rendergraph.images import write
 
@@ -105,6 +105,13 @@ def test_the_window_keeps_light_from_ringing(asked: Asked, references: Path, tmp
     )
     assert (cut == 0).any(axis=1).mean() > 0.1
     assert (damped == 0).any(axis=1).mean() < 0.01
+    # By a power of the degree: the second band is damped by the fourth power of what the first is.
+    pipeline = rg.load("ibl", size=(8, 8), environment=tmp_path / "env_sun.exr")
+    frame = session.render(pipeline, outputs=["radiance"], taps=["environment.harmonics"])
+    texels = np.asarray(frame["environment.harmonics"], np.float64)[0]
+    first, second = texels[9][0] / (0.488603 * texels[3][0]), texels[12][0] / (1.092548 * texels[4][0])
+    assert first < 0.9 * 2 / 3
+    assert second / 0.25 == pytest.approx((first / (2 / 3)) ** 4, rel=1e-3)
     # A light that is everywhere needs none of it.
     even = [asked("white", directions, np.array(2.0), f"environment.window={word}") for word in ("false", "true")]
     np.testing.assert_array_equal(even[0], even[1])
@@ -150,6 +157,29 @@ def test_a_white_furnace(session: rg.Session, references: Path, tmp_path: Path, 
         inside = picture[..., 3] == 1
         assert inside.mean() > 0.3
         np.testing.assert_allclose(picture[inside][:, :3], 1, atol=0.005)
+
+
+def test_a_coloured_metal_in_even_light(session: rg.Session, references: Path, tmp_path: Path) -> None:
+    """Each pixel of a ball is the table's of its angle, and with compensation as Turquin has it."""
+    wanted = dict(np.load(references / "brdf_table.npz"))
+    row = int(np.abs(wanted["roughness"] - 0.6).argmin())
+    f0 = np.array([0.9, 0.5, 0.1])
+    scene = PLAIN.replace("[1, 1, 1]", "[0.9, 0.5, 0.1]") % (1, float(wanted["roughness"][row]))
+    (tmp_path / "s.yaml").write_text(scene)
+    place = ((np.arange(48) + 0.5) / 48 - 0.5) * 2.2
+    n_v = np.sqrt(np.clip(1 - place[:, None] ** 2 - place**2, 0, 1))
+    inside = n_v > 0.3
+    a, b = (np.interp(n_v, wanted["nov"], wanted[f"{name}_exact"][row])[..., None] for name in "AB")
+    for word, factor in (("false", 1.0), ("true", 1 + f0 * (1 / (a + b) - 1))):
+        pipeline = rg.load(
+            "forward",
+            scene=tmp_path / "s.yaml",
+            environment=references / "env_white.exr",
+            sets=[f"light.multiple_scattering={word}"],
+            size=(48, 48),
+        )
+        picture = session.render(pipeline, outputs=["radiance"])["radiance"][..., :3]
+        np.testing.assert_allclose(picture[inside], ((f0 * a + b) * factor)[inside], rtol=0.015)
 
 
 @pytest.mark.parametrize("smith", ["exact", "fast"])
