@@ -167,13 +167,13 @@ def test_without_last_frame_it_adapts_at_once(frames: Frames) -> None:
 
 @pytest.mark.slow
 def test_shipped_pipelines(session: rg.Session) -> None:
-    """`adaptation` begins dark, for an eye that comes from the light, and ends as `hdr`."""
+    """`adaptation` is `hdr` from its first frame on; an eye that comes from the light begins dark and ends there."""
     taps = ["exposure.luminance"]
     settled = session.render(rg.load("hdr", size=(48, 32)), taps=taps)
-    shown = [
-        session.render(rg.load("adaptation", size=(48, 32)), frames=range(1, n + 1), fps=10, taps=taps)
-        for n in (1, 11, 200)
-    ]
+    first = session.render(rg.load("adaptation", size=(48, 32)), taps=taps)
+    np.testing.assert_array_equal(first["image"], settled["image"])
+    coming = rg.load("adaptation", size=(48, 32), sets=["exposure.start=2"])
+    shown = [session.render(coming, frames=range(1, n + 1), fps=10, taps=taps) for n in (1, 11, 200)]
     assert [frame["image"].mean() for frame in shown] == sorted(frame["image"].mean() for frame in shown)
     assert shown[0]["exposure.luminance"] == 2
     at_once, start = float(settled["exposure.luminance"][0, 0, 0]), 2.0
