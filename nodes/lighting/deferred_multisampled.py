@@ -12,7 +12,8 @@ from ._image_lighting import ImageLighting, samples_stored
 from .deferred_lighting import DeferredLighting
 
 _EDGE = 1
-_TILE = 4
+_TILE = 4  # texels along a side; what some rasterisers shade at once
+_LOOKED_AT = ("depth", "albedo", "normal", "material", "emissive", "specular")
 
 
 def half_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
@@ -22,11 +23,11 @@ def half_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
     return depth.mip_size(1)
 
 
-def tiles_of_depth(_node: DeferredMultisampled, facts: Facts) -> tuple[int, int]:
-    """How many tiles cover the picture."""
+def bytes_of_tiles(_node: DeferredMultisampled, facts: Facts) -> int:
+    """Two draw commands of five words, and for each a word a tile."""
     depth = facts.input("depth").desc
     assert depth is not None
-    return -(-depth.width // _TILE), -(-depth.height // _TILE)
+    return 4 * 2 * (5 + -(-depth.width // _TILE) * -(-depth.height // _TILE))
 
 
 class DeferredMultisampled(DeferredLighting):
@@ -34,18 +35,19 @@ class DeferredMultisampled(DeferredLighting):
 
     A G-buffer cannot be averaged and then lit: the mean of two surfaces is none. To light every sample is right, and
     costs as many times as there are samples, though in most pixels all of them lie on one triangle. So pixels whose
-    samples differ are marked in the stencil (Lauritzen 2010), by depth, normal and base colour: every pixel is lit
-    once, in the middle, and those that are marked sample by sample. Edges of shadows within a surface do not show in a
-    G-buffer; they are found in that light of the middles, where the share of it that shadows leave does not run on
-    straight from pixel to pixel. The picture is that of `deferred_lighting`, which lights every sample. With one sample
-    a pixel it is that node.
+    samples differ are marked in the stencil (Lauritzen 2010), by depth, normal and material: every pixel is lit once,
+    in the middle of what is alike, and those that are marked sample by sample. Edges of shadows within a surface do not
+    show in a G-buffer. For them shadows are looked up at two samples on either side of each pixel's middle, which take
+    turns from pixel to pixel: pixels between which and beside which they differ are marked, too, and the mean of both
+    lights the others. The picture is that of `deferred_lighting`, which lights every sample. With one sample a pixel it
+    is that node.
     """
 
     edges = Output(AnyTexel, format="r8", doc="1 where the samples of a pixel are lit one by one, 0 elsewhere.")
     edge_share = Output(AnyTexel, format="r32f", size=(1, 1), doc="The share of pixels with samples lit one by one.")
     marks = Internal(Depth, format="depth24_stencil8", samples=samples_stored, clear=0.0)
-    lit_share = Internal(format="r8", samples=samples_stored)
-    tiles = Internal(format="r8", size=tiles_of_depth)
+    shadow_difference = Internal(format="r8", samples=samples_stored)
+    tiles = Internal(kind="buffer", bytes=bytes_of_tiles)
     means = Internal(format="r32f", size=half_of_depth, mips=0)
 
     normal_angle: float = param(
@@ -54,12 +56,11 @@ class DeferredMultisampled(DeferredLighting):
     depth_angle: float = param(
         default=15.0, unit="°", min=0, max=90, doc="Between the way from sample to sample and the surface."
     )
-
     shadow_change: float = param(
-        default=0.02,
+        default=0.05,
         min=0,
-        max=2,
-        doc="Bend of the lit share from pixel to pixel, above which it is an edge of a shadow.",
+        max=1,
+        doc="Share of the light that shadows take at one sample and not at another; more is an edge. 1 finds none.",
     )
 
     def record(self, steps: Steps) -> None:
@@ -71,13 +72,19 @@ class DeferredMultisampled(DeferredLighting):
             return
         ImageLighting.record(self, steps)
         reads = {**self.surface(steps), **self.shadows(steps), **self.ambient_light(steps)}
-        looked_at = {name: reads[name] for name in ("depth", "albedo", "normal") if name in reads}
+        looked_at = {name: reads[name] for name in _LOOKED_AT if name in reads}
         steps.fullscreen("deferred_edges.frag", out={"edges": self.edges}, **looked_at, label="edges")
         lit: dict[str, Any] = {}
         if steps.connected(self.lookup) and self.wants_lights(steps):
-            lit = {"lit_share": self.lit_share}
-        # All pixels once, marked ones too: to leave those out costs more than the few are worth.
-        steps.fullscreen("deferred_lighting.frag", out=self.pictures(steps) | lit, label="pixels", **reads)
+            lit = {"shadow_difference": self.shadow_difference}
+        steps.fullscreen(
+            "deferred_lighting.frag",
+            out=self.pictures(steps) | lit,
+            defines={"LIT_ONCE": 1},
+            label="pixels",
+            edges=self.edges,
+            **reads,
+        )
         if lit:
             steps.fullscreen(
                 "shadow_edges.frag",
@@ -90,25 +97,49 @@ class DeferredMultisampled(DeferredLighting):
         here = StencilFace(reference=_EDGE, depth_pass="replace")
         marking = State(depth_test=False, depth_write=False, stencil=Stencil(here))
         steps.fullscreen("mark_edges.frag", out=self.marks, edges=self.edges, state=marking, label="marks")
-        marked = Stencil(StencilFace(func="equal", reference=_EDGE))
-        steps.fullscreen(
-            "marked_tiles.frag", out=self.tiles, edges=self.edges, defines={"TILE": _TILE}, label="marked tiles"
+        steps.clear(self.tiles)
+        steps.compute(
+            "marked_tiles.comp",
+            over=tuple(-(-side // _TILE) for side in steps.desc(self.edges).size),
+            out={"tiles": self.tiles},
+            defines={"TILE": _TILE, **({"HAS_SHADOW_DIFFERENCE": 1} if lit else {})},
+            label="marked tiles",
+            edges=self.edges,
+            **lit,
         )
-        columns, rows = steps.desc(self.tiles).size
-        steps.draw(
-            "deferred_lighting.frag",
-            vertex="marked_tiles.vert",
-            vertices=6 * columns * rows,
-            out={**self.pictures(steps), "marks": self.marks},
-            defines={**self.per_sample(steps), "TILE": _TILE},
-            state=State(depth_test=False, depth_write=False, cull="none", stencil=marked),
-            label="samples",
-            tiles=self.tiles,
-            screen=steps.desc(self.edges).size,
-            **reads,
-        )
+        self.light_marked(steps, reads, first=0 if lit else 1)
         self.blend_over(steps)
         if steps.used(self.edge_share):
             steps.fullscreen("<halve.frag>", source=self.edges, out=self.means.mip(0))
             last = halve_down(steps, self.means)
             steps.fullscreen("<halve.frag>", source=self.means.mip(last), out=self.edge_share)
+
+    def light_marked(self, steps: Steps, reads: dict[str, Any], first: int) -> None:
+        """Light samples of marked pixels, in tiles: some rasterisers ask the stencil after the shader has run.
+
+        The first sample of what surfaces mark has been lit with all pixels. So it is drawn in tiles alone where a
+        shadow marks something, and nowhere where there are none. A tile is a point, as the two triangles of a square
+        would both shade the texels along its diagonal, if not all of them.
+
+        Args:
+            steps: what records it.
+            reads: what lighting reads.
+            first: the first sample that may have to be lit.
+        """
+        marked = Stencil(StencilFace(func="equal", reference=_EDGE))
+        for number in range(first, steps.desc(self.depth).samples):
+            steps.draw(
+                "deferred_lighting.frag",
+                vertex="marked_tiles.vert",
+                vertices=self.tiles,
+                topology="points",
+                command=0 if number else 1,
+                out={**self.pictures(steps), "marks": self.marks},
+                defines={"ONE_SAMPLE": 1, "TILE": _TILE},
+                state=State(depth_test=False, depth_write=False, cull="none", stencil=marked),
+                label=f"sample {number}",
+                tiles=self.tiles,
+                screen=steps.desc(self.edges).size,
+                sample_number=number,
+                **reads,
+            )

@@ -9,8 +9,12 @@
 #define STORED sampler2D
 #endif
 // Which sample of its texel a fragment lights; one that asks for its own number is run for each.
-#ifdef PER_SAMPLE
+#if defined(PER_SAMPLE)
 #define HERE gl_SampleID
+#elif defined(ONE_SAMPLE)
+uniform int sample_number;
+#define HERE sample_number
+#define position_at position_of_sample
 #else
 #define HERE TEXEL_CENTER
 #endif
@@ -41,6 +45,17 @@ uniform STORED phong_specular;
 uniform STORED phong_ambient;
 #endif
 
+#ifdef HAS_NORMAL
+// Of no unit length in the middle of all samples.
+vec3 stored_normal(ivec2 texel, int number) {
+    vec3 sum = texelFetch(normal, texel, max(number, 0)).xyz;
+#if DEPTH_SAMPLES > 1 && !defined(ONE_SAMPLE)
+    for (int i = 1; i < DEPTH_SAMPLES && number == TEXEL_CENTER; ++i) sum += texelFetch(normal, texel, i).xyz;
+#endif
+    return sum;
+}
+#endif
+
 // What a sample of a texel holds, by its number, or TEXEL_CENTER: what a texel holds whose samples are alike. False
 // where nothing is.
 bool surface_at(ivec2 texel, int number, out Surface s) {
@@ -53,14 +68,14 @@ bool surface_at(ivec2 texel, int number, out Surface s) {
 #else
     s.geometric_normal = vec3(0.0);  // shadows in screen space need none
 #endif
+#ifdef HAS_NORMAL
+    s.normal = normalize(stored_normal(texel, number));
+#endif
     number = max(number, 0);
     s.base_color = texelFetch(albedo, texel, number).rgb;
     s.base_color *= s.base_color;
     s.alpha = 1.0;
     s.lit = 1.0;
-#ifdef HAS_NORMAL
-    s.normal = normalize(texelFetch(normal, texel, number).xyz);
-#endif
 #ifdef HAS_MATERIAL
     vec4 stored = texelFetch(material, texel, number);
     s.metallic = stored.x;

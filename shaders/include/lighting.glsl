@@ -1,11 +1,12 @@
-// A surface under all lights. `shadow()` is the framework's. With WRITES_LIT_SHARE it is known afterwards how much of
-// what could light the surface does.
+// A surface under all lights. `shadow()` is the framework's. With WRITES_SHADOW_DIFFERENCE it is looked up at two other
+// places than the surface's, of which the mean lights it, and it is known afterwards by how much they differ.
 #include <lights.glsl>
 #include <luminance.glsl>
 #include <radiance.glsl>
 
-#ifdef WRITES_LIT_SHARE
-float could_reach = 0.0, does_reach = 0.0;  // irradiance without shadows and with them
+#ifdef WRITES_SHADOW_DIFFERENCE
+vec3 shadow_places[2], shadow_normals[2];
+float could_reach = 0.0, changing = 0.0;  // irradiance without shadows, and what of it reaches one of the two places
 #endif
 
 // Light of one of them reflected to the viewer, by the scene's index.
@@ -14,11 +15,15 @@ Reflected reflected_light(Surface s, int light) {
     vec3 to_light;
     vec3 irradiance = irradiance_from(lights[light], s.position, to_light);
     if (dot(s.normal, to_light) > 0.0) {
-        float open = shadow(light, s.position, s.geometric_normal);
-#ifdef WRITES_LIT_SHARE
+#ifdef WRITES_SHADOW_DIFFERENCE
+        float one = shadow(light, shadow_places[0], shadow_normals[0]);
+        float other = shadow(light, shadow_places[1], shadow_normals[1]);
         float reaching = luminance_of(irradiance) * dot(s.normal, to_light);
         could_reach += reaching;
-        does_reach += reaching * open;
+        changing += reaching * abs(one - other);
+        float open = 0.5 * (one + other);
+#else
+        float open = shadow(light, s.position, s.geometric_normal);
 #endif
         irradiance *= open;
     }

@@ -28,11 +28,16 @@ bool nearer(float depth, float other) {
     return depth > other;
 }
 
-// World-space position of a window position (0 to 1, bottom left first) and a window depth. By way of view space, where
-// the numbers near the eye are small: float32 keeps more of them than through the whole inverse at once.
-vec3 world_position(View v, vec2 uv, float depth) {
+// View-space position of a window position (0 to 1, bottom left first) and a window depth.
+vec3 position_in_view(View v, vec2 uv, float depth) {
     vec4 p = v.inverse_projection * vec4(uv * 2.0 - 1.0, depth, 1.0);
-    return (v.inverse_view * vec4(p.xyz / p.w, 1.0)).xyz;
+    return p.xyz / p.w;
+}
+
+// The same in world space. By way of view space, where the numbers near the eye are small: float32 keeps more of them
+// than through the whole inverse at once.
+vec3 world_position(View v, vec2 uv, float depth) {
+    return (v.inverse_view * vec4(position_in_view(v, uv, depth), 1.0)).xyz;
 }
 
 // Distance along the view axis in metres of a window position and depth, whatever the projection.

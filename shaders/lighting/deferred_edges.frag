@@ -1,8 +1,17 @@
 // Whether the samples of a texel see different surfaces (A. Lauritzen, "Deferred Rendering for Current and Future
-// Rendering Pipelines", 2010): other normals or colours, or a way from one to the other that leaves the surface.
+// Rendering Pipelines", 2010): other normals or materials, or a way from one to the other that leaves the surface.
 #include <depth_surface.glsl>
 
 uniform sampler2DMS albedo;
+#ifdef HAS_MATERIAL
+uniform sampler2DMS material;
+#endif
+#ifdef HAS_EMISSIVE
+uniform sampler2DMS emissive;
+#endif
+#ifdef HAS_SPECULAR
+uniform sampler2DMS specular;
+#endif
 #ifdef HAS_NORMAL
 uniform sampler2DMS normal;
 #endif
@@ -10,24 +19,38 @@ uniform float normal_angle;  // degrees
 uniform float depth_angle;   // degrees
 out float edges;
 
+bool differs(sampler2DMS stored, ivec2 texel, int number) {
+    vec4 difference = texelFetch(stored, texel, number) - texelFetch(stored, texel, 0);
+    return any(greaterThan(abs(difference), vec4(0.5 / 255.0)));
+}
+
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    float d, other;
-    vec3 position = position_at(texel, 0, d);
-    vec3 color = texelFetch(albedo, texel, 0).rgb;
+    float d = texelFetch(depth, texel, 0).r;
+    bool nothing = is_nothing(d), found = false;
 #ifdef HAS_NORMAL
-    vec3 up = normalize(texelFetch(normal, texel, 0).xyz);
+    View v = depth_views[0];
+    vec3 up = normalize(texelFetch(normal, texel, 0).xyz), across = mat3(v.view) * up;
+    vec3 position = position_in_view(v, (vec2(texel) + DEPTH_SAMPLE_POSITIONS[0]) * v.viewport.zw, d);
     float alike = cos(radians(normal_angle)), steep = sin(radians(depth_angle));
 #endif
-    edges = 0.0;
     for (int i = 1; i < DEPTH_SAMPLES; ++i) {
-        vec3 away = position_at(texel, i, other) - position;
-        if (is_nothing(d) != is_nothing(other)) edges = 1.0;
-        if (is_nothing(d) || is_nothing(other)) continue;
-        if (any(greaterThan(abs(texelFetch(albedo, texel, i).rgb - color), vec3(0.5 / 255.0)))) edges = 1.0;
+        float other = texelFetch(depth, texel, i).r;
+        found = found || nothing != is_nothing(other) || differs(albedo, texel, i);
+#ifdef HAS_MATERIAL
+        found = found || differs(material, texel, i);
+#endif
+#ifdef HAS_EMISSIVE
+        found = found || differs(emissive, texel, i);
+#endif
+#ifdef HAS_SPECULAR
+        found = found || differs(specular, texel, i);
+#endif
 #ifdef HAS_NORMAL
-        if (dot(normalize(texelFetch(normal, texel, i).xyz), up) < alike) edges = 1.0;
-        if (abs(dot(away, up)) > steep * length(away)) edges = 1.0;
+        vec3 away = position_in_view(v, (vec2(texel) + DEPTH_SAMPLE_POSITIONS[i]) * v.viewport.zw, other) - position;
+        bool turned = dot(normalize(texelFetch(normal, texel, i).xyz), up) < alike;
+        found = found || !nothing && (turned || abs(dot(away, across)) > steep * length(away));
 #endif
     }
+    edges = found ? 1.0 : 0.0;
 }

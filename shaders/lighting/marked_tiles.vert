@@ -1,13 +1,16 @@
-// A square over each tile of the picture that holds a mark, two triangles each; the others have no area.
-uniform sampler2D tiles;
+// A point over each tile that is listed. One that reaches out of the picture has its middle inside, or would be clipped.
 uniform ivec2 screen;
+struct Command {
+    uint vertices, instances, first, base_instance, none;
+};
+layout(std430) readonly buffer tiles {
+    Command commands[2];
+    uint listed[];
+};
 
 void main() {
-    int number = gl_VertexID / 6;
-    int corner = int[](0, 1, 2, 2, 1, 3)[gl_VertexID % 6];
-    int columns = textureSize(tiles, 0).x;
-    ivec2 tile = ivec2(number % columns, number / columns);
-    bool marked = texelFetch(tiles, tile, 0).r > 0.5;
-    vec2 place = vec2((tile + ivec2(corner & 1, corner >> 1)) * TILE) / vec2(screen);
-    gl_Position = marked ? vec4(place * 2.0 - 1.0, 0.0, 1.0) : vec4(0.0, 0.0, 0.0, 1.0);
+    int number = int(listed[gl_VertexID]), columns = (screen.x + TILE - 1) / TILE;
+    vec2 middle = min(vec2(number % columns, number / columns) * TILE + 0.5 * TILE, vec2(screen) - 0.5);
+    gl_Position = vec4(middle / vec2(screen) * 2.0 - 1.0, 0.0, 1.0);
+    gl_PointSize = float(TILE);
 }

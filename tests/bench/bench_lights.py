@@ -91,14 +91,15 @@ def shaded(session: Any, executable: Any) -> list[tuple[Any, int]]:
             raw.delete("glDeleteQueries", query)
             if compiled.step.node == "light" and any(write.name == "radiance" for write in compiled.step.writes):
                 step = compiled.step
-                together = step.samples if "PER_SAMPLE" not in dict(step.defines) else 1
+                alone = {"PER_SAMPLE", "ONE_SAMPLE"} & set(dict(step.defines))
+                together = 1 if alone else step.samples
                 found.append((step, value.value // together))
     return found
 
 
 def marked(steps: list[tuple[Any, int]]) -> int:
     """Samples that are lit one by one."""
-    return sum(count for step, count in steps if step.label == "samples")
+    return sum(count for step, count in steps if "ONE_SAMPLE" in dict(step.defines))
 
 
 def evaluations(pipeline: str, steps: list[tuple[Any, int]], lights: int, covered: int) -> int:
