@@ -46,6 +46,16 @@ def test_what_is_no_edge_stays_as_it_is(draw: Any, noise: Any) -> None:
     np.testing.assert_allclose(frame["image"][below], frame["plain"][below], atol=0.02)
 
 
+@pytest.mark.parametrize(("bright", "dark", "smooth"), [(0.4, 0.32, True), (0.9, 0.82, False), (0.03, 0.01, False)])
+def test_an_edge_differs_by_a_share_of_what_is_brighter(draw: Any, bright: float, dark: float, smooth: bool) -> None:
+    """A pixel that stands out by a fifth is smoothed, by a tenth not, and by 0.02 of white not in the dark either."""
+    shown = np.full((9, 9, 1), dark)
+    shown[4, 4] = bright
+    radiance = np.where(shown > 0.04045, ((shown + 0.055) / 1.055) ** 2.4, shown / 12.92)
+    frame = draw(radiance.astype(np.float32), TEXT)
+    assert (frame["image"][4, 4, 0] != frame["plain"][4, 4, 0]) == smooth
+
+
 @pytest.mark.parametrize("scene", ["shadow_study", "stairs"])
 def test_pictures_come_nearer_to_those_of_more_pixels(session: rg.Session, scene: str) -> None:
     def shown(pipeline: str, size: tuple[int, int]) -> Any:
