@@ -20,7 +20,7 @@ FORMULAS = {
     "deferred": "V + L·F",
     "deferred-stencil-lights": "V + ΣF′",
     "forward-msaa": "V + L·F",
-    "deferred-msaa": "V + L·(F + 4E)",
+    "deferred-msaa": "V + L·(F + 3E)",
 }
 WIDTH, HEIGHT, LEFT, TOP, PANEL = 920, 450, 70, 50, 340
 
