@@ -38,6 +38,7 @@ def occlusion(session: rg.Session, pipeline: str, scene: str, size: tuple[int, i
 def traced(session: rg.Session) -> npt.NDArray[np.float32]:
     """The same by rays: the traced picture over one without occlusion, both under ambient light of 1 alone."""
     truth = ImageBuf(str(HERE / "traced.exr")).get_pixels("float")
+    assert truth is not None
     sets = ["light.terms=ambient", "light.ambient=1"]
     size = (truth.shape[1], truth.shape[0])
     bare = session.render(rg.load("deferred", scene=HERE / "stairs.yaml", size=size, sets=sets), outputs=["radiance"])
