@@ -121,3 +121,12 @@ def test_a_pass_that_most_frames_leave_out_takes_no_time_in_the_median() -> None
     always, once = StepTime("a", 2.0, 1.0), StepTime("b", 600.0, 500.0)
     frames = [FrameTimes(603.0, (once, always)), FrameTimes(3.0, (always,)), FrameTimes(3.0, (always,))]
     assert median_times(frames) == [StepTime("b", 0.0, 0.0), StepTime("a", 2.0, 1.0)]
+
+
+def test_only_what_is_timed_is_drawn_beforehand(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    updated: list[float] = []
+    monkeypatch.setattr(Slow, "update", lambda self, frame: updated.append(frame.time))
+    for options, count in (({}, 1), ({"timed": True}, 2), ({"warm_up": True}, 2)):
+        updated.clear()
+        bench.draw("nodes: {slow: {type: slow}}\noutputs: {a: slow.color}", Slow, shaders=SHADERS, **options)
+        assert len(updated) == count

@@ -617,3 +617,11 @@ def test_shared_images_decode(shared: Path) -> None:
 def test_openimageio_is_imported_on_first_use() -> None:
     code = "import sys, rendergraph.images; sys.exit('OpenImageIO' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_a_png_is_written_without_openimageio(tmp_path: Path) -> None:
+    """It takes longer to import than a picture takes to draw."""
+    code = "import sys, numpy\nfrom rendergraph.images import write\n"
+    code += "write('a.png', numpy.full((2, 3, 4), 7, 'u1'))\nassert 'OpenImageIO' not in sys.modules\n"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
+    assert (read(tmp_path / "a.png") == 7).all()
