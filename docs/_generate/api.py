@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterator
 from typing import Any, Literal, get_args, get_origin
 
+import msgspec
+
 import rendergraph
 import rendergraph.api
 import rendergraph.api.viewing
@@ -110,7 +112,8 @@ def _entry(name: str, thing: Any) -> str:
     parts = [f"## {name}"]
     if not inspect.isclass(thing):
         return "\n\n".join([*parts, block(f"{name}{signature(thing)}", "python"), _doc(thing)])
-    arguments = signature(thing) if dataclasses.is_dataclass(thing) or "__init__" in vars(thing) else ""
+    is_value = dataclasses.is_dataclass(thing) or issubclass(thing, msgspec.Struct)
+    arguments = signature(thing) if is_value or "__init__" in vars(thing) else ""
     parts += [block(f"class {name}{arguments}" if arguments else f"class {name}: ...", "python"), _doc(thing)]
     for member, value in _public_members(thing):
         shown = value.fget if isinstance(value, property) else getattr(value, "func", value)
@@ -142,7 +145,11 @@ def signature(thing: Any, *, method: bool = False) -> str:
     except (TypeError, ValueError):
         return "(…)"
     shown, keyword_only = [], False
+    # A struct's signature has its types worked out; the page shows them by the names that it explains.
+    is_struct = inspect.isclass(thing) and issubclass(thing, msgspec.Struct)
+    written = inspect.get_annotations(thing) if is_struct else {}
     for parameter in found.parameters.values():
+        parameter = parameter.replace(annotation=written.get(parameter.name, parameter.annotation))
         if method and parameter.name in ("self", "cls"):
             continue
         if parameter.kind is parameter.KEYWORD_ONLY and not keyword_only:
