@@ -131,7 +131,7 @@ def _public_members(cls: type) -> Iterator[tuple[str, Any]]:
             base is not cls and hasattr(rendergraph.api, base.__name__)
         ):
             continue
-        for name, value in vars(base).items():
+        for name, value in list(vars(base).items()):  # pydantic adds to a class that is looked at
             shown = value.fget if isinstance(value, property) else getattr(value, "func", value)
             shown = getattr(shown, "__func__", shown)
             if not name.startswith("_") and name not in seen and inspect.isfunction(shown) and shown.__doc__:
