@@ -319,10 +319,13 @@ class Executable(Struct, eq=False, dict=True):
         self._listed, self._parts = listed, {}
         self.fresh = True
 
-    def set_uniforms(self, steps: Iterable[Step]) -> None:
-        """Take over changed parameter values; the steps must be the same but for their uniforms."""
-        values: Mapping[StepKey, Step] = {step.key: step for step in steps}
-        changed = {c.step.key for c in self.steps[0] if c.values(c.step) != c.values(values[c.step.key])}
+    def changed(self, values: Mapping[StepKey, Step]) -> set[StepKey]:
+        """The steps whose parameter values are others in these, which must be the same but for their uniforms."""
+        return {c.step.key for c in self.steps[0] if c.values(c.step) != c.values(values[c.step.key])}
+
+    def set_uniforms(self, values: Mapping[StepKey, Step]) -> None:
+        """Take over changed parameter values."""
+        changed = self.changed(values)
         self.touched |= {source_of_step(key) for key in changed}
         self.due = self._with_dependents(self.due | (changed & self.kept.keys()))
         for compiled in (c for steps_of in self.steps for c in steps_of):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,13 +42,17 @@ class ExecutableCache(Struct, eq=False):
     stale: set[Program] = field(default_factory=set)
     _entries: dict[Hashable, _Entry] = field(default_factory=dict)
 
-    def take(self, key: Hashable) -> Executable | None:
-        """Look one up, to be drawn next; None where there is none or one of its files has changed."""
+    def take(self, key: Hashable, losing: Callable[[], None]) -> Executable | None:
+        """Look one up, to be drawn next; None where there is none, or one of its files has changed: it is freed then.
+
+        `losing` is called before it is.
+        """
         entry = self._entries.pop(key, None)
         if entry is None:
             return None
         if changed(entry.files):
             self.stale |= _programs(entry.executable)
+            losing()
             entry.executable.release()
             return None
         again(entry.files)

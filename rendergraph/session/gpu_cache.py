@@ -75,10 +75,12 @@ class GpuCache:
     def take(self, expanded: Expanded) -> tuple[Hashable, Executable | None]:
         """What was compiled of the same before, with the values of these steps, and the key it is kept by."""
         key = key_of(expanded)
-        self._save()
-        executable = self._executables.take(key)
+        executable = self._executables.take(key, losing=self._save)
         if executable is not None:
-            executable.set_uniforms(expanded.expansion.steps)
+            values = {step.key: step for step in expanded.expansion.steps}
+            if executable is not self.active or not executable.changed(values).isdisjoint(executable.kept):
+                self._save()
+            executable.set_uniforms(values)
             self._restore(expanded.options, executable)
         return key, executable
 
@@ -89,6 +91,7 @@ class GpuCache:
             InputError: a mistake in a shader.
             RenderError: the device cannot hold it.
         """
+        self._save()
         linked, needed = planned.linked, planned.plan.memory.allocated_bytes
         types = {node.id: node.type for node in linked.graph.nodes}
         self._executables.make_room(needed)
@@ -109,7 +112,7 @@ class GpuCache:
         self.programs.release()
 
     def _save(self) -> None:
-        """What was drawn last has made, others may want: this comes before anything takes its place."""
+        """What was drawn last has made, others may want: this comes before it is lost or something else is drawn."""
         if self.active is not None and self._shares:
             self._kept.save(self.active)
 

@@ -106,7 +106,8 @@ def test_a_changed_parameter_moves_from_the_whole_frame_into_its_draws() -> None
     made = executable(step(0, draw(blur, "across", axis=0)), step(1, draw(blur, "down", axis=0)))
     assert run(made) == ["across", "down"]
     made.fresh = False
-    made.set_uniforms([Step("n", number, "fullscreen", uniforms=(("axis", number),)) for number in (0, 1)])
+    steps = [Step("n", number, "fullscreen", uniforms=(("axis", number),)) for number in (0, 1)]
+    made.set_uniforms({step.key: step for step in steps})
     assert made.fresh
     assert statics(made) == []
     assert run(made) == ["1.axis=0", "across", "1.axis=1", "down"]

@@ -130,6 +130,16 @@ def test_a_value_that_was_there_before_is_there_again(bench: Any, session: rg.Se
     assert not np.array_equal(pictures[1.0], pictures[2.0])
 
 
+def test_nothing_is_copied_while_one_pipeline_goes_on(bench: Any, session: rg.Session) -> None:
+    pipeline = bench.pipeline(ONE, Table, Show, shaders=SHADERS)
+    drawn(session, pipeline)
+    made = session.device.textures_made
+    drawn(session, pipeline.set("b.gain", 2.0))
+    assert session.device.textures_made == made
+    drawn(session, pipeline.set("a.value", 2.0))
+    assert session.device.textures_made == made + 1
+
+
 def test_another_size_scene_and_text_tell_what_is_the_same(bench: Any, session: rg.Session) -> None:
     pipeline = bench.pipeline(ONE, Table, Show, shaders=SHADERS)
     drawn(session, pipeline)
