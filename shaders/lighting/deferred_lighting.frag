@@ -17,10 +17,10 @@ uniform sampler2D edges;  // 1 where samples differ: there the first is lit, and
 #ifdef WRITES_SHADOW_DIFFERENCE
 // The sample that is nearest to the other side of the middle.
 int opposite(int number) {
-    vec2 wanted = 1.0 - DEPTH_SAMPLE_POSITIONS[number];
+    vec2 other = 1.0 - DEPTH_SAMPLE_POSITIONS[number];
     int nearest = 0;
     for (int i = 1; i < DEPTH_SAMPLES; ++i) {
-        if (distance(DEPTH_SAMPLE_POSITIONS[i], wanted) < distance(DEPTH_SAMPLE_POSITIONS[nearest], wanted)) nearest = i;
+        if (distance(DEPTH_SAMPLE_POSITIONS[i], other) < distance(DEPTH_SAMPLE_POSITIONS[nearest], other)) nearest = i;
     }
     return nearest;
 }

@@ -1,4 +1,4 @@
-// A point over each tile that is listed. One that reaches out of the picture has its middle inside, or would be clipped.
+// A point over each tile that is listed. One that reaches out of the picture has its middle inside: else it is clipped.
 uniform ivec2 screen;
 struct Command {
     uint vertices, instances, first, base_instance, none;

@@ -1,6 +1,6 @@
 // Whether the samples of a texel may differ in how much of the light reaches them: where that changes between the two
-// places in a texel at which it was looked up, and beside that, for neighbours look at other places. Neighbours that see
-// several surfaces tell nothing: among three of them a texel is taken for an edge, too.
+// places in a texel at which it was looked up, and beside that, for neighbours look at other places. Neighbours that
+// see several surfaces tell nothing: among three of them a texel is taken for an edge, too.
 #include <depth_surface.glsl>
 
 uniform sampler2DMS shadow_difference;  // 1 where samples see different surfaces

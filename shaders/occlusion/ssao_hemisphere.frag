@@ -41,7 +41,8 @@ Start start_at(View v, ivec2 texel, vec2 size) {
     mat4 p = v.projection;
     mat3 change = 0.5 * radius * mat3(
         size.x * p[0][0], 0.0, 0.0, 0.0, size.y * p[1][1], 0.0, size * (p[2].xy + p[2][3]), 2.0 * p[2][3]);
-    return Start(view_position(v, middle, surface.w), surface, place, change, 1.0 / vec4(size * w - place.xy, place.xy));
+    vec4 to_edges = 1.0 / vec4(size * w - place.xy, place.xy);
+    return Start(view_position(v, middle, surface.w), surface, place, change, to_edges);
 }
 
 // How much of what lies along a direction is blocked, 0 to 1.

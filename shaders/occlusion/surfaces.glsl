@@ -52,8 +52,8 @@ bool rises(View v, vec3 offset, vec3 normal, float distance) {
     return dot(offset, normal) > 0.02 * length(offset) + 2.0 * depth_error(v, distance);
 }
 
-// 1 where a neighbour at `offset` lies in the same plane and faces the same way, 0 where it is another surface: at twice
-// the tolerance, nearly as exp(-x²) falls, without its cost.
+// 1 where a neighbour at `offset` lies in the same plane and faces the same way, 0 where it is another surface: at
+// twice the tolerance, nearly as exp(-x²) falls, without its cost.
 float same_surface(vec3 offset, vec3 normal, vec3 neighbour, float tolerance) {
     float off_plane = 0.5 * dot(offset, normal) / tolerance;
     float near = max(1.0 - off_plane * off_plane, 0.0);
