@@ -305,7 +305,7 @@ class TooManyMips(Node):
 class FailingRule(Node):
     """A rule with a mistake in it."""
 
-    radiance = Output(Radiance, format=lambda node, facts: vars(facts)["nonsense"], doc="Never.")
+    radiance = Output(Radiance, format=lambda node, facts: dict[str, str]()["nonsense"], doc="Never.")
 
 
 def _size(found: TextureInfo) -> tuple[int, int]:

@@ -79,4 +79,4 @@ def test_a_containers_bound_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_the_limit_of_a_pipeline(gl: rg.Session) -> None:
     with pytest.raises(RenderError, match="RG616"):
         gl.render(rg.load("forward", size=(32, 32), limits={"plan-memory": 1}))
-    gl.render(rg.load("forward", size=(32, 32), limits={"plan-memory": 20}))
+    gl.render(rg.load("forward", size=(32, 32), limits={"plan-memory": 32}))
