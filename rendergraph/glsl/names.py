@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from msgspec import Struct, field
@@ -81,6 +82,7 @@ def declared(text: str) -> set[str]:
     return {name for name in found if not name.startswith("gl_")}
 
 
+@lru_cache(maxsize=1024)
 def calls(text: str, function: str) -> bool:
     """Whether a text without comments calls a function it does not declare itself."""
     if re.search(rf"(?<![\w.]){re.escape(function)}\s*\(", text) is None:

@@ -17,12 +17,14 @@ from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
 from rendergraph.program.images import with_formats
 from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
-from rendergraph.program.remembered import text_key
+from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.resources import folder
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
 
 VERSION = "#version 450 core"
+_CALLED: Remembered[str] = Remembered()
+"""Files with all that they include, as they are read to see what they call."""
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
 
 
@@ -162,7 +164,8 @@ def _stage(
         plugged = dict(step.includes)
         return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
 
-    called = expanded(Includes(include_folder)).text
+    key = file, include_folder, root, step.includes, versions, node.inherited
+    called = _CALLED.get(key, lambda: expanded(Includes(include_folder)).text)
     functions = SourceText()
     for signature in wanted.values():
         if calls(called, signature.name):
