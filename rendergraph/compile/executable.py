@@ -148,6 +148,7 @@ class Executable(Struct, eq=False, dict=True):
         fresh: `statics` have to be written and everything bound before the next frame.
         looks_back: a program looks at where things were in the frame before.
         made_kept: kept steps have run.
+        shares_kept: what they make may be taken over from other pipelines, and by those.
     """
 
     device: Device
@@ -168,6 +169,7 @@ class Executable(Struct, eq=False, dict=True):
     fresh: bool = True
     looks_back: bool = False
     made_kept: bool = False
+    shares_kept: bool = True
     filled: dict[str, bytes] = field(default_factory=dict)
     touched: set[str] = field(default_factory=set)
     _steady: list[list[FrameStep]] = field(default_factory=list)

@@ -38,7 +38,7 @@ class KeptValues(Struct, eq=False):
 
     def save(self, executable: Executable) -> None:
         """Copy what it has made since it was asked last."""
-        if executable.due or not executable.made_kept:
+        if executable.due or not (executable.made_kept and executable.shares_kept):
             return
         executable.made_kept = False
         for id, content in contents(executable).items():
@@ -52,7 +52,7 @@ class KeptValues(Struct, eq=False):
 
     def restore(self, executable: Executable) -> None:
         """Copy what is there of what it is about to make; the steps that make it have not to run."""
-        if not executable.due or not self._held:
+        if not (executable.due and executable.shares_kept and self._held):
             return
         there = {id: content for id, content in contents(executable).items() if content in self._held}
         for id, content in there.items():

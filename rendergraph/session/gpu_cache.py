@@ -15,7 +15,6 @@ from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene
 from rendergraph.session.executables import ExecutableCache, key_of
 from rendergraph.session.scenes import image_limits
-from rendergraph.session.selection import RenderOptions
 from rendergraph.session.values import Expanded, Linked, Planned
 
 if TYPE_CHECKING:
@@ -44,7 +43,6 @@ class GpuCache:
         self._kept = KeptValues(device)
         self._executables = ExecutableCache()
         self._scene: tuple[Scene, GpuScene] | None = None
-        self._shares = False
 
     def upload(self, linked: Linked) -> GpuScene:
         """A pipeline's scene on the GPU, in place of another that was there.
@@ -81,7 +79,7 @@ class GpuCache:
             if executable is not self.active or not executable.changed(values).isdisjoint(executable.kept):
                 self._save()
             executable.set_uniforms(values)
-            self._restore(expanded.options, executable)
+            self._kept.restore(executable)
         return key, executable
 
     def make(self, key: Hashable, planned: Planned, scene: GpuScene) -> Executable:
@@ -100,7 +98,8 @@ class GpuCache:
         with stamps.looking() as files:
             executable = compile_plan(self._device, planned.plan, types, views, scene, self.programs, poison=poison)
         self._executables.add(key, executable, files)
-        self._restore(planned.options, executable)
+        executable.shares_kept = planned.options.shares
+        self._kept.restore(executable)
         self.programs.discard(self._executables.unused())
         return executable
 
@@ -113,13 +112,8 @@ class GpuCache:
 
     def _save(self) -> None:
         """What was drawn last has made, others may want: this comes before it is lost or something else is drawn."""
-        if self.active is not None and self._shares:
+        if self.active is not None:
             self._kept.save(self.active)
-
-    def _restore(self, options: RenderOptions, executable: Executable) -> None:
-        self._shares = options.shares
-        if options.shares:
-            self._kept.restore(executable)
 
     def _forget(self) -> None:
         """Free the scene and all that was compiled for it."""
