@@ -85,14 +85,25 @@ def declared(text: str) -> set[str]:
 @lru_cache(maxsize=1024)
 def calls(text: str, function: str) -> bool:
     """Whether a text without comments calls a function it does not declare itself."""
-    if re.search(rf"(?<![\w.]){re.escape(function)}\s*\(", text) is None:
+    ends = [at + len(function) for at in _places(text, function) if text[at - 1 : at] != "."]
+    if not any(text[end:].lstrip().startswith("(") for end in ends):
         return False
     return all(function_of(head(one).rest) != function for one, _ in statements(tokens(without_directives(text))))
 
 
 def mentions(text: str, name: str) -> bool:
     """Whether a name stands in a text as a whole word."""
-    return re.search(rf"\b{re.escape(name)}\b", text) is not None
+    return next(_places(text, name), None) is not None
+
+
+def _places(text: str, name: str) -> Iterator[int]:
+    """Where a name stands as a whole word. Names are many, and an expression for each takes a millisecond to compile."""
+    at = text.find(name)
+    while at >= 0:
+        around = text[at - 1 : at] + text[at + len(name) : at + len(name) + 1]
+        if not any(letter == "_" or letter.isalnum() for letter in around):
+            yield at
+        at = text.find(name, at + 1)
 
 
 def renamed(text: str, rename: Callable[[str], str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rendergraph.glsl import declared
-from rendergraph.glsl.names import calls, renamed
+from rendergraph.glsl.names import calls, mentions, renamed
 
 TEXT = """#define SCALE 2.0
 #define TWICE(x) ((x) * SCALE)
@@ -67,3 +67,20 @@ def test_calls() -> None:
     assert calls("void main() { float x = shadow(0, p, n); }", "shadow")
     assert not calls("float shadow(int i) { return 1.0; } void main() { shadow(0); }", "shadow")
     assert not calls("void main() { my_shadow(0); a.shadow(); }", "shadow")
+    assert calls("float my_shadow; void main() { a.shadow(); shadow\n    (0); }", "shadow")
+    assert not calls("uniform float shadow; void main() { float x = shadow; }", "shadow")
+
+
+def test_mentions_whole_words() -> None:
+    assert mentions("depth_views", "depth_views")
+    assert mentions("a_depth_views + b.depth_views[0]", "depth_views")
+    for text in (
+        "",
+        "depth_view",
+        "a_depth_views",
+        "2depth_views",
+        "depth_views2",
+        "depth_views_depth_views",
+        "édepth_views",
+    ):
+        assert not mentions(text, "depth_views"), text
