@@ -97,7 +97,7 @@ def mentions(text: str, name: str) -> bool:
 
 
 def _places(text: str, name: str) -> Iterator[int]:
-    """Where a name stands as a whole word. Names are many, and an expression for each takes a millisecond to compile."""
+    """Where a name stands as a whole word. Names are many; to compile an expression takes a millisecond."""
     at = text.find(name)
     while at >= 0:
         around = text[at - 1 : at] + text[at + len(name) : at + len(name) + 1]
