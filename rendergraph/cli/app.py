@@ -151,7 +151,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return _told([_usage(error)], error.exit_code, as_json)
     except click.ClickException as error:
         return _told([Problem("RG500", error.format_message())], error.exit_code, as_json)
-    except (KeyboardInterrupt, EOFError, click.Abort):
+    except (KeyboardInterrupt, click.Abort):
         say("interrupted")
         return INTERRUPTED
     except Interruption as signalled:

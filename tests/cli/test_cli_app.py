@@ -139,6 +139,7 @@ def test_errors_become_messages_and_exit_codes(cli: Any, fake: Any, kind: Any, c
     [
         (KeyboardInterrupt(), 130, "interrupted"),
         (ZeroDivisionError("a\nb"), 1, "RG599 a mistake in rendergraph, not yours: ZeroDivisionError: a b; "),
+        (EOFError("marshal data too short"), 1, "RG599 a mistake in rendergraph, not yours: EOFError: marshal data"),
         (MemoryError(), 1, "RG509 out of memory"),
         (OSError(28, "No space left on device", "x"), 1, "x: RG509 No space left on device"),
         (BrokenPipeError(), 0, ""),
