@@ -120,10 +120,10 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
             and len(value) == len(tests)
             and all(test(entry) for test, entry in zip(tests, value, strict=True))
         )
-    if origin in (tuple, Sequence):
+    if origin in (tuple, list, Sequence):
         entries = test_of(arguments[0])
         return lambda value: isinstance(value, tuple | list | range) and all(map(entries, value))
-    if origin is Mapping:
+    if origin in (dict, Mapping):
         keys, entries = map(test_of, arguments)
         return lambda value: isinstance(value, Mapping) and all(keys(k) and entries(v) for k, v in value.items())
     if Callable in (origin, annotation):
@@ -131,7 +131,36 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
     if annotation in (int, float):
         kinds = int if annotation is int else int | float
         return lambda value: isinstance(value, kinds) and not isinstance(value, bool)
-    return lambda value: isinstance(value, annotation)
+    kind = origin or annotation
+    return lambda value: isinstance(value, kind)
+
+
+def converted(value: Any, annotation: Any) -> Any:
+    """A value of a file as an annotation has it: a list as a tuple, a whole number as a float; else what it was."""
+    return _conversion(annotation)(value)
+
+
+@cache
+def _conversion(annotation: Any) -> Callable[[Any], Any]:
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _conversion(annotation.__origin__)
+    if origin in (Union, types.UnionType):
+        parts = [(_conversion(part), test_of(part)) for part in arguments]
+        return lambda value: next((made for convert, test in parts if test(made := convert(value))), value)
+    if origin is list or (origin is tuple and Ellipsis in arguments):
+        entry = _conversion(arguments[0])
+        return lambda value: origin(map(entry, value)) if isinstance(value, tuple | list) else value
+    if origin is tuple:
+        entries = [_conversion(part) for part in arguments]
+        return lambda value: (
+            tuple(make(part) for make, part in zip(entries, value, strict=True))
+            if isinstance(value, tuple | list) and len(value) == len(entries)
+            else value
+        )
+    if annotation is float:
+        return lambda value: float(value) if fits(value, int) and abs(value) <= LARGEST else value
+    return lambda value: value
 
 
 def words_for(annotation: Any, limits: Range = Range(), *, file: bool = False) -> str:
@@ -285,5 +314,5 @@ def may_be(annotation: Any, wanted: type) -> bool:
     return wanted in (annotation, get_origin(annotation)) or any(may_be(part, wanted) for part in get_args(annotation))
 
 
-hints_of = cache(partial(get_type_hints, include_extras=True))
+hints_of: Callable[[Any], dict[str, Any]] = cache(partial(get_type_hints, include_extras=True))
 """The annotations of a class or function by name, worked out once."""

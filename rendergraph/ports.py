@@ -270,6 +270,3 @@ class Function(Port):
     def read_names(self) -> tuple[str, ...]:
         """The names of the ports in `reads`."""
         return tuple(read.port.name if isinstance(read, Part) else read for read in self.reads)
-
-
-PORT_TYPES = (Port, Input, WrittenPort, Output, InOut, Internal, History, Views, Function)

@@ -9,7 +9,8 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin
 
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Extensions, Function, InOut, Input, Node, Parameter, Port, Views
@@ -31,6 +32,13 @@ _ROLES = {
     "structural": "Changing it changes the plan.",
 }
 _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A parameter of the pipeline."}
+_PLAIN: dict[type, Schema] = {
+    bool: {"type": "boolean"},
+    int: {"type": "integer"},
+    float: {"type": "number"},
+    str: {"type": "string"},
+    NoneType: {"type": "null"},
+}
 _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
 
@@ -163,20 +171,18 @@ def port_type(port: Port) -> str:
 
 
 def _params(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
-    types: Schema = cls.model_json_schema().get("properties", {})
-    own = {name: _param(one, types[name], extensions) for name, one in cls.parameters().items()}
+    own = {name: _param(one, extensions) for name, one in cls.parameters().items()}
     return _known_names(own, f"'{type_name}' has no such param.")
 
 
-def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Schema:
+def _param(parameter: Parameter, extensions: Extensions) -> Schema:
     """One parameter: its own values, null for the default, or a parameter of the pipeline.
 
     Args:
         parameter: the parameter.
-        written: its type as pydantic writes it.
         extensions: where the choices come from that plugins add.
     """
-    own = _draft_07({key: value for key, value in written.items() if key not in ("default", "title")})
+    own = _type(parameter.type)
     doc = parameter.doc
     if parameter.open_name:  # any word in its type, its own and the plugins' in the schema
         added = extensions.choices(parameter.open_name)
@@ -185,7 +191,7 @@ def _param(parameter: Parameter, written: Schema, extensions: Extensions) -> Sch
         own = {"type": "string", "enum": list(dict.fromkeys(words))}
     limits = {"minimum": parameter.limits.low, "maximum": parameter.limits.high}
     limits = {key: limit for key, limit in limits.items() if limit is not None}
-    common = {"description": _about_param(parameter, doc), "default": written.get("default")}
+    common = {"description": _about_param(parameter, doc), "default": json.loads(json.dumps(parameter.default))}
     kind = own.get("type")
     if kind in _WORDS:  # said without alternatives: editors then name the limit that is broken
         message = f"This is {_WORDS[kind]}, or $name for a parameter of the pipeline."
@@ -216,16 +222,20 @@ def _about_param(parameter: Parameter, doc: str) -> str:
     return f"{doc}\n\nDefault {default}{unit}{limits}. {_ROLES[parameter.role]}"
 
 
-def _draft_07(value: Any) -> Any:
-    """Pydantic writes draft 2020-12, where a list of given length is spelled differently."""
-    if isinstance(value, list):
-        return [_draft_07(part) for part in value]
-    if not isinstance(value, dict):
-        return value
-    table = {key: _draft_07(part) for key, part in value.items()}
-    if "prefixItems" in table:
-        table["items"] = table.pop("prefixItems")
-    return table
+def _type(annotation: Any) -> Schema:
+    """A type as a schema; of what is not listed here, any value."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in (Union, UnionType):
+        return {"anyOf": [_type(part) for part in arguments]}
+    if origin is Literal:
+        kinds = {type(choice) for choice in arguments}
+        return {"enum": list(arguments), **(_PLAIN.get(kinds.pop(), {}) if len(kinds) == 1 else {})}
+    if origin in (tuple, list):
+        several = origin is list or Ellipsis in arguments
+        entries = _type(arguments[0]) if several else [_type(part) for part in arguments]
+        count = {} if several else {"minItems": len(arguments), "maxItems": len(arguments)}
+        return {"type": "array", "items": entries, **count}
+    return dict(_PLAIN.get(annotation, {}))
 
 
 # --- is a file on disk still right? ----------------------------------------------------------------------------------

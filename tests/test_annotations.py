@@ -8,7 +8,18 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import pytest
 
-from rendergraph.annotations import Known, Length, Matching, Range, fits, mistakes_in, mistakes_of, right, words_for
+from rendergraph.annotations import (
+    Known,
+    Length,
+    Matching,
+    Range,
+    converted,
+    fits,
+    mistakes_in,
+    mistakes_of,
+    right,
+    words_for,
+)
 from rendergraph.errors import Misuse
 
 Count: TypeAlias = Annotated[int, Range(0)]
@@ -32,6 +43,9 @@ FITS: list[tuple[Any, list[object], list[object]]] = [
     (Side | Callable[[Any], Side], ["right", len], ["lef", 1]),
     (tuple[int, int], [(1, 2)], [(1,), (1, 2, 3), [1, 2], (1, 2.0)]),
     (tuple[int, ...], [(), (1, 2), [1]], [("a",), 1, "12"]),
+    (list[int], [[], [1]], [["a"], 1]),
+    (dict[str, int], [{"a": 1}], [{"a": "b"}, []]),
+    (set[int], [{1}], [[1]]),
     (Sequence[str], [["a"], ("a", "b")], ["ab", {"a"}]),
     (Mapping[str, int], [{}, {"a": 1}], [{1: 1}, {"a": "b"}, [("a", 1)]]),
     (Count, [0, 7], [-1, 0.5, True]),
@@ -50,6 +64,29 @@ def test_what_fits(annotation: Any, right_ones: list[object], wrong_ones: list[o
     assert [value for value in wrong_ones if fits(value, annotation)] == []
     assert all(list(mistakes_in("it", value, annotation)) == [] for value in right_ones)
     assert all(list(mistakes_in("it", value, annotation)) for value in wrong_ones)
+
+
+CONVERTED: list[tuple[Any, object, object]] = [
+    (float, 2, 2.0),
+    (float, True, True),
+    (float, 10**400, 10**400),
+    (int, 2.0, 2.0),
+    (Count, 2, 2),
+    (int | float, 2, 2),
+    (float | tuple[float, float], 2, 2.0),
+    (float | tuple[float, float], [1, 2], (1.0, 2.0)),
+    (float | tuple[float, float], [1, 2, 3], [1, 2, 3]),
+    (tuple[float, ...], [1, 2, 3], (1.0, 2.0, 3.0)),
+    (tuple[tuple[int, int], ...], [[1, 2], [3, 4]], ((1, 2), (3, 4))),
+    (list[float], [1, 2], [1.0, 2.0]),
+    (str | list[str], ["a"], ["a"]),
+    (Side | tuple[Side, ...], ["left"], ("left",)),
+]
+
+
+@pytest.mark.parametrize(("annotation", "value", "made"), CONVERTED)
+def test_what_a_file_means(annotation: Any, value: object, made: object) -> None:
+    assert repr(converted(value, annotation)) == repr(made)
 
 
 BEYOND: list[tuple[Range, float, str | None]] = [

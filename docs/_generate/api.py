@@ -116,8 +116,8 @@ def _entry(name: str, thing: Any) -> str:
     arguments = signature(thing) if is_value or "__init__" in vars(thing) else ""
     parts += [block(f"class {name}{arguments}" if arguments else f"class {name}: ...", "python"), _doc(thing)]
     for member, value in _public_members(thing):
-        shown = value.fget if isinstance(value, property) else getattr(value, "func", value)
-        shown = getattr(shown, "__func__", shown)
+        shown: Any = value.fget if isinstance(value, property) else getattr(value, "func", value)
+        shown = inspect.unwrap(getattr(shown, "__func__", shown))
         kind = "" if isinstance(value, property) or hasattr(value, "func") else signature(shown, method=True)
         parts += [f"### {name}.{member}", block(f"{member}{kind}", "python") if kind else "", _doc(shown)]
     return "\n\n".join(part for part in parts if part)
@@ -131,9 +131,9 @@ def _public_members(cls: type) -> Iterator[tuple[str, Any]]:
             base is not cls and hasattr(rendergraph.api, base.__name__)
         ):
             continue
-        for name, value in list(vars(base).items()):  # pydantic adds to a class that is looked at
-            shown = value.fget if isinstance(value, property) else getattr(value, "func", value)
-            shown = getattr(shown, "__func__", shown)
+        for name, value in vars(base).items():
+            shown: Any = value.fget if isinstance(value, property) else getattr(value, "func", value)
+            shown = inspect.unwrap(getattr(shown, "__func__", shown))
             if not name.startswith("_") and name not in seen and inspect.isfunction(shown) and shown.__doc__:
                 seen.add(name)
                 yield name, value

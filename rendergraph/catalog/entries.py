@@ -11,7 +11,7 @@ from typing import Any
 from rendergraph.catalog.header import Header
 from rendergraph.catalog.parameter import HeaderParameter
 from rendergraph.catalog.rules import number_rule, size_rule, word_rule
-from rendergraph.declare import Extensions, Input, Node, Output, Port, WrittenPort
+from rendergraph.declare import Extensions, Input, Node, Output, Parameter, Port, WrittenPort
 from rendergraph.document import Value
 from rendergraph.errors import Place, Problem, suggestion
 from rendergraph.glsl import SourceText, strip_comments
@@ -45,7 +45,7 @@ class Entries:
         header: its header.
         globals: what its text declares.
         ports: by name, those of the header first.
-        fields: parameters by name: type and field.
+        parameters: parameters by name.
         problems: everything that is wrong.
     """
 
@@ -65,7 +65,7 @@ class Entries:
         self.globals = globals_of(self.text)
         self.declared = {found.name: found for found in self.globals.declared}
         self.ports: dict[str, Port] = {}
-        self.fields: dict[str, Any] = {}
+        self.parameters: dict[str, Parameter] = {}
         self.problems: list[Problem] = list(header.problems)
         self._without_range: list[str] = []
         self._outs = [found for found in self.globals.declared if found.storage == "out"]
@@ -96,7 +96,7 @@ class Entries:
     # Everything ------------------------------------------------------------------------------------------------------
 
     def collect(self) -> None:
-        """Fill `ports` and `fields`."""
+        """Fill `ports` and `parameters`."""
         count = len(self.declared.keys() | self.header.names.keys())
         if count > MOST_NAMES:
             text = f"the shader has {count:,} ports and parameters, {MOST_NAMES} are the limit; a texture holds tables"
@@ -332,12 +332,12 @@ class Entries:
         known = [found.name for found in plain if found.storage == "uniform"]
         named, declared = self.header.names.get(name), self.declared.get(name)
         reader = HeaderParameter(name, entry, named, declared, self._words)
-        field = reader.field([other for other in known if other not in self.header.names])
+        made = reader.parameter([other for other in known if other not in self.header.names])
         self.problems += reader.problems
         for text in reader.said:
             self.say(text[0], text[1], declared)
-        if field is not None:
-            self.fields[name] = field
+        if made is not None:
+            self.parameters[name] = made
             self._without_range += [name] if reader.lacks_range else []
 
     @cached_property

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import Any, Literal
 
 from rendergraph.annotations import Range, fits
-from rendergraph.declare import define, param, structural
+from rendergraph.declare import Parameter
 from rendergraph.document import Value
 from rendergraph.errors import Problem, suggestion
 from rendergraph.glsl.globals import Global
@@ -47,14 +47,14 @@ class HeaderParameter:
         self.said: list[tuple[str, str]] = []
         self.lacks_range = False
 
-    def field(self, uniforms: Sequence[str]) -> tuple[Any, Any] | None:
-        """Type and pydantic field, None where it is wrong.
+    def parameter(self, uniforms: Sequence[str]) -> Parameter | None:
+        """The parameter, None where it is wrong.
 
         Args:
             uniforms: those that the header does not mention, in case its name is misspelt.
         """
         found, entry = self.found, self.entry
-        role = self._word("role") or ("param" if found is not None else "define")
+        role: Any = self._word("role") or ("param" if found is not None else "define")
         if not self._agrees(role, uniforms):
             return None
         made = self._of_uniform(found) if found is not None else self._of_header()
@@ -66,9 +66,7 @@ class HeaderParameter:
             low = 0
         self._check_range(Range(low, high), default)
         self.lacks_range = not {"min", "max", "choices"} & entry.keys() and annotation is not bool
-        kinds: dict[str, Callable[..., Any]] = {"param": param, "define": define, "structural": structural}
-        field = kinds[role](default=default, min=low, max=high, doc=self._word("doc"), unit=self._word("unit"))
-        return annotation, field
+        return Parameter(role, default, self._word("doc"), self._word("unit"), Range(low, high), type=annotation)
 
     def _word(self, key: str) -> str:
         return str(self.entry[key].data) if key in self.entry else ""

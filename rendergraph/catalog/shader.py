@@ -8,10 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from types import new_class
 from typing import Any
-
-from pydantic import create_model
 
 from rendergraph.catalog.entries import Entries
 from rendergraph.catalog.header import Header, read_header
@@ -80,9 +77,8 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
         raise InputError(entries.problems)
     doc = header.doc or f"The shader {file.name}."
     words = "".join(part.capitalize() for part in file.stem.replace("-", "_").split("_")) or "Shader"
-    parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record, **entries.ports}
-    base = new_class(words, (Node,), {}, lambda space: space.update(parts))
-    cls: type[Node] = create_model(words, __base__=base, __module__=__name__, __doc__=doc, **entries.fields)
+    parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record}
+    cls = type(words, (Node,), {**parts, **entries.ports, **entries.parameters})
     # Docs may be missing, which a warning says; and other tools' shaders have names with capitals.
     mistakes = [mistake for mistake in declaration_mistakes(cls) if mistake.kind not in ("doc", "case")]
     if mistakes:

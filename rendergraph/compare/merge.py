@@ -94,8 +94,7 @@ def _classes(graphs: Sequence[Graph]) -> dict[Key, int]:
     followers = _followers(graphs)
     classes: dict[Key, int] = {}
     signatures: Mapping[Key, object] = {
-        key: (node.type.name, node.type.file, type(node.node), node.node.model_dump_json())
-        for key, node in nodes.items()
+        key: (node.type.name, node.type.file, type(node.node), repr(node.node)) for key, node in nodes.items()
     }
     while True:
         numbers: dict[object, int] = {}

@@ -9,7 +9,6 @@ from rendergraph.declare.node import DROPPED, Node
 from rendergraph.declare.parameters import Parameter, define, param, structural
 from rendergraph.facts import Facts, LightFacts, ObjectFacts, TextureInfo, casting_lights
 from rendergraph.ports import (
-    PORT_TYPES,
     Function,
     History,
     InOut,
@@ -28,7 +27,6 @@ from rendergraph.ports import (
 __all__ = [
     "DROPPED",
     "NO_EXTENSIONS",
-    "PORT_TYPES",
     "READ_IMAGES",
     "RESERVED_NAMES",
     "Added",

@@ -6,6 +6,7 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
+from inspect import get_annotations
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -61,7 +62,7 @@ def declared_by(cls: type[Node], file: Path, name: str = "") -> Place:
     """
     if file.suffix == ".py":
         own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
-        for base in (base for base in own if name in {**vars(base), **vars(base).get("__annotations__", {})}):
+        for base in (base for base in own if name in {**vars(base), **get_annotations(base)}):
             module = getattr(sys.modules.get(base.__module__), "__file__", None)
             found = declared_in(Path(module) if module else file, name)
             if found.line:
@@ -114,7 +115,6 @@ def told(error: BaseException) -> str:
         if is_interruption(another):
             raise
         said = ""
-    said = re.sub(r" For further information visit \S+", "", said)  # pydantic's link
     said = said if len(said) <= _MOST_SAID else said[:_MOST_SAID] + "…"
     return f"{type(error).__name__}: {said}"
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any, Literal, get_args, get_origin
+from collections.abc import Iterator
+from inspect import get_annotations
+from typing import Literal, get_args, get_origin
 
-from pydantic import ValidationError
-
-from rendergraph.annotations import may_be, mistakes_in, parts_of
+from rendergraph.annotations import may_be, mistakes_in, parts_of, quoted
 from rendergraph.declare.blame import told
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
@@ -20,11 +18,7 @@ from rendergraph.ports import History, Internal
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
-_OF_THE_BASE = frozenset(
-    """
-    copy json dict schema construct fields validate record update ports inputs outputs groups parameters shader
-    """.split()  # noqa: SIM905 - as below
-)
+_OF_THE_BASE = frozenset(name for name in vars(Node) if not name.startswith("_"))
 
 # Words that cannot be a GLSL identifier, that hide a built-in function used everywhere, or that the base class owns.
 RESERVED_NAMES: frozenset[str] = (
@@ -65,12 +59,12 @@ def declaration_mistakes(cls: type[Node]) -> list[Mistake]:
     Checked: names are GLSL identifiers and distinct, also as macros; docs exist; types and defaults are what a shader
     can be given and lie inside their range; formats, kinds and words exist; rules name ports of this node.
     """
+    try:
+        cls.parameters()
+    except Exception as error:  # whatever evaluating an annotation raises
+        named = [name for name, hint in get_annotations(cls).items() if str(getattr(error, "name", None)) in str(hint)]
+        return [Mistake(next(iter(named), ""), f"the types of its parameters cannot be worked out: {told(error)}")]
     return [*_names(cls), *_docs(cls), *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
-
-
-def complaint(detail: Mapping[str, Any]) -> str:
-    """What a validator's own exception says, else pydantic's words, of one entry of `ValidationError.errors()`."""
-    return str(detail["ctx"]["error"]) if "error" in detail.get("ctx", ()) else str(detail["msg"])
 
 
 def _names(cls: type[Node]) -> Iterator[Mistake]:
@@ -81,7 +75,7 @@ def _names(cls: type[Node]) -> Iterator[Mistake]:
             yield Mistake(name, f"'{name}' is not a lower-case GLSL identifier")
         elif name != name.lower():
             yield Mistake(name, f"'{name}' is not a lower-case GLSL identifier", "case")
-        elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES) or name.startswith("model_"):
+        elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES):
             text = f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
             yield Mistake(name, text)
     for name in sorted(set(ports) & set(parameters)):
@@ -97,7 +91,7 @@ def _names(cls: type[Node]) -> Iterator[Mistake]:
             yield Mistake(group, f"group '{group}' has the name of a port or parameter")
     inherited = {name for base in cls.__mro__[1:] if issubclass(base, Node) for name in base.ports()}
     for name, value in vars(cls).items():
-        if value is None and name != "shader" and name[0] != "_" and name not in inherited:
+        if value is None and name != "shader" and name[0] != "_" and name not in {*inherited, *parameters}:
             yield Mistake(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
@@ -142,6 +136,10 @@ def _macros(cls: type[Node]) -> Iterator[Mistake]:
 def _parameters(cls: type[Node]) -> Iterator[Mistake]:
     sound = True
     for name, parameter in cls.parameters().items():
+        if parameter.type is None:
+            yield Mistake(name, f"parameter '{name}' has no type; write it as in `{name}: float = param(…)`")
+            sound = False
+            continue
         if parameter.open_name and str not in get_args(parameter.type):
             yield Mistake(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
         if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
@@ -169,32 +167,28 @@ def _limits(parameter: Parameter) -> Iterator[Mistake]:
 
 def _defaults(cls: type[Node]) -> Iterator[Mistake]:
     """Defaults go the way of values in a file."""
+    sound = True
+    for name, parameter in cls.parameters().items():
+        wrong = ""
+        try:
+            written = json.dumps(parameter.default)
+        except (TypeError, ValueError):
+            wrong = "no value that a file can hold"
+        else:
+            try:
+                parameter.convert(json.loads(written))
+            except (TypeError, ValueError) as error:
+                wrong = f"wrong: it {error}"
+        if wrong and parameter.role != "plain":
+            yield Mistake(name, f"the default of '{name}', {quoted(parameter.default)}, is {wrong}")
+        sound = sound and not wrong
     try:
-        node = cls()
-        values = {name: getattr(node, name) for name in cls.parameters()}
-        written = json.dumps(values)
-    except TypeError as error:
-        yield Mistake("", f"a default is no value that a file can hold: {error}")
-        return
-    except BaseException as error:  # what the author's own validators raise
+        if sound:
+            cls()
+    except BaseException as error:  # what the author's own check raises
         if is_interruption(error):
             raise
         yield Mistake("", f"it cannot be made with its defaults: {told(error)}")
-        return
-    if not all(_finite(value) for value in values.values()):
-        yield Mistake("", "a default is not finite")
-        return
-    try:
-        cls.model_validate_json(written)
-    except ValidationError as error:
-        for detail in error.errors(include_url=False):
-            name = str(detail["loc"][0]) if detail["loc"] else ""
-            of = f"the default of '{name}', {values[name]!r}, is" if name in values else "its defaults are"
-            yield Mistake(name, f"{of} wrong: {complaint(detail)}")
-    except BaseException as error:  # as above
-        if is_interruption(error):
-            raise
-        yield Mistake("", f"its own checks fail on the defaults: {told(error)}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:
@@ -218,8 +212,3 @@ def _not_for_a_shader(parameter: Parameter) -> str | None:
     if other:
         return f"a {role} of {getattr(other[0], '__name__', other[0])}; shaders take numbers and switches"
     return None
-
-
-def _finite(value: object) -> bool:
-    numbers = value if isinstance(value, tuple | list) else (value,)
-    return all(math.isfinite(number) for number in numbers if isinstance(number, float))

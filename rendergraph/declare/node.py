@@ -2,90 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
-from typing import Any, ClassVar
+from inspect import get_annotations
+from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform, get_origin
 
 from msgspec.structs import replace
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 
-from rendergraph.declare.parameters import Parameter
-from rendergraph.ports import PORT_TYPES, Function, InOut, Input, Output, Port, Views
+from rendergraph.annotations import hints_of, quoted
+from rendergraph.declare.parameters import Parameter, define, param, structural
+from rendergraph.errors import Misuse, suggestion
+from rendergraph.ports import Function, InOut, Input, Output, Port, Views
 from rendergraph.steps import Frame, Steps
 
 DROPPED: Any = None
 """What a subclass sets a port of its base to that it does without: `depth = DROPPED`."""
 
 
-@cache
-def _ports_of(cls: type[Node]) -> dict[str, Port]:
-    # Every stage asks for ports of every node, and pydantic's base classes hold hundreds of attributes.
-    found: dict[str, Port] = {}
-    for base in reversed(cls.__mro__):
-        if issubclass(base, Node):
-            for name, value in vars(base).items():
-                if isinstance(value, Port):
-                    found[name] = value
-                elif name in found:
-                    del found[name]  # a subclass drops a port by setting it to DROPPED, which is None
-    return found
-
-
-@cache
-def _outputs_of(cls: type[Node]) -> dict[str, Output | InOut | Function | Views]:
-    return {
-        name: port
-        for name, port in _ports_of(cls).items()
-        if isinstance(port, Output | InOut | Function) or (isinstance(port, Views) and port.public)
-    }
-
-
-@cache
-def _inputs_of(cls: type[Node]) -> dict[str, Input | InOut]:
-    return {name: port for name, port in _ports_of(cls).items() if isinstance(port, Input | InOut)}
-
-
-@cache
-def _parameters_of(cls: type[Node]) -> dict[str, Parameter]:
-    cls.model_rebuild(raise_errors=False)  # a type that was named before it was made
-    found: dict[str, Parameter] = {}
-    for name, info in cls.model_fields.items():
-        declared = next((one for one in info.metadata if isinstance(one, Parameter)), Parameter("plain", info.default))
-        found[name] = replace(declared, name=name, type=info.annotation)
-    return found
-
-
-class Node(BaseModel):
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(param, define, structural))
+class Node:
     """Base of every node: ports and parameters as class attributes, nothing more for a plain full-screen pass.
 
-    Instances are frozen: they hold parameter values only. The type's name is the stem of its module.
+    Instances are frozen and hold parameter values only; `dict(node)` has them. The type's name is the stem of its
+    module.
     """
 
-    model_config = ConfigDict(
-        frozen=True,
-        strict=True,
-        extra="forbid",
-        ignored_types=(*PORT_TYPES, type(DROPPED)),
-        protected_namespaces=(),
-        defer_build=True,  # bases are never made into nodes
-    )
+    def __init__(self, **values: Any) -> None:
+        """Args are values of parameters; the others have their defaults.
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        for name in [name for name in cls.__annotations__ if isinstance(vars(cls).get(name), Port)]:
-            del cls.__annotations__[name]  # `color: Output = Output(…)` is a port too, and no parameter
+        Raises:
+            Misuse: there is no such parameter, or it cannot have such a value; with all that are wrong.
+        """
+        parameters = self.parameters()
+        wrong = []
+        for name in values:
+            try:
+                values[name] = parameters[name].convert(values[name])
+            except KeyError:
+                wrong.append(f"it has no parameter '{name}'{suggestion(name, parameters)}")
+            except (TypeError, ValueError) as error:
+                wrong.append(f"'{name}' {error}, this is {quoted(values[name])}")
+        if wrong:
+            raise Misuse(f"{type(self).__name__}: {'; '.join(wrong)}")
+        vars(self).update({name: parameter.default for name, parameter in parameters.items()} | values)
+        self.validate()
 
-    @field_validator("*", mode="after")
-    @classmethod
-    def _within_limits(cls, value: Any, info: ValidationInfo) -> Any:
-        # Not pydantic's ge and le: a parameter may be a number or a colour, and the limits hold for each component.
-        if wrong := cls.parameters()[str(info.field_name)].beyond(value):
-            raise ValueError(wrong)
-        return value
+    def __iter__(self) -> Iterator[tuple[str, Any]]:
+        """Names and values of its parameters, for `dict(node)`."""
+        return ((name, getattr(self, name)) for name in self.parameters())
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self)})"
+
+    if not TYPE_CHECKING:  # to which the class is a frozen dataclass
+
+        def __eq__(self, other: object) -> bool:
+            return type(self) is type(other) and dict(self) == dict(other)
+
+        def __hash__(self) -> int:
+            return hash((type(self), *dict(self).values()))
+
+        def __setattr__(self, name: str, value: object) -> None:
+            raise Misuse(f"'{name}' cannot be set: a node holds its parameters, which never change, and nothing else")
 
     shader: ClassVar[str | None] = None
     """Shader of the default `record`: a fragment shader, or a compute shader, which ends in `.comp`; the type's name
     with `.frag` where None."""
+
+    def validate(self) -> None:
+        """Refuse what types and limits of the parameters let through: `raise ValueError("far must be beyond near")`.
+
+        Called whenever a node is made. The message is shown at the value that is to blame, or at the node.
+        """
 
     def record(self, steps: Steps) -> None:
         """Append the steps of this pass; called before the schedule and without GL.
@@ -113,19 +101,33 @@ class Node(BaseModel):
         return 0.0, 0.0
 
     @classmethod
+    @cache
     def ports(cls) -> Mapping[str, Port]:
         """Every port by name, in the order of declaration, bases first."""
-        return _ports_of(cls)
+        found: dict[str, Port] = {}
+        for base in [base for base in reversed(cls.__mro__) if issubclass(base, Node)]:
+            for name, value in vars(base).items():
+                if isinstance(value, Port):
+                    found[name] = value
+                elif name in found:
+                    del found[name]  # a subclass drops a port by setting it to DROPPED, which is None
+        return found
 
     @classmethod
-    def inputs(cls) -> dict[str, Input | InOut]:
+    @cache
+    def inputs(cls) -> Mapping[str, Input | InOut]:
         """Ports that take links."""
-        return _inputs_of(cls)
+        return {name: port for name, port in cls.ports().items() if isinstance(port, Input | InOut)}
 
     @classmethod
-    def outputs(cls) -> dict[str, Output | InOut | Function | Views]:
+    @cache
+    def outputs(cls) -> Mapping[str, Output | InOut | Function | Views]:
         """Ports that others may read."""
-        return _outputs_of(cls)
+        return {
+            name: port
+            for name, port in cls.ports().items()
+            if isinstance(port, Output | InOut | Function) or (isinstance(port, Views) and port.public)
+        }
 
     @classmethod
     def groups(cls) -> dict[str, tuple[str, ...]]:
@@ -137,6 +139,17 @@ class Node(BaseModel):
         return table
 
     @classmethod
-    def parameters(cls) -> dict[str, Parameter]:
+    @cache
+    def parameters(cls) -> Mapping[str, Parameter]:
         """Parameters by name, in the order of declaration."""
-        return _parameters_of(cls)
+        hints = hints_of(cls)  # worked out now, when a type that was named before it was made is there
+        found: dict[str, Parameter] = {}
+        for base in [base for base in reversed(cls.__mro__) if issubclass(base, Node)]:
+            for name in {**get_annotations(base), **vars(base)}:
+                value, hint = vars(base).get(name), hints.get(name, ClassVar)
+                plain = name[0] != "_" and ClassVar not in (hint, get_origin(hint)) and not isinstance(value, Port)
+                if isinstance(value, Parameter):
+                    found[name] = replace(value, name=name, type=hints.get(name, value.type))
+                elif plain or (name in found and not isinstance(value, Port)):
+                    found[name] = Parameter("plain", value, name=name, type=hint)
+        return found

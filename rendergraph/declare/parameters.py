@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from msgspec import Struct
-from pydantic import Field
-from pydantic.fields import FieldInfo
 
-from rendergraph.annotations import Range, fits, words_for
+from rendergraph.annotations import Range, converted, fits, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 
@@ -64,6 +62,20 @@ class Parameter(Struct, frozen=True):
         """
         return words_for(self.closed(added), self.limits, file=True)
 
+    def convert(self, value: object) -> Any:
+        """A value as its type has it: a list of a file as a tuple, a whole number as a float.
+
+        Raises:
+            TypeError: it is not what the type says: `takes a whole number`.
+            ValueError: a number in it is not finite or outside the limits: `must be at least 1`.
+        """
+        found = converted(value, self.type)
+        if not fits(found, self.type):
+            raise TypeError(f"takes {self.takes()}")
+        if wrong := self.beyond(found):
+            raise ValueError(wrong)
+        return found
+
     def beyond(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
@@ -79,13 +91,6 @@ def _listed(annotation: Any) -> Iterator[Any]:
             yield from _listed(part)
 
 
-def _field(parameter: Parameter) -> Any:
-    """A pydantic field that carries its declaration as metadata, which pydantic hands on and does not look at."""
-    field: FieldInfo = Field(default=parameter.default)
-    field.metadata.append(parameter)
-    return field
-
-
 def param(
     *, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None, glsl: str = ""
 ) -> Any:
@@ -98,7 +103,7 @@ def param(
         min, max: smallest and largest legal value, inclusive.
         glsl: the uniform's type where it is not what the annotation says (`vec3` for a number or a colour).
     """
-    return _field(Parameter("param", default, doc, unit, Range(min, max), glsl))
+    return Parameter("param", default, doc, unit, Range(min, max), glsl)
 
 
 def define(
@@ -127,9 +132,9 @@ def define(
         needs: what such an include may say that it needs (`#pragma needs(…)`), which others do without: `NEEDS_…` in
             the shader, `steps.needs(…)` in `record`.
     """
-    return _field(Parameter("define", default, doc, unit, Range(min, max), open_name=choices, needs=needs))
+    return Parameter("define", default, doc, unit, Range(min, max), open_name=choices, needs=needs)
 
 
 def structural(*, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None) -> Any:
     """A parameter that is part of the plan: a resolution, a light's name."""
-    return _field(Parameter("structural", default, doc, unit, Range(min, max)))
+    return Parameter("structural", default, doc, unit, Range(min, max))

@@ -235,12 +235,13 @@ def _now_called(end: Endpoint, nodes: Mapping[str, str]) -> Endpoint:
 
 
 def _parameters(old: GraphNode, new: GraphNode) -> list[ParameterChange]:
-    before, after = (node.node.model_dump(mode="json") for node in (old, new))
-    given = {name for node in (old, new) for name in node.node.model_fields_set}
+    before, after = dict(old.node), dict(new.node)
+    defaults = {name: one.default for name, one in {**old.node.parameters(), **new.node.parameters()}.items()}
     return [
         ParameterChange(new.id, name, before.get(name), after.get(name))
         for name in dict.fromkeys([*before, *after])
-        if before.get(name) != after.get(name) and ((name in before and name in after) or name in given)
+        if before.get(name) != after.get(name)
+        and ((name in before and name in after) or {**before, **after}[name] != defaults[name])
     ]
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Extensions, Node, Parameter
 from rendergraph.declare.blame import happened
-from rendergraph.declare.mistakes import complaint
 from rendergraph.document import Value, said, shown
 from rendergraph.errors import InputError, Problem, is_interruption, node_named, suggestion
 from rendergraph.glsl.source import needs, needs_place
@@ -20,35 +17,44 @@ from rendergraph.resolve import NodeSpec
 
 
 def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
-    """The node with its parameter values, defaults for those that are wrong, and what is wrong.
+    """The node with its parameter values, defaults for those that are wrong, and what is wrong."""
+    cls, parameters = node_type.cls, node_type.cls.parameters()
+    unknown = [name for name in spec.params if name not in parameters]
+    problems = [_unknown(spec.params[name], name, node_type) for name in unknown[:MOST_PROBLEMS]]
+    values = {}
+    for name in [name for name in spec.params if name in parameters]:
+        value = spec.params[name]
+        try:
+            values[name] = parameters[name].convert(value.plain())
+        except TypeError as error:
+            hint = suggestion(value.data, parameters[name].words, most=0) if isinstance(value.data, str) else ""
+            problems.append(value.problem("RG104", f"'{spec.id}.{name}' {error}, this is {said(value)}{hint}"))
+        except ValueError as error:
+            problems.append(value.problem("RG104", f"'{spec.id}.{name}' is {said(value)}, it {error}"))
+    try:
+        return cls(**values), problems
+    except BaseException as error:  # its own check is the author's code
+        if is_interruption(error):
+            raise
+        return cls(), problems or [_refused(spec, node_type, values, error)]
 
-    Values go through pydantic as JSON: as Python values its strict mode refuses a list for a tuple, and its lax mode
-    takes `'1.5'` and `true` for numbers.
-    """
-    values = {name: value.plain() for name, value in spec.params.items()}
-    cls = node_type.cls
-    problems: list[Problem] = []
-    for name in [name for name in values if name not in cls.parameters()]:
-        del values[name]
-        if len(problems) < MOST_PROBLEMS:
-            problems.append(_unknown(spec.params[name], name, node_type))
-    try:
-        return cls.model_validate_json(json.dumps(values)), problems
-    except BaseException as error:  # validators are the author's code
-        if is_interruption(error):
-            raise
-        if not isinstance(error, ValidationError):
-            text = f"{node_named(spec.id, node_type.name)}: its own checks fail: {happened(error, cls)}"
-            return cls.model_construct(), [*problems, spec.value.problem("RG209", text, key=True)]
-        for name, details in _by_parameter(error).items():
-            values.pop(name, None)
-            problems.append(_wrong(spec, node_type, name, details))
-    try:
-        return cls.model_validate_json(json.dumps(values)), problems
-    except BaseException as error:  # a rule between parameters fails, and has been said
-        if is_interruption(error):
-            raise
-        return cls.model_construct(), problems
+
+def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], error: BaseException) -> Problem:
+    """What a node's own check says; at the value without which it would say nothing, where there is one such."""
+    who = node_named(spec.id, node_type.name)
+    if not isinstance(error, ValueError):
+        text = f"{who}: its own checks fail: {happened(error, node_type.cls)}"
+        return spec.value.problem("RG209", text, key=True)
+    guilty = []
+    for name in values:
+        try:
+            node_type.cls(**{other: values[other] for other in values if other != name})
+            guilty.append(spec.params[name])
+        except BaseException as another:  # as above
+            if is_interruption(another):
+                raise
+    text = f"{who}: {error}"
+    return guilty[0].problem("RG104", text) if len(guilty) == 1 else spec.value.problem("RG104", text, key=True)
 
 
 def choice_files(
@@ -93,13 +99,6 @@ def _unmet(parameter: Parameter, file: Path) -> list[Problem]:
     ]
 
 
-def _by_parameter(error: ValidationError) -> dict[str, list[Any]]:
-    table: dict[str, list[Any]] = {}
-    for detail in error.errors(include_url=False):
-        table.setdefault(str(detail["loc"][0]) if detail["loc"] else "", []).append(detail)
-    return table
-
-
 def _unknown(value: Value, name: str, node_type: NodeType) -> Problem:
     cls = node_type.cls
     if name in cls.inputs() or name in cls.groups():
@@ -107,17 +106,3 @@ def _unknown(value: Value, name: str, node_type: NodeType) -> Problem:
     else:
         hint = suggestion(name, cls.parameters()) if cls.parameters() else "; it takes none"
     return value.problem("RG103", f"node type '{node_type.name}' has no param '{shown(name)}'{hint}", key=True)
-
-
-def _wrong(spec: NodeSpec, node_type: NodeType, name: str, details: list[Any]) -> Problem:
-    value = spec.params.get(name)
-    detail = details[0]
-    message = complaint(detail)
-    if value is None:  # a rule between parameters
-        return spec.value.problem("RG104", f"node '{spec.id}': {message}", key=True)
-    if detail["type"] in ("value_error", "assertion_error"):
-        text = f"'{spec.id}.{name}' is {said(value)}, it {message}"
-        return value.problem("RG104", text)
-    parameter = node_type.cls.parameters()[name]
-    hint = suggestion(value.data, parameter.words, most=0) if isinstance(value.data, str) else ""
-    return value.problem("RG104", f"'{spec.id}.{name}' takes {parameter.takes()}, this is {said(value)}{hint}")

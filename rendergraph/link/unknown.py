@@ -5,13 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import new_class
 from typing import Any
 
-from pydantic import create_model
-
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import Input, Node, Output, structural
+from rendergraph.declare import Input, Node, Output, Parameter
 from rendergraph.document import Value, shown
 from rendergraph.errors import nearest, shown_file
 from rendergraph.resolve import NodeSpec, PipelineSpec
@@ -44,14 +41,13 @@ def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
     taken = {name: Input(AnyTexture, optional=True, many=_is_list(value)) for name, value in node.inputs.items()}
     made = {name: Output(AnyTexture) for name in _asked_of(spec, node.id)}
     ports = {name: port for name, port in {**taken, **made}.items() if not hasattr(Node, name)}
-    parts = {"__module__": __name__, "__doc__": "A node of unknown type.", **ports}
-    base = new_class("Unknown", (Node,), {}, lambda space: space.update(parts))
-    fields: dict[str, Any] = {
-        name: (Any, structural(default=None, doc=""))
+    params = {
+        name: Parameter("structural", None, type=Any)
         for name in node.params
         if name.isidentifier() and not name.startswith("_") and not hasattr(Node, name) and name not in ports
     }
-    cls: type[Node] = create_model("Unknown", __base__=base, __module__=__name__, **fields)
+    about = {"__module__": __name__, "__doc__": "A node of unknown type."}
+    cls = type("Unknown", (Node,), {**about, **ports, **params})
     return NodeType(node.type, "", cls, Path(), Path(), "", missing=True)
 
 

@@ -124,7 +124,7 @@ def graph_json(graph: Graph) -> dict[str, Any]:
                 "family": node.type.family,
                 "inputs": {name: [str(end) for end in ends] for name, ends in node.inputs.items()},
                 "outputs": outputs,
-                "parameters": node.node.model_dump(mode="json"),
+                "parameters": dict(node.node),
             }
         )
     return {

@@ -140,7 +140,7 @@ def test_a_path_on_the_command_line_is_the_users_own(
     monkeypatch.chdir(here)
     sets = [f"effect.type={os.path.relpath(folder / 'times.frag')}", "effect.color=display.color", "effect.gain=3"]
     spec = spec_of(folder / "p.yaml", sets=sets)
-    assert link(spec, Catalog.discover())["effect"].node.model_dump() == {"gain": 3.0}
+    assert dict(link(spec, Catalog.discover())["effect"].node) == {"gain": 3.0}
     assert [note.text for note in spec.notes] == [
         f"node 'effect' is now '{os.path.relpath(folder / 'times.frag')}', which has no input 'radiance' of 'tonemap'; "
         "dropped"
@@ -415,7 +415,7 @@ def test_a_link_in_a_folder_leads_nowhere_outside(write: Write) -> None:
 LACKING = """extends: forward
 plugins: [rendergraph-outline, rendergraph]
 nodes:
-  edge: {type: outline, inputs: {color: display.color, many: [light.radiance]}, params: {width: 3, copy: 1}}
+  edge: {type: outline, inputs: {color: display.color, many: [light.radiance]}, params: {width: 3, record: 1}}
   tone: {type: tonemap, inputs: {radiance: edge.outlined}}
 outputs: {image: tone.color, edges: edge.edges}
 """

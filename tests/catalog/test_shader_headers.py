@@ -61,7 +61,7 @@ def test_a_header_says_everything_that_a_class_can(tmp_path: Path) -> None:
     assert isinstance(darkened, Output)
     assert (darkened.like, darkened.format, darkened.mips, darkened.clear) == ("color", "r32f", 0, (1.0, 2.0, 3.0, 4.0))
     assert (darkened.first, darkened.semantic, darkened.doc) == (5, None, "Result.")
-    assert cls().model_dump() == {
+    assert dict(cls()) == {
         "strength": 0.25,
         "taps": 4,
         "curve": "soft",

@@ -27,7 +27,7 @@ def distinct(graphs: Sequence[Graph]) -> int:
             (port, tuple((key(graph, end.node), end.port) for end in ends))
             for port, ends in sorted(node.inputs.items())
         )
-        return node.type.name, node.node.model_dump_json(), reads
+        return node.type.name, repr(node.node), reads
 
     return len({key(graph, name) for graph in graphs for name in needed(graph)})
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import pickle
+import re
+from typing import Any, Literal
 
 import pytest
-from pydantic import ValidationError
 
 from rendergraph.annotations import Range
 from rendergraph.api import Node, define, param, structural
 from rendergraph.declare import declaration_mistakes
+from rendergraph.errors import Misuse
 
 
 class Curved(Node):
@@ -65,8 +67,50 @@ def test_limits_hold_for_each_component() -> None:
     assert tint.beyond(float("nan")) == "must be finite"
     assert Hard.parameters()["gain"].beyond(0.5) == "must be at least 1"
     assert Curved.parameters()["light"].beyond("auto") is None
-    with pytest.raises(ValidationError, match="must be at most 1"):
-        Curved(tint=(0.0, 1.5, 1.0))
+
+
+def test_a_node_takes_values_as_a_file_has_them() -> None:
+    given: dict[str, Any] = {"gain": 2, "tint": [0, 1, 0.5], "light": ["sun"]}
+    node: Any = Curved(**given)
+    assert dict(node) == {"gain": 2.0, "tint": (0.0, 1.0, 0.5), "curve": "soft", "taps": 2, "light": ["sun"]}
+    assert [type(number) for number in (node.gain, *node.tint)] == [float] * 4
+    assert Curved(tint=1).tint == 1.0
+    assert (Curved(gain=2) == Curved(gain=2.0), Curved() == Hard(), Curved(gain=2) == Curved()) == (True, False, False)
+    assert len({Curved(gain=2), Curved(gain=2.0), Curved(), Hard()}) == 3
+    assert repr(Hard(taps=4)) == "Hard(gain=2.0, tint=0.5, curve='soft', taps=4, light='auto')"
+    assert pickle.loads(pickle.dumps(node)) == node
+
+
+WRONG: dict[str, tuple[dict[str, Any], str]] = {
+    "beyond": ({"tint": (0.0, 1.5, 1.0)}, "'tint' must be at most 1, this is (0.0, 1.5, 1.0)"),
+    "text": ({"gain": "1.5"}, "'gain' takes a number from 0 to 4, this is '1.5'"),
+    "a switch": ({"gain": True}, "'gain' takes a number from 0 to 4, this is True"),
+    "too few": ({"tint": [0.5, 0.5]}, "'tint' takes a number up to 1 or a list of 3 numbers, this is [0.5, 0.5]"),
+    "no choice": ({"taps": 3}, "'taps' takes one of 1, 2, 4, this is 3"),
+    "a fraction": ({"taps": 2.0}, "'taps' takes one of 1, 2, 4, this is 2.0"),
+    "a mixed list": ({"light": ["sun", 1]}, "'light' takes text or a list of words, this is ['sun', 1]"),
+    "endless": ({"gain": 10**400}, "'gain' must be from -3.4028235e+38 to 3.4028235e+38, this is 100"),
+    "unknown": ({"gian": 1.0}, "it has no parameter 'gian'; did you mean 'gain'?"),
+    "all at once": (
+        {"gain": 5, "taps": 3},
+        "'gain' must be at most 4, this is 5; 'taps' takes one of 1, 2, 4, this is 3",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_node_refuses_a_value(name: str) -> None:
+    values, said = WRONG[name]
+    with pytest.raises(Misuse, match=re.escape(f"Curved: {said}")):
+        Curved(**values)
+
+
+def test_a_node_never_changes() -> None:
+    node: Any = Curved()
+    with pytest.raises(Misuse, match="'gain' cannot be set"):
+        node.gain = 2.0
+    with pytest.raises(Misuse, match="'scratch' cannot be set"):
+        node.scratch = []
 
 
 def test_a_bare_value_is_plain() -> None:

@@ -73,7 +73,7 @@ def test_parameters_are_old_and_new(make: Maker) -> None:
     found = diff(make(BASE), make(BASE, sets=("ao.radius=0.75", "ao.offset=[1, 0]")))
     assert [(c.node, c.name, c.old, c.new) for c in found.parameters] == [
         ("ao", "radius", 0.5, 0.75),
-        ("ao", "offset", [0.0, 0.0], [1.0, 0.0]),
+        ("ao", "offset", (0.0, 0.0), (1.0, 0.0)),
     ]
     assert "  ~ ao.radius: 0.5 → 0.75\n  ~ ao.offset: [0.0, 0.0] → [1.0, 0.0]\n" in diff_text(found)
 

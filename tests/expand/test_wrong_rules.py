@@ -62,23 +62,23 @@ def test_a_rule_that_fails(author: Any, body: str) -> None:
     assert said == f"test.yaml:4:3: {expected.replace('{line}', str(line))}"
 
 
-VALIDATORS = {
-    "raise KeyError(value)  # here": "RG490 node type 'wrong': it",
-    "return value if value == 1.0 else 1 / 0  # here": "RG209 node 'a' (wrong): its own checks fail: wrong.py:{line}: ZeroDivisionError: division by zero",
+CHECKS = {
+    "raise KeyError(self.gain)  # here": "wrong.py:13:1: RG490 node type 'wrong': it cannot be made with its defaults: KeyError: 1.0",
+    "self.gain == 1.0 or 1 / 0  # here": "test.yaml:4:3: RG209 node 'a' (wrong): its own checks fail: wrong.py:{line}: ZeroDivisionError: division by zero",
+    "if self.gain > 1:\n        raise ValueError('gain must be at most 1')": "test.yaml:4:46: RG104 node 'a' (wrong): gain must be at most 1",
+    "if self.gain > self.bias:\n        raise ValueError('gain must be at most bias')": "test.yaml:4:3: RG104 node 'a' (wrong): gain must be at most bias",
 }
 
 
-@pytest.mark.parametrize("body", VALIDATORS)
-def test_a_validator_that_fails(author: Any, body: str) -> None:
-    before = "from pydantic import field_validator\n\n\n"
+@pytest.mark.parametrize("body", CHECKS)
+def test_a_check_of_an_authors_own(author: Any, body: str) -> None:
     author.node(
-        f'{COLOR}gain: float = param(default=1.0, doc="Gain.")\n\n@field_validator("gain")\n@classmethod\n'
-        f"def right(cls, value):\n    {body}",
-        before=before,
+        f'{COLOR}gain: float = param(default=1.0, doc="Gain.")\nbias: float = param(default=1.0, doc="Bias.")\n\n'
+        f"def validate(self):\n    {body}"
     )
-    text = "nodes:\n  a: {type: wrong, params: {gain: 2.0}}\noutputs: {image: a.color}\n"
-    said = author.said(author.pipeline(text).check)
-    assert VALIDATORS[body].replace("{line}", str(author.line())) in said[0]
+    text = "nodes:\n  a: {type: wrong, params: {bias: 0.5, gain: 2.0}}\noutputs: {image: a.color}\n"
+    (said,) = author.said(author.pipeline(text).check)
+    assert said == CHECKS[body].replace("{line}", str(author.line()) if "# here" in body else "")
 
 
 HELPER = "def shade(steps, port):\n    steps.fullscreen('wrong.frag', source=port.x)  # deep\n"

@@ -62,7 +62,7 @@ def test_a_graph_of_typed_nodes(toy_catalog: Catalog) -> None:
         "depth": (Endpoint("prepass", "depth"),),
     }
     assert graph["shadows"].inputs["depth"] == (Endpoint("prepass", "depth"),)
-    assert graph["light"].node.model_dump()["ambient"] == 1
+    assert dict(graph["light"].node)["ambient"] == 1
     assert graph["sun"].type.name == "shadow_map"
     assert graph.outputs == {"image": Endpoint("display", "color"), "radiance": Endpoint("light", "radiance")}
     assert str(graph["light"].place) == "<text>:7:3"
@@ -137,7 +137,7 @@ def test_unused_nodes_and_null_parameters_are_fine(toy_catalog: Catalog) -> None
     text = FORWARD.replace(
         "outputs:", "  lonely: {type: ssao, inputs: {depth: prepass}, params: {samples: null}}\noutputs:"
     )
-    assert linked(text, toy_catalog)["lonely"].node.model_dump()["samples"] == 16
+    assert dict(linked(text, toy_catalog)["lonely"].node)["samples"] == 16
 
 
 def test_last_frame_may_go_round(toy_catalog: Catalog) -> None:

@@ -133,7 +133,7 @@ CALLS = {
     "1 / 0": "RG420 ZeroDivisionError: division by zero",
     "exit(7)": "RG420 SystemExit: 7",
     "raise Exception": "RG420 Exception: ",
-    "self.gain = 2.0": "RG420 ValidationError: 1 validation error for Wrong gain Instance is frozen [type=frozen_instance, input_value=2.0, input_type=float]",
+    "self.gain = 2.0": "RG423 'gain' cannot be set: a node holds its parameters, which never change, and nothing else",
 }
 
 
