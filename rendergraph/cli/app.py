@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import importlib
 import os
 import signal
@@ -134,6 +136,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     if args is None:
         watch()
+        atexit.register(gc.freeze)  # all that is left goes with the process, and need not be looked through for cycles
     words = list(sys.argv[1:] if args is None else args)
     as_json = "--json" in words
     be_quiet(False)
