@@ -59,15 +59,11 @@ class ScreenSpaceOcclusion(Node):
 
     def gather_surfaces(self, steps: Steps) -> None:
         """Bring normals and distances into `surfaces`."""
-        size = steps.desc(self.surfaces).size
-        steps.fullscreen(
-            "surfaces.frag",
-            out=self.surfaces,
-            depth=self.depth,
-            normal=self.normal,
-            reduced=size,
-            defines=self.sizes(steps),
-        )
+        steps.fullscreen("surfaces.frag", out=self.surfaces, defines=self.sizes(steps), **self.gathered(steps))
+
+    def gathered(self, steps: Steps) -> dict[str, Any]:
+        """What surfaces are gathered from."""
+        return {"depth": self.depth, "normal": self.normal, "reduced": steps.desc(self.surfaces).size}
 
     def target(self, steps: Steps, small: Port) -> Port:
         """Where the last pass at reduced size goes: `occlusion` itself where nothing is reduced, else `small`."""

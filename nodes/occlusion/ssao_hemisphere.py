@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from rendergraph.api import Internal, Steps, define, param
+from typing import Any
+
+from rendergraph.api import Internal, Port, Steps, define, param, structural
 
 from ._kernel import spread_points
-from ._screen_space import ScreenSpaceOcclusion, reduced_size
+from ._refined import NONE, Ports, RefinedOcclusion
+from ._screen_space import reduced_size
 
 
-class SSAOHemisphere(ScreenSpaceOcclusion):
+class SSAOHemisphere(RefinedOcclusion):
     """How open each surface is, from points in the hemisphere above it that are projected back onto the depth.
 
     The classic of 2007 (Mittring, "Finding Next Gen", 2007). A point that lies behind the surface seen at its place is
@@ -17,12 +20,22 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
     64×64 noise texture, another at every pixel; along each lie one point within a fifth of the radius and three up to
     all of it, or up to where the direction leaves the picture. Four pixels share what they find, and a blur that stays
     on its surface takes the rest of the noise away.
+
+    By itself a quarter of the pixels does so, with three quarters more points, which leaves as much noise after a blur
+    of about the same span. The others are interpolated, and computed where that would show.
     """
 
     noise = Internal(format="rgba16_snorm", size=(64, 64), kept=True)
+    between = Internal(format="r16", size="depth")
     across = Internal(format="r16", size=reduced_size)
     blurred = Internal(format="r16", size=reduced_size)
 
+    scale: float = structural(
+        default=0.5,
+        min=0.125,
+        max=1,
+        doc="Share of the picture's width and height it is computed at, where `refine` does not ask for all.",
+    )
     samples: int = define(default=32, min=8, max=128, doc="Points looked at, four a direction; rounded down to fours.")
     animated: bool = define(default=False, doc="Other directions in each frame, for `accumulate` to put together.")
     blur: int = param(
@@ -30,7 +43,8 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
         unit="texels",
         min=0,
         max=16,
-        doc="How far the blur reaches to each side, at `scale`, in steps of two; 0 leaves each pixel what it found.",
+        doc="How far the blur reaches to each side; at a reduced size, with `refine`, three quarters as many of its "
+        "texels. 0 leaves each pixel what it found, and refines all.",
     )
     nearest: float = param(
         default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."
@@ -38,28 +52,44 @@ class SSAOHemisphere(ScreenSpaceOcclusion):
 
     def record(self, steps: Steps) -> None:
         """Surfaces, noise, occlusion, the blur's two axes, full size."""
-        screen, sizes = self.screen(steps), self.sizes(steps)
+        sizes = self.sizes(steps)
         self.gather_surfaces(steps)
         steps.fullscreen("noise.frag", out=self.noise)
+        if not self.refines(steps):
+            target = self.target(steps, self.blurred)
+            self._look(steps, self.unfiltered, self.samples, surfaces=self.surfaces, defines=sizes)
+            self._blur(steps, (self.unfiltered, self.across, target), surfaces=self.surfaces, defines=sizes)
+            if sizes:
+                self.upsample(steps, target, {"occlusion": self.occlusion}, {})
+            return
+        size, more = steps.desc(self.unfiltered).size, self.samples * 7 // 4
+        few: dict[str, Any] = {"surfaces": self.whole, "reduced": size, "defines": {"SPARSE": 1, "SAMPLES": more}}
+        self._look(steps, self.unfiltered, more, **few)
+        few = {"surfaces": self.surfaces, "defines": {"SPARSE": 1, **sizes}}
+        self._blur(steps, (self.unfiltered, self.across, self.blurred), **few)
+        out = {"occlusion": self.occlusion, "found": self.between}
+        self.interpolate(steps, self.blurred, out, defines={"BLURRED": 1})
+        self._look(steps, self.occlusion, self.samples, **self.over_marked())
+        self._blur(steps, (self.occlusion, self.between, self.occlusion), **self.over_marked())
+
+    def _look(self, steps: Steps, out: Port, samples: int, *, also: Ports = NONE, **options: Any) -> None:
         steps.fullscreen(
             "ssao_hemisphere.frag",
-            out=self.unfiltered,
-            surfaces=self.surfaces,
+            out={"unfiltered": out, **also},
             noise=self.noise,
-            directions=spread_points(self.samples // 4).tolist(),
-            screen=screen,
-            defines=sizes,
+            directions=spread_points(samples // 4).tolist(),
+            screen=self.screen(steps),
+            **options,
         )
-        target = self.target(steps, self.blurred)
-        for source, out, axis in ((self.unfiltered, self.across, (1, 0)), (self.across, target, (0, 1))):
+
+    def _blur(self, steps: Steps, ports: tuple[Port, Port, Port], *, also: Ports = NONE, **options: Any) -> None:
+        """Along both axes; ports are the source, what is between and the target."""
+        for source, out, axis in ((*ports[:2], (1, 0)), (*ports[1:], (0, 1))):
             steps.fullscreen(
                 "bilateral_blur.frag",
                 source=source,
-                out=out,
-                surfaces=self.surfaces,
+                out={"blurred": out, **also},
                 axis=axis,
-                screen=screen,
-                defines=sizes,
+                screen=self.screen(steps),
+                **options,
             )
-        if sizes:
-            self.upsample(steps, target, {"occlusion": self.occlusion}, {})

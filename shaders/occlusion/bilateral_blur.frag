@@ -18,7 +18,12 @@ void main() {
     vec3 position = view_position(v, place_for(texel, last + 1, screen), here.w);
     float tolerance = 0.1 * radius + depth_error(v, here.w);
     ivec2 odd = texel & axis;
-    int reach = blur >> 1 << 1;
+#ifdef SPARSE
+    int wide = blur * 3 >> 2;  // each has looked at more points, and is about more of the picture
+#else
+    int wide = blur;
+#endif
+    int reach = wide >> 1 << 1;
     float aside = 0.5 - float(odd.x + odd.y);  // from the texel to the middle of its four
     float total = 1e-3;  // of its own, should no other lie on its surface
     float sum = total * texelFetch(source, texel, 0).r;
@@ -26,7 +31,7 @@ void main() {
         ivec2 there = clamp(texel + i * axis, ivec2(0), last);
         vec4 seen = texelFetch(surfaces, there, 0);
         vec3 offset = view_position(v, place_for(there, last + 1, screen), seen.w) - position;
-        float within = clamp(0.5 * (float(reach) + 1.0 - abs(float(i) + aside)), 0.0, 1.0);
+        float within = clamp(0.5 * (float(wide) + 1.0 - abs(float(i) + aside)), 0.0, 1.0);
         float weight = within * same_surface(offset, here.xyz, seen.xyz, tolerance);
         sum += weight * texelFetch(source, there, 0).r;
         total += weight;

@@ -28,11 +28,7 @@ float brightened(float open) {
 
 void finish(Value value) {
 #ifdef FINAL
-#ifdef FOUR
-    float open = value.w;
-#else
-    float open = value;
-#endif
+    float open = openness(value);
 #ifdef WRITES_OCCLUSION
 #ifdef MULTI_BOUNCE
     occlusion = brightened(clamp(open, 0.0, 1.0));

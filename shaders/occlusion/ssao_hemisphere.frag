@@ -87,13 +87,13 @@ float blocked_along(View v, Start here, ivec2 size, vec3 along, float jitter) {
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = ivec2(gl_FragCoord.xy);
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
     ivec2 size = textureSize(surfaces, 0);
-    Start here = start_at(v, texel, vec2(size));
+    Start here = start_at(v, texel_here(size), vec2(size));
 #if ANIMATED
-    vec4 random = texelFetch(noise, texel + frame_index * ivec2(37, 19) & 63, 0);
+    vec4 random = texelFetch(noise, pixel + frame_index * ivec2(37, 19) & 63, 0);
 #else
-    vec4 random = texelFetch(noise, texel & 63, 0);
+    vec4 random = texelFetch(noise, pixel & 63, 0);
 #endif
     vec3 mirror = normalize(random.xyz);
     float blocked = 0.0;

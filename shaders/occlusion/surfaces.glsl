@@ -2,14 +2,32 @@
 // view axis in metres, 0 where nothing is. The picture may be smaller than the screen; each of its texels then holds
 // the surface of one of the screen's, not a mean of several.
 
-// The texel of a picture of size `screen` that a texel of a picture of size `small` stands for; without REDUCED they
-// are of one size. Numbers with a point are divided: whole ones some processors can only divide one by one.
-ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
-#ifdef REDUCED
+// The texel of a picture of size `screen` that a texel of a picture of size `small` stands for. Numbers with a point
+// are divided: whole ones some processors can only divide one by one.
+ivec2 stands_for(ivec2 texel, ivec2 small, ivec2 screen) {
     vec2 step = vec2(screen) / vec2(small);
     return ivec2((vec2(texel) + 0.5) * step + 0.25 / vec2(small));
+}
+
+// The same where `surfaces` are of the smaller size; without REDUCED they are the screen's.
+ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
+#ifdef REDUCED
+    return stands_for(texel, small, screen);
 #else
     return texel;
+#endif
+}
+
+#ifdef SPARSE
+uniform ivec2 reduced;  // size of the target, whose pixels look at all of a larger picture's surfaces
+#endif
+
+// The texel of `surfaces` that this pixel is about.
+ivec2 texel_here(ivec2 size) {
+#ifdef SPARSE
+    return stands_for(ivec2(gl_FragCoord.xy), reduced, size);
+#else
+    return ivec2(gl_FragCoord.xy);
 #endif
 }
 

@@ -8,3 +8,11 @@ const Value NOTHING = vec4(0.0, 0.0, 0.0, 1.0);
 #define PARTS r
 const Value NOTHING = 1.0;
 #endif
+
+float openness(Value value) {
+#ifdef FOUR
+    return value.w;
+#else
+    return value;
+#endif
+}

@@ -252,7 +252,7 @@ def test_what_needs_an_environment_is_shown_under_one_and_what_a_step_does_not_b
 def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) -> None:
     shown = cli("explain", "ao", "--glsl", "--pipeline", "ssao-hemisphere", "--step", "2").out
     assert "step 2 of node 'ao' (ssao_hemisphere)" in shown
-    assert "//   3  fullscreen  bilateral_blur.frag" in shown
+    assert "//   4  fullscreen  bilateral_blur.frag" in shown
     (tmp_path / "two.yaml").write_text(
         "scene: 1\nobjects: {a: {shape: box}, b: {shape: plane, material: thin}}\nmaterials: {thin: {double_sided: true}}\n"
     )

@@ -113,7 +113,7 @@ nodes:
   ao:
     type: shown_occlusion
     inputs: {{depth: g.depth, normal: g.normal}}
-    params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, samples: {SAMPLES}}}
+    params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, refine: false, samples: {SAMPLES}}}
   disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}, form: disc}}}}
 outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, unfiltered: ao.unfiltered, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
 """)

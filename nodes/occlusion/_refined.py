@@ -1,0 +1,69 @@
+"""What the occlusions share that compute few pixels of a picture and interpolate where those agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+from rendergraph.api import Depth, Internal, Port, State, Steps, param, structural
+
+from ._screen_space import ScreenSpaceOcclusion
+
+Ports = Mapping[str, Port]
+Macros = Mapping[str, int]
+NONE: Final[Mapping[str, Any]] = MappingProxyType({})
+MARKED = State(depth_test=True, depth_write=False)
+
+
+class RefinedOcclusion(ScreenSpaceOcclusion):
+    """Base of the techniques that work at two sizes: reduced, and the picture's own where that does not do.
+
+    Dual-resolution occlusion (Bavoil and Sainz, "Multi-Layer Dual-Resolution Screen-Space Ambient Occlusion", 2009).
+    Reduced pixels look at the surfaces of the whole picture. A pixel of the picture takes the mean of the four around
+    it that lie on its own surface; where none does, or they differ, it is marked, and the technique's passes are drawn
+    once more over what is marked. The marks are a depth: its test leaves out blocks of pixels before a shader begins.
+    """
+
+    whole = Internal(format="rgba32f", size="depth", view="depth")
+    marks = Internal(Depth, format="depth16", size="depth")
+
+    refine: bool = structural(
+        default=True, doc="At a reduced size, compute all pixels where reduced ones differ or are on another surface."
+    )
+    contrast: float = param(
+        default=0.05, min=0, max=1, doc="What reduced pixels may differ by and still be interpolated; with `refine`."
+    )
+
+    def refines(self, steps: Steps) -> bool:
+        """Whether there are two sizes."""
+        return self.refine and bool(self.sizes(steps))
+
+    def gather_surfaces(self, steps: Steps) -> None:
+        """Bring normals and distances into `surfaces`, and with two sizes the picture's into `whole`."""
+        super().gather_surfaces(steps)
+        if self.refines(steps):
+            steps.fullscreen("surfaces.frag", out={"surfaces": self.whole}, **self.gathered(steps))
+
+    def over_marked(self) -> dict[str, Any]:
+        """Arguments of steps over the pixels that `interpolate` has marked; `also` is for their `out`."""
+        return {"surfaces": self.whole, "state": MARKED, "also": {"marks": self.marks}}
+
+    def interpolate(self, steps: Steps, source: Port, out: Ports, defines: Macros = NONE) -> None:
+        """Bring what is reduced to full size, and mark the pixels that it says too little about.
+
+        Args:
+            steps: what records it.
+            source: a reduced texture, without noise.
+            out: what is made of it, by the names in `finish.glsl`, and as `found` where the steps put what they filter.
+            defines: what of it there is to make, and `BLURRED` where `blur` may be 0 and leave the noise in.
+        """
+        steps.fullscreen(
+            "refine.frag",
+            out={**out, "marks": self.marks},
+            state=State(depth_test=False),
+            source=source,
+            surfaces=self.whole,
+            reduced_surfaces=self.surfaces,
+            defines={**defines, "FINAL": 1},
+        )

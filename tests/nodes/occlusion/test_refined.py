@@ -1,0 +1,54 @@
+"""Occlusion at two sizes against the same at the picture's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from .conftest import Occlusion
+
+Floats = npt.NDArray[np.float64]
+
+STUDY = """objects:
+  floor: {shape: plane, size: [20, 20]}
+  wall: {shape: box, size: [4, 2, 0.1], at: [0, 1, -0.6]}
+  ball: {shape: sphere, radius: 0.5, at: [0.9, 0.5, 0.3]}
+  post1: {shape: cylinder, radius: 0.03, height: 1.5, at: [-0.9, 0.75, 0]}
+  post2: {shape: cylinder, radius: 0.03, height: 1.5, at: [-0.6, 0.75, 0.3]}
+  post3: {shape: cylinder, radius: 0.03, height: 1.5, at: [-0.2, 0.75, 0.5]}
+cameras: {main: {eye: [0, 2.2, 4], target: [0, 0.5, 0], fov_y_degrees: 40, near: 0.1, far: 60}}
+"""
+SIZE = (96, 72)
+TECHNIQUES = pytest.mark.parametrize("technique", ["hemisphere"])
+
+
+@pytest.fixture
+def apart(occlusion: Occlusion) -> Occlusion:
+    """`apart(technique, **params)`: how far two sizes are off the whole one, per pixel."""
+
+    def difference(technique: str, **params: float) -> Floats:
+        both = (occlusion(technique, STUDY, SIZE, samples=128, radius=0.5, scale=scale, **params) for scale in (0.5, 1))
+        two, whole = both
+        assert whole.min() < 0.6
+        return np.asarray(np.abs(two - whole))
+
+    return difference
+
+
+@TECHNIQUES
+def test_edges_and_contacts_are_those_of_the_whole_size(apart: Occlusion, technique: str) -> None:
+    """Posts two texels wide, silhouettes before others and before nothing, corners: no halo, nothing leaks."""
+    two = apart(technique)
+    assert two.max() < 0.2
+    assert np.quantile(two, 0.99) < 0.06
+    mean = np.sqrt((two**2).mean())
+    assert mean < 0.015
+    assert mean < 0.7 * np.sqrt((apart(technique, contrast=1) ** 2).mean())
+
+
+def test_without_a_blur_every_pixel_is_its_own(occlusion: Occlusion) -> None:
+    """Noise is not interpolated: pixel by pixel the picture that knows of no other size."""
+    two, whole = (occlusion("hemisphere", STUDY, SIZE, radius=0.5, blur=0, scale=scale) for scale in (0.5, 1))
+    assert whole.std() > 0.1
+    np.testing.assert_array_equal(two, whole)
