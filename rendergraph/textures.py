@@ -5,7 +5,6 @@ Nothing here touches GL: a format knows its GL enum as a number so that `gl` nee
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from msgspec import Struct
@@ -92,8 +91,7 @@ def _formats() -> dict[str, Format]:
 FORMATS: dict[str, Format] = _formats()
 
 
-@dataclass(frozen=True)
-class Semantic:
+class Semantic(Struct, frozen=True):
     """What the texels of a port mean.
 
     Attributes:
@@ -152,8 +150,7 @@ SEMANTICS: tuple[Semantic, ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Signature:
+class Signature(Struct, frozen=True):
     """A function that one node provides and another calls inside its shader.
 
     Attributes:

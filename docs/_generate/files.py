@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 import re
 from collections.abc import Iterator
 from typing import Any
+
+import msgspec
 
 from rendergraph import document
 from rendergraph.catalog import entries, find
@@ -88,7 +89,7 @@ def _documented(of: str, kind: str, limits: Any) -> list[tuple[str, str, int, st
     """The fields of a class of limits, as its docstring explains them, and what `--limit` calls them."""
     doc = re.sub(r"\n {8,}", " ", inspect.getdoc(limits) or "")
     about = dict(re.findall(r"^ +(\w+): (.*)$", doc, re.MULTILINE))
-    values = {field.name: getattr(limits, field.name) for field in dataclasses.fields(limits)}
+    values = msgspec.structs.asdict(limits)
     return [
         (of, about[name].rstrip("."), most, f"{kind}-{name.replace('_', '-')}=N")
         for name, most in values.items()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
 from msgspec import Struct
@@ -17,8 +16,7 @@ SHADERS = (".frag", ".comp")
 """Endings of shader files that are nodes by themselves: full-screen and compute."""
 
 
-@dataclass(frozen=True)
-class NodeType:
+class NodeType(Struct, frozen=True):
     """One node type.
 
     Attributes:
@@ -43,7 +41,7 @@ class NodeType:
     warnings: tuple[Problem, ...] = ()
     inherited: tuple[Path, ...] = ()
     missing: bool = False
-    text: str = field(default="", repr=False)
+    text: str = ""
 
     @property
     def is_shader(self) -> bool:

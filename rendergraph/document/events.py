@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Any
+
+from msgspec import Struct
 
 from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Broken, Document, Scalar, Source, Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem
 
 
-@dataclass(frozen=True)
-class YamlLimits:
+class YamlLimits(Struct, frozen=True):
     """Budgets of one YAML file; each is a small multiple of what a person writes.
 
     Attributes:

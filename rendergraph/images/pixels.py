@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 
 from rendergraph.errors import Place, Problem
 from rendergraph.images.encode import HALF_MAX
@@ -16,8 +16,7 @@ from rendergraph.scene.model import ImageSource
 Pixels: TypeAlias = npt.NDArray[Any]
 
 
-@dataclass(frozen=True)
-class ImageLimits:
+class ImageLimits(Struct, frozen=True):
     """What an image may claim.
 
     Attributes:

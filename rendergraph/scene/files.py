@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import stat
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -29,8 +28,7 @@ CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 _MOST_WARNINGS = 50
 
 
-@dataclass(frozen=True)
-class SceneLimits:
+class SceneLimits(Struct, frozen=True):
     """How much a scene may ask for.
 
     Attributes:

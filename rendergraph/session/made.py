@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
+
+from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import shipped_pipelines
@@ -56,8 +57,7 @@ def _inside(folder: Path) -> str | None:
     return None if text == "." else text
 
 
-@dataclass(frozen=True)
-class Made:
+class Made(Struct, frozen=True):
     """What a picture says of how it was made.
 
     Attributes:

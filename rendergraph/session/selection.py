@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from numbers import Integral
 from pathlib import Path
 from typing import Any, TypedDict
@@ -86,7 +86,7 @@ def _limit_names() -> dict[str, dict[str, str]]:
     from rendergraph.scene.files import SceneLimits
 
     names = {
-        kind: {f"{kind}-{entry.name.replace('_', '-')}": entry.name for entry in fields(limits)}
+        kind: {f"{kind}-{name.replace('_', '-')}": name for name in limits.__struct_fields__}
         for kind, limits in (("yaml", YamlLimits), ("scene", SceneLimits))
     }
     return {**names, "plan": {"plan-memory": "memory"}}

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
+from msgspec import Struct
+
 from rendergraph.textures import FORMATS, TextureDesc
 
 if TYPE_CHECKING:
@@ -19,8 +21,7 @@ if TYPE_CHECKING:
     from rendergraph.session.selection import RenderOptions, Selection
 
 
-@dataclass(frozen=True)
-class Wanted:
+class Wanted(Struct, frozen=True):
     """A port whose texture must exist at the end of a frame, and what of it is read.
 
     Attributes:
