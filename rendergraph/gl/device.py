@@ -168,7 +168,9 @@ def open_device(index: int | None = None) -> Device:
     try:
         with previous_context():
             backend = glcontext.get_backend_by_name("egl")
-            context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen)
+            # By their names, which every Linux has: to look for them takes two processes more.
+            names = {"libgl": "libGL.so.1", "libegl": "libEGL.so.1"}
+            context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
             ctx = moderngl.create_context(context=context)
             return wrap(ctx, context.load, owned=True)
     except DeviceError:
