@@ -7,6 +7,7 @@ from typing import Any
 
 from rendergraph.api import Internal, Port, Steps, define
 
+from ._refined import MARKED, RefinedOcclusion
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
 
 
@@ -76,3 +77,41 @@ class ArmOcclusion(ScreenSpaceOcclusion):
             )
         if sizes:
             self.upsample(steps, found if smooth % 2 else small, out, macros)
+
+
+class RefinedArms(RefinedOcclusion, ArmOcclusion):
+    """Base of those of them that work at two sizes: whose neighbours' mean is all the filter there is."""
+
+    shared_later = Internal(format="r16f", size="depth")
+    shared_later_four = Internal(format="rgba16f", size="depth")
+
+    def look(
+        self,
+        steps: Steps,
+        fragment: str,
+        out: Mapping[str, Port],
+        *,
+        four: bool = False,
+        smooth: int = 0,
+        defines: Mapping[str, int] | None = None,
+        **reads: Any,
+    ) -> None:
+        """Surfaces, what a shader finds out and the neighbours' mean at a reduced size, and again what that lacks."""
+        if not self.refines(steps):
+            super().look(steps, fragment, out, four=four, smooth=smooth, defines=defines, **reads)
+            return
+        macros = {**(defines or {}), **({"FOUR": 1} if four else {})}
+        found, small = (self.unfiltered_four, self.neighbours_four) if four else (self.unfiltered, self.neighbours)
+        later = self.shared_later_four if four else self.shared_later
+        screen = {"screen": self.screen(steps)}
+        self.gather_surfaces(steps)
+        few = {"surfaces": self.whole, "reduced": steps.desc(found).size, "defines": {**macros, "SPARSE": 1}}
+        steps.fullscreen(fragment, out=found, **screen, **few, **reads)
+        few = {"surfaces": self.surfaces, "defines": {**macros, **self.sizes(steps)}}
+        steps.fullscreen("neighbours_mean.frag", out={"mean": small}, unfiltered=found, **screen, **few)
+        self.interpolate(steps, small, {**out, "found": later}, macros)
+        marked = {"surfaces": self.whole, "state": MARKED, **screen}
+        marks = {"marks": self.marks}
+        steps.fullscreen(fragment, out={"unfiltered": later, **marks}, defines=macros, **marked, **reads)
+        final = {**macros, "FINAL": 1}
+        steps.fullscreen("neighbours_mean.frag", out={**out, **marks}, unfiltered=later, defines=final, **marked)

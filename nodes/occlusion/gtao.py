@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from rendergraph.api import Normal, Output, Port, Steps, param
 
-from ._arms import ArmOcclusion
+from ._arms import RefinedArms
 
 
-class GTAO(ArmOcclusion):
+class GTAO(RefinedArms):
     """How open each surface is, and where to: the share of a white sky's light that reaches it.
 
     Ground-truth ambient occlusion (Jiménez, Wu, Pesce and Jarabo, "Practical Real-Time Strategies for Accurate Indirect

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from rendergraph.api import Steps, param
 
-from ._arms import ArmOcclusion
+from ._arms import RefinedArms
 
 
-class HBAO(ArmOcclusion):
+class HBAO(RefinedArms):
     """How open each surface is, from how high the picture's surfaces rise around it.
 
     Horizon-based ambient occlusion (Bavoil and Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008): the depth

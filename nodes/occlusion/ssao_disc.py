@@ -6,10 +6,10 @@ from typing import Literal
 
 from rendergraph.api import Steps, define, param, structural
 
-from ._arms import ArmOcclusion
+from ._arms import RefinedArms
 
 
-class SSAODisc(ArmOcclusion):
+class SSAODisc(RefinedArms):
     """How open each surface is, from the surfaces seen in a disc around it on the screen.
 
     Positions are reconstructed, and each sample hides some of the sky. By itself it is a strip of its arm's slice: from

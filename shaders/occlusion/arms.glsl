@@ -12,8 +12,9 @@
 #endif
 #define ARMS (SAMPLES / STEPS / 2 * 2)
 
-// Unit vector of a pixel's arm 0 of `arms` on the screen.
-vec2 first_arm(ivec2 texel, int arms) {
+// Unit vector of this pixel's arm 0 of `arms` on the screen.
+vec2 first_arm(int arms) {
+    ivec2 texel = ivec2(gl_FragCoord.xy);
     float turn = float((texel.x + texel.y & 3) << 2 | texel.x & 3) + 0.5;
 #if ANIMATED
     turn = 16.0 * fract(turn / 16.0 + 0.618034 * float(frame_index & 1023));
@@ -22,8 +23,9 @@ vec2 first_arm(ivec2 texel, int arms) {
     return vec2(cos(angle), sin(angle));
 }
 
-// How far the samples of a pixel's arm lie within their steps, 0 to 1.
-float stretch_of(ivec2 texel, int arm) {
+// How far the samples of its arm lie within their steps, 0 to 1.
+float stretch_of(int arm) {
+    ivec2 texel = ivec2(gl_FragCoord.xy);
     float stretch = float((texel.y - texel.x & 3) << 2 | texel.y & 3) + 0.5;
 #if ANIMATED
     stretch += 16.0 * 0.754878 * float(frame_index & 1023);

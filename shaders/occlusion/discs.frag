@@ -42,13 +42,13 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     float w = clip_w(v, here.w);
     float region = radius * wider;
     vec2 reach = covered(v, region, w);
-    vec2 along = first_arm(texel, ARMS);
+    vec2 along = first_arm(ARMS);
     vec3 eye = to_eye(v, position);
     float blocked = 0.0;
     float whole = 0.0;  // what could be, of all arms
     vec3 light = vec3(0.0);
     for (int arm = 0; arm < ARMS; ++arm) {
-        float stretch = stretch_of(texel, arm);
+        float stretch = stretch_of(arm);
         float horizon = -1.0;  // cosine of the angle to the eye; what lies below is hidden already
         float hidden = 0.0;
 #ifdef STRIPS
@@ -135,7 +135,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = ivec2(gl_FragCoord.xy);
+    ivec2 texel = texel_here(textureSize(surfaces, 0));
     vec4 here = texelFetch(surfaces, texel, 0);
     vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
     vec3 position = view_position(v, middle, here.w);

@@ -13,10 +13,10 @@ float open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     ivec2 size = textureSize(surfaces, 0);
     vec2 reach = covered(v, radius, clip_w(v, here.w));
     vec3 eye = to_eye(v, position);
-    vec2 along = first_arm(texel, ARMS);
+    vec2 along = first_arm(ARMS);
     float blocked = 0.0;
     for (int arm = 0; arm < ARMS; ++arm) {
-        float stretch = stretch_of(texel, arm);
+        float stretch = stretch_of(arm);
         // The tangent plane's line in the arm's slice, by its cosine to the eye: the sine of its elevation.
         vec3 across = normalize(cross(vec3(along, 0.0), eye));
         vec3 tangent = cross(here.xyz, across);
@@ -43,7 +43,7 @@ float open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = ivec2(gl_FragCoord.xy);
+    ivec2 texel = texel_here(textureSize(surfaces, 0));
     vec4 here = texelFetch(surfaces, texel, 0);
     vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
     vec3 position = view_position(v, middle, here.w);

@@ -33,14 +33,14 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     float region = radius * wider;
     vec2 reach = covered(v, region, clip_w(v, here.w));
     vec3 eye = to_eye(v, position);
-    vec2 along = first_arm(texel, ARMS);
+    vec2 along = first_arm(ARMS);
     vec3 light = vec3(0.0);
     float blocked = 0.0;
     float whole = 0.0;
     for (int number = 0; number < ARMS / 2; ++number) {
         Slice s = slice_along(along, eye, here.xyz);
         float weight = s.share * s.whole / 32.0;
-        float stretch = stretch_of(texel, number);
+        float stretch = stretch_of(number);
         Sights sights = sights_along(v, middle, reach * along);
         uint filled = 0u;    // by all in the region
         uint occluded = 0u;  // by what is within the radius
@@ -81,7 +81,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = ivec2(gl_FragCoord.xy);
+    ivec2 texel = texel_here(textureSize(surfaces, 0));
     vec4 here = texelFetch(surfaces, texel, 0);
     vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
     vec3 position = view_position(v, middle, here.w);
