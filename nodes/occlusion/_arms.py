@@ -103,14 +103,18 @@ class RefinedArms(RefinedOcclusion, ArmOcclusion):
         macros = {**(defines or {}), **({"FOUR": 1} if four else {})}
         found, small = (self.unfiltered_four, self.neighbours_four) if four else (self.unfiltered, self.neighbours)
         later = self.shared_later_four if four else self.shared_later
-        screen = {"screen": self.screen(steps)}
+        screen: dict[str, Any] = {"screen": self.screen(steps)}
         self.gather_surfaces(steps)
-        few = {"surfaces": self.whole, "reduced": steps.desc(found).size, "defines": {**macros, "SPARSE": 1}}
+        few: dict[str, Any] = {
+            "surfaces": self.whole,
+            "reduced": steps.desc(found).size,
+            "defines": {**macros, "SPARSE": 1},
+        }
         steps.fullscreen(fragment, out=found, **screen, **few, **reads)
         few = {"surfaces": self.surfaces, "defines": {**macros, **self.sizes(steps)}}
         steps.fullscreen("neighbours_mean.frag", out={"mean": small}, unfiltered=found, **screen, **few)
         self.interpolate(steps, small, {**out, "found": later}, macros)
-        marked = {"surfaces": self.whole, "state": MARKED, **screen}
+        marked: dict[str, Any] = {"surfaces": self.whole, "state": MARKED, **screen}
         marks = {"marks": self.marks}
         steps.fullscreen(fragment, out={"unfiltered": later, **marks}, defines=macros, **marked, **reads)
         final = {**macros, "FINAL": 1}
