@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import structs
 
 from rendergraph.authoring.feed import Surrounded
 from rendergraph.authoring.gl_watch import let_go, living, watched
@@ -77,7 +78,7 @@ class Trial:
         self._before = living(self.device, _MOST_NAMES)
         self.gpu = Gpu(ctx=self.device.ctx)
         cls = watched(self.type.cls, self.gpu.device, self._state)
-        self.around = Surrounded(replace(self.type, cls=cls), self.folder)
+        self.around = Surrounded(structs.replace(self.type, cls=cls), self.folder)
         self._fed: dict[str, npt.NDArray[Any]] = {}
         self._fills_buffers = self.type.cls.update is not Node.update  # perhaps once and for all
 
