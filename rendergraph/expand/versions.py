@@ -26,6 +26,13 @@ from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Where, Write
 from rendergraph.textures import FORMATS, BufferDesc, Sampler, TextureDesc
 
+_TAKEN_OVER = frozenset(
+    """
+    label state region objects materials order in_place per_light topology command instances groups invocations
+    """.split()  # noqa: SIM905 - a list of so many words reads best as text
+)
+"""Options of a request that a step has as they are."""
+
 
 def versioned(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> Versioned:
     """Count the versions of every resource.
@@ -106,8 +113,10 @@ class _Versions:
             role: Role = "transient"
             if is_kept(port):
                 role = "kept"
-            elif isinstance(port, Internal | History):
-                role = "internal" if isinstance(port, Internal) else "history"
+            elif isinstance(port, Internal):
+                role = "internal"
+            elif isinstance(port, History):
+                role = "history"
             resource = Resource(str(end), desc, role, port.first or 0.0, info.view, info.lights)
             self.resources[resource.id] = resource
             self.version[resource.id] = 0
@@ -164,21 +173,6 @@ class _Versions:
         for layout, port in attributes.items():
             reads += self._reads(recording, port.name, Part(port))
             held.append((layout, reads[-1].resource))
-        keep = (
-            "label",
-            "state",
-            "region",
-            "objects",
-            "materials",
-            "order",
-            "in_place",
-            "per_light",
-            "topology",
-            "command",
-            "instances",
-            "groups",
-            "invocations",
-        )
         return Step(
             node=node.id,
             index=index,
@@ -199,7 +193,7 @@ class _Versions:
             type=node.type.name,
             where=Where(node.place, request.caller),
             if_drawn=_numbered(recording, options.get("if_drawn", ""), index),
-            **{key: options[key] for key in keep if key in options},
+            **{key: value for key, value in options.items() if key in _TAKEN_OVER},
         )
 
     def _own(self, recording: Recording, port: Port) -> str:

@@ -204,8 +204,7 @@ class _Linker:
         self.missing += wrong if self.spec.missing else ()
         for problem in (*problems, *wrong):
             self._say(problem)
-        ports = node_type.cls.ports()
-        inputs = {name: port for name, port in ports.items() if isinstance(port, Input | InOut)}
+        ports, inputs = node_type.cls.ports(), node_type.cls.inputs()
         return Draft(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
 
     # Links ------------------------------------------------------------------------------------------------------------

@@ -16,6 +16,11 @@ from rendergraph.link.names import Draft, Link, line_of
 
 def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
     """One problem for each knot of nodes that need each other in the same frame."""
+    try:
+        TopologicalSorter(sources(nodes)).prepare()
+        return []
+    except CycleError:
+        import networkx as nx  # for the message of a mistake alone
     links = {
         (link.source.node, draft.spec.id): (name, link)
         for draft in nodes.values()
@@ -23,11 +28,6 @@ def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
         for link in ends
         if not link.source.previous
     }
-    try:
-        TopologicalSorter(sources(nodes)).prepare()
-        return []
-    except CycleError:
-        import networkx as nx  # for the message of a mistake alone
     graph: nx.DiGraph[str] = nx.DiGraph()
     graph.add_nodes_from(nodes)
     graph.add_edges_from(links)
