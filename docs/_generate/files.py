@@ -89,7 +89,7 @@ def _documented(of: str, kind: str, limits: Any) -> list[tuple[str, str, int, st
     """The fields of a class of limits, as its docstring explains them, and what `--limit` calls them."""
     doc = re.sub(r"\n {8,}", " ", inspect.getdoc(limits) or "")
     about = dict(re.findall(r"^ +(\w+): (.*)$", doc, re.MULTILINE))
-    values = msgspec.structs.asdict(limits)
+    values = {found.name: found.default for found in msgspec.structs.fields(limits)}
     return [
         (of, about[name].rstrip("."), most, f"{kind}-{name.replace('_', '-')}=N")
         for name, most in values.items()
