@@ -43,8 +43,8 @@ class SSAOHemisphere(RefinedOcclusion):
         unit="texels",
         min=0,
         max=16,
-        doc="How far the blur reaches to each side; at a reduced size, with `refine`, three quarters as many of its "
-        "texels. 0 leaves each pixel what it found, and refines all.",
+        doc="How far the blur reaches to each side; with `refine` three quarters as many of the reduced size. 0 leaves "
+        "each pixel what it found, and refines all.",
     )
     nearest: float = param(
         default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."

@@ -136,7 +136,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     if args is None:
         watch()
-        atexit.register(gc.freeze)  # all that is left goes with the process, and need not be looked through for cycles
+        atexit.register(_leave)
     words = list(sys.argv[1:] if args is None else args)
     as_json = "--json" in words
     be_quiet(False)
@@ -192,6 +192,12 @@ def _invoke(words: list[str]) -> int:
     except click.exceptions.Exit as done:
         return int(done.exit_code)
     return 0
+
+
+def _leave() -> None:
+    """All that is left goes with the process, and need not be looked through for cycles."""
+    if "OpenImageIO" not in sys.modules:  # whose bindings tell of every object that is still there
+        gc.freeze()
 
 
 def _told(problems: Sequence[Problem], code: int, as_json: bool) -> int:
