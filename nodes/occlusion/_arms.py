@@ -7,7 +7,7 @@ from typing import Any
 
 from rendergraph.api import Internal, Port, Steps, define
 
-from ._refined import MARKED, RefinedOcclusion
+from ._refined import RefinedOcclusion
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
 
 
@@ -92,13 +92,12 @@ class RefinedArms(RefinedOcclusion, ArmOcclusion):
         out: Mapping[str, Port],
         *,
         four: bool = False,
-        smooth: int = 0,
         defines: Mapping[str, int] | None = None,
         **reads: Any,
     ) -> None:
         """Surfaces, what a shader finds out and the neighbours' mean at a reduced size, and again what that lacks."""
         if not self.refines(steps):
-            super().look(steps, fragment, out, four=four, smooth=smooth, defines=defines, **reads)
+            super().look(steps, fragment, out, four=four, defines=defines, **reads)
             return
         macros = {**(defines or {}), **({"FOUR": 1} if four else {})}
         found, small = (self.unfiltered_four, self.neighbours_four) if four else (self.unfiltered, self.neighbours)
@@ -114,8 +113,6 @@ class RefinedArms(RefinedOcclusion, ArmOcclusion):
         few = {"surfaces": self.surfaces, "defines": {**macros, **self.sizes(steps)}}
         steps.fullscreen("neighbours_mean.frag", out={"mean": small}, unfiltered=found, **screen, **few)
         self.interpolate(steps, small, {**out, "found": later}, macros)
-        marked: dict[str, Any] = {"surfaces": self.whole, "state": MARKED, **screen}
-        marks = {"marks": self.marks}
-        steps.fullscreen(fragment, out={"unfiltered": later, **marks}, defines=macros, **marked, **reads)
+        steps.fullscreen(fragment, defines=macros, **self.over_marked({"unfiltered": later}), **screen, **reads)
         final = {**macros, "FINAL": 1}
-        steps.fullscreen("neighbours_mean.frag", out={**out, **marks}, unfiltered=later, defines=final, **marked)
+        steps.fullscreen("neighbours_mean.frag", unfiltered=later, defines=final, **self.over_marked(out), **screen)

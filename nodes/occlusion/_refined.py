@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any, Final
+from typing import Any
 
 from rendergraph.api import Depth, Internal, Port, State, Steps, param, structural
 
 from ._screen_space import ScreenSpaceOcclusion
-
-Ports = Mapping[str, Port]
-Macros = Mapping[str, int]
-NONE: Final[Mapping[str, Any]] = MappingProxyType({})
-MARKED = State(depth_test=True, depth_write=False)
 
 
 class RefinedOcclusion(ScreenSpaceOcclusion):
@@ -45,11 +39,14 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
         if self.refines(steps):
             steps.fullscreen("surfaces.frag", out={"surfaces": self.whole}, **self.gathered(steps))
 
-    def over_marked(self) -> dict[str, Any]:
-        """Arguments of steps over the pixels that `interpolate` has marked; `also` is for their `out`."""
-        return {"surfaces": self.whole, "state": MARKED, "also": {"marks": self.marks}}
+    def over_marked(self, out: Mapping[str, Port]) -> dict[str, Any]:
+        """Arguments of a step over the pixels that `interpolate` has marked."""
+        state = State(depth_test=True, depth_write=False)
+        return {"out": {**out, "marks": self.marks}, "surfaces": self.whole, "state": state}
 
-    def interpolate(self, steps: Steps, source: Port, out: Ports, defines: Macros = NONE) -> None:
+    def interpolate(
+        self, steps: Steps, source: Port, out: Mapping[str, Port], defines: Mapping[str, int] | None = None
+    ) -> None:
         """Bring what is reduced to full size, and mark the pixels that it says too little about.
 
         Args:
@@ -65,5 +62,5 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
             source=source,
             surfaces=self.whole,
             reduced_surfaces=self.surfaces,
-            defines={**defines, "FINAL": 1},
+            defines={**(defines or {}), "FINAL": 1},
         )

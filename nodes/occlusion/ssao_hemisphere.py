@@ -7,7 +7,7 @@ from typing import Any
 from rendergraph.api import Internal, Port, Steps, define, param, structural
 
 from ._kernel import spread_points
-from ._refined import NONE, Ports, RefinedOcclusion
+from ._refined import RefinedOcclusion
 from ._screen_space import reduced_size
 
 
@@ -55,41 +55,37 @@ class SSAOHemisphere(RefinedOcclusion):
         sizes = self.sizes(steps)
         self.gather_surfaces(steps)
         steps.fullscreen("noise.frag", out=self.noise)
+        found = {"unfiltered": self.unfiltered}
         if not self.refines(steps):
             target = self.target(steps, self.blurred)
-            self._look(steps, self.unfiltered, self.samples, surfaces=self.surfaces, defines=sizes)
+            self._look(steps, self.samples, out=found, surfaces=self.surfaces, defines=sizes)
             self._blur(steps, (self.unfiltered, self.across, target), surfaces=self.surfaces, defines=sizes)
             if sizes:
                 self.upsample(steps, target, {"occlusion": self.occlusion}, {})
             return
         size, more = steps.desc(self.unfiltered).size, self.samples * 7 // 4
-        few: dict[str, Any] = {"surfaces": self.whole, "reduced": size, "defines": {"SPARSE": 1, "SAMPLES": more}}
-        self._look(steps, self.unfiltered, more, **few)
-        few = {"surfaces": self.surfaces, "defines": {"SPARSE": 1, **sizes}}
-        self._blur(steps, (self.unfiltered, self.across, self.blurred), **few)
+        self._look(steps, more, out=found, surfaces=self.whole, reduced=size, defines={"SPARSE": 1, "SAMPLES": more})
+        few = {"SPARSE": 1, **sizes}
+        self._blur(steps, (self.unfiltered, self.across, self.blurred), surfaces=self.surfaces, defines=few)
         out = {"occlusion": self.occlusion, "found": self.between}
         self.interpolate(steps, self.blurred, out, defines={"BLURRED": 1})
-        self._look(steps, self.occlusion, self.samples, **self.over_marked())
-        self._blur(steps, (self.occlusion, self.between, self.occlusion), **self.over_marked())
+        self._look(steps, self.samples, **self.over_marked({"unfiltered": self.occlusion}))
+        self._blur(steps, (self.occlusion, self.between, self.occlusion), marked=True)
 
-    def _look(self, steps: Steps, out: Port, samples: int, *, also: Ports = NONE, **options: Any) -> None:
+    def _look(self, steps: Steps, samples: int, **options: Any) -> None:
         steps.fullscreen(
             "ssao_hemisphere.frag",
-            out={"unfiltered": out, **also},
             noise=self.noise,
             directions=spread_points(samples // 4).tolist(),
             screen=self.screen(steps),
             **options,
         )
 
-    def _blur(self, steps: Steps, ports: tuple[Port, Port, Port], *, also: Ports = NONE, **options: Any) -> None:
+    def _blur(self, steps: Steps, ports: tuple[Port, Port, Port], *, marked: bool = False, **options: Any) -> None:
         """Along both axes; ports are the source, what is between and the target."""
         for source, out, axis in ((*ports[:2], (1, 0)), (*ports[1:], (0, 1))):
+            target: dict[str, Port] = {"blurred": out}
+            where: dict[str, Any] = self.over_marked(target) if marked else {"out": target}
             steps.fullscreen(
-                "bilateral_blur.frag",
-                source=source,
-                out={"blurred": out, **also},
-                axis=axis,
-                screen=self.screen(steps),
-                **options,
+                "bilateral_blur.frag", source=source, axis=axis, screen=self.screen(steps), **where, **options
             )

@@ -218,7 +218,7 @@ def node_named(node: str, node_type: str) -> str:
 def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
     """`; did you mean 'x'?`, or those that begin with the word, or the whole list where it is short, or nothing."""
     known = sorted(set(words))
-    family = [name for name in known if name.replace("-", "_").partition("_")[0] == word.lower()]
+    family = [name for name in known if name.lower().replace("-", "_").partition("_")[0] == word.lower()]
     if len(family) > 1:
         more = f" or {len(family) - 4} more" if len(family) > 5 else ""
         return f"; did you mean one of {', '.join(family[: 4 if more else 5])}{more}?"

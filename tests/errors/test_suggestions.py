@@ -14,6 +14,7 @@ MANY = ["ssao-disc", "ssao-gtao", "ssao_hemisphere", "bloom", "kernel_size", *(f
     [
         ("ssao", MANY, "; did you mean one of ssao-disc, ssao-gtao, ssao_hemisphere?"),
         ("SSAO", MANY, "; did you mean one of ssao-disc, ssao-gtao, ssao_hemisphere?"),
+        ("lamp", ["Lamp_left", "lamp-right"], "; did you mean one of Lamp_left, lamp-right?"),
         ("ssao-dics", MANY, "; did you mean 'ssao-disc'?"),
         ("kernal", MANY, "; did you mean 'kernel_size'?"),
         ("kernel", MANY, "; did you mean 'kernel_size'?"),

@@ -19,6 +19,11 @@ STUDY = """objects:
   post3: {shape: cylinder, radius: 0.03, height: 1.5, at: [-0.2, 0.75, 0.5]}
 cameras: {main: {eye: [0, 2.2, 4], target: [0, 0.5, 0], fov_y_degrees: 40, near: 0.1, far: 60}}
 """
+CORNER = """objects:
+  floor: {shape: plane, size: [20, 20]}
+  wall: {shape: box, size: [20, 8, 0.1], at: [0, 4, -1]}
+cameras: {main: {eye: [4, 4, 4], target: [0, 0.2, 0], fov_y_degrees: 40, near: 0.1, far: 60}}
+"""
 SIZE = (96, 72)
 TECHNIQUES = pytest.mark.parametrize("technique", ["hemisphere", "disc", "hbao", "gtao"])
 
@@ -45,6 +50,18 @@ def test_edges_and_contacts_are_those_of_the_whole_size(apart: Occlusion, techni
     mean = np.sqrt((two**2).mean())
     assert mean < 0.01
     assert mean < 0.4 * np.sqrt((apart(technique, contrast=1) ** 2).mean())
+
+
+@TECHNIQUES
+@pytest.mark.parametrize("axis", [0, 1])
+def test_what_is_interpolated_is_smooth(occlusion: Occlusion, technique: str, axis: int) -> None:
+    """Where nothing is marked, slopes change from pixel to pixel no more than at full size: weights are the right way."""
+    both = (
+        occlusion(technique, CORNER, SIZE, samples=128, radius=1.5, **more)
+        for more in ({"contrast": 1, "scale": 0.5}, {"scale": 1})
+    )
+    two, whole = (np.sqrt((np.diff(picture, 2, axis) ** 2).mean()) for picture in both)
+    assert two < 1.3 * whole  # turned round they are 1.4 and more
 
 
 def test_without_a_blur_every_pixel_is_its_own(occlusion: Occlusion) -> None:
