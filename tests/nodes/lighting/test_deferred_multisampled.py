@@ -79,7 +79,7 @@ def test_marked_pixels_are_those_of_every_sample_lit(session: rg.Session) -> Non
 
 def test_where_a_surface_bends_a_little_its_mean_is_lit(session: rg.Session) -> None:
     """Balls of coarse triangles, all but their outlines lit once: by one sample's normal 4 % of the pixels were off."""
-    pipeline = rg.load("deferred-msaa", scene="shapes", size=(96, 54), patches=[UNSHADOWED])
+    pipeline = rg.load("deferred-msaa", scene="facets", size=(96, 54), patches=[UNSHADOWED])
     pipeline = pipeline.set("light.environment", None)
     both = pipeline.set("light.normal_angle", 3), every_sample(pipeline)
     once, every = (session.render(one)["radiance"][..., :3].astype(np.float64) for one in both)
