@@ -135,24 +135,20 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, kind)
 
 
-def converted(value: Any, annotation: Any) -> Any:
-    """A value of a file as an annotation has it: a list as a tuple, a whole number as a float; else what it was."""
-    return _conversion(annotation)(value)
-
-
 @cache
-def _conversion(annotation: Any) -> Callable[[Any], Any]:
+def conversion_to(annotation: Any) -> Callable[[Any], Any]:
+    """What makes a value of a file one of an annotation: of a list a tuple, of a whole number a float."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        return _conversion(annotation.__origin__)
+        return conversion_to(annotation.__origin__)
     if origin in (Union, types.UnionType):
-        parts = [(_conversion(part), test_of(part)) for part in arguments]
+        parts = [(conversion_to(part), test_of(part)) for part in arguments]
         return lambda value: next((made for convert, test in parts if test(made := convert(value))), value)
     if origin is list or (origin is tuple and Ellipsis in arguments):
-        entry = _conversion(arguments[0])
+        entry = conversion_to(arguments[0])
         return lambda value: origin(map(entry, value)) if isinstance(value, tuple | list) else value
     if origin is tuple:
-        entries = [_conversion(part) for part in arguments]
+        entries = [conversion_to(part) for part in arguments]
         return lambda value: (
             tuple(make(part) for make, part in zip(entries, value, strict=True))
             if isinstance(value, tuple | list) and len(value) == len(entries)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from msgspec import Struct
@@ -51,6 +52,11 @@ class Port:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "owner", owner.__name__)
 
+    @cached_property
+    def whole(self) -> Part:
+        """All of its texture, as a part."""
+        return Part(self)
+
     def mip(self, level: int) -> Part:
         """One level of the mip chain as an ordinary 2D texture."""
         return Part(self, mip=level)
@@ -61,7 +67,7 @@ class Port:
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The whole texture, read with this sampler; inputs have theirs declared."""
-        return Part(self).sampled(filter, wrap, compare)
+        return self.whole.sampled(filter, wrap, compare)
 
     def tested(self) -> Part:
         """The texture attached read-only for the depth test, of an input that other steps sample."""
@@ -133,7 +139,7 @@ class Input(Port):
         """One texture of an input that takes a list, counted from 0; a shader has it under a name without a number."""
         return Part(self, link=number)
 
-    @property
+    @cached_property
     def takes_scene(self) -> bool:
         """Whether it reads the scene's environment where nothing is linked to it."""
         return self.semantic == EnvironmentMap

@@ -9,7 +9,7 @@ no assignment uses fewer.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import Literal, TypeAlias
 
@@ -135,30 +135,33 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
         views: let formats of one texel class share through texture views.
         heap: let textures of any description share blocks of memory, where that takes fewer bytes.
     """
+    descs = {id: resource.desc for id, resource in schedule.resources.items()}
+    classes = {id: storage_class(resource) for id, resource in schedule.resources.items()}
+    sizes = {id: desc.bytes for id, desc in descs.items()}
     lifetimes = _lifetimes(schedule)
     shareable = [
         id for id in sorted(lifetimes, key=lambda id: (lifetimes[id].first, id)) if id not in schedule.whole_frame
     ]
-    by_desc = _colour(schedule, lifetimes, shareable, _description)
-    by_class = _colour(schedule, lifetimes, shareable, storage_class)
+    by_desc = _colour(shareable, lifetimes, descs, descs)
+    by_class = _colour(shareable, lifetimes, descs, classes)
     better: list[tuple[Tier, Groups]] = []  # tiers above the one asked for
     if not alias:
         groups = [[id] for id in shareable]
         better = [("descriptor", by_desc), ("view", by_class)]
     elif views:
-        groups = _fewest_views(schedule, shareable, by_desc, by_class)
+        groups = _fewest_views(shareable, classes, by_desc, by_class)
     else:
         groups = by_desc
         better = [("view", by_class)]
     if len(shareable) <= MOST_PLACED:
-        blocks = _blocks(schedule, lifetimes, shareable, by_desc)
+        blocks = _blocks(shareable, lifetimes, sizes, classes, by_desc)
         if not (alias and heap):
             better.append(("heap", blocks))
-        elif _bytes(schedule, blocks) < _bytes(schedule, groups):
+        elif _bytes(blocks, sizes) < _bytes(groups, sizes):
             groups = blocks
     # With a texture of its own for everything, history has two in any order.
     copies = schedule.history_copies if alias else dict.fromkeys(schedule.history_copies, 2)
-    physicals, placement = _physicals(schedule, groups, copies)
+    physicals, placement = _physicals(schedule, groups, copies, sizes, classes)
     released: dict[int, list[str]] = defaultdict(list)
     for id in shareable:
         if id not in schedule.shown:
@@ -169,8 +172,10 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
         physicals=physicals,
         placement=placement,
         released={position: tuple(ids) for position, ids in sorted(released.items())},
-        memory=_memory(schedule, physicals, placement, better),
-        reasons=_reasons(schedule, lifetimes, physicals, placement, _alike(views=views, heap=heap), alias=alias),
+        memory=_memory(schedule, physicals, placement, better, sizes),
+        reasons=_reasons(
+            schedule, lifetimes, physicals, placement, _alike(descs, classes, views=views, heap=heap), alias=alias
+        ),
     )
 
 
@@ -190,17 +195,15 @@ def _lifetimes(schedule: Schedule) -> dict[str, Lifetime]:
     }
 
 
-def _description(resource: Resource) -> object:
-    return resource.desc
-
-
 Groups = list[list[str]]
 """Resources that live in one physical each, in time order."""
 
 
-def _colour(
-    schedule: Schedule, lifetimes: Mapping[str, Lifetime], ids: Iterable[str], kind: Callable[[Resource], object]
-) -> Groups:
+Kinds: TypeAlias = Mapping[str, object]
+"""What a resource has in common with those that it can share with, by id."""
+
+
+def _colour(ids: Iterable[str], lifetimes: Mapping[str, Lifetime], descs: Kinds, kinds: Kinds) -> Groups:
     """Interval colouring within each kind; of the free textures one of the same description, else the oldest."""
     groups: Groups = []
     free: dict[object, list[int]] = defaultdict(list)  # by kind: indices into groups, lowest first
@@ -208,16 +211,15 @@ def _colour(
     taken: list[bool] = []
     busy: list[tuple[int, int]] = []  # last position and group
     for id in ids:
-        resource = schedule.resources[id]
         while busy and busy[0][0] < lifetimes[id].first:
             _, group = heappop(busy)
             taken[group] = False
-            owner = schedule.resources[groups[group][-1]]
-            heappush(free[kind(owner)], group)
-            heappush(free_exact[owner.desc], group)
-        found = _take(free_exact[resource.desc], taken, groups, schedule, resource.desc)
+            owner = groups[group][-1]
+            heappush(free[kinds[owner]], group)
+            heappush(free_exact[descs[owner]], group)
+        found = _take(free_exact[descs[id]], taken, groups, descs, descs[id])
         if found is None:
-            found = _take(free[kind(resource)], taken, groups, schedule, None)
+            found = _take(free[kinds[id]], taken, groups, descs, None)
         if found is None:
             found = len(groups)
             groups.append([])
@@ -228,22 +230,22 @@ def _colour(
     return groups
 
 
-def _take(free: list[int], taken: Sequence[bool], groups: Groups, schedule: Schedule, desc: object) -> int | None:
+def _take(free: list[int], taken: Sequence[bool], groups: Groups, descs: Kinds, desc: object) -> int | None:
     # Every free texture is queued by kind and by description; an entry is stale once the other queue gave it away.
     while free:
         group = heappop(free)
-        if not taken[group] and (desc is None or schedule.resources[groups[group][-1]].desc == desc):
+        if not taken[group] and (desc is None or descs[groups[group][-1]] == desc):
             return group
     return None
 
 
-def _fewest_views(schedule: Schedule, ids: Iterable[str], by_desc: Groups, by_class: Groups) -> Groups:
+def _fewest_views(ids: Iterable[str], classes: Kinds, by_desc: Groups, by_class: Groups) -> Groups:
     """The class's sharing where it saves bytes, the description's where it does not: a view for nothing is clutter."""
 
     def kinds(groups: Groups) -> dict[object, Groups]:
         table: dict[object, Groups] = defaultdict(list)
         for group in groups:
-            table[storage_class(schedule.resources[group[0]])].append(group)
+            table[classes[group[0]]].append(group)
         return table
 
     exact, loose = kinds(by_desc), kinds(by_class)
@@ -254,36 +256,38 @@ def _fewest_views(schedule: Schedule, ids: Iterable[str], by_desc: Groups, by_cl
     return sorted(chosen, key=lambda group: order[group[0]])
 
 
-def _blocks(schedule: Schedule, lifetimes: Mapping[str, Lifetime], ids: Sequence[str], by_desc: Groups) -> Groups:
+def _blocks(
+    ids: Sequence[str],
+    lifetimes: Mapping[str, Lifetime],
+    sizes: Mapping[str, int],
+    classes: Kinds,
+    by_desc: Groups,
+) -> Groups:
     """Textures in blocks of memory, buffers as they are; no history and nothing kept is among them."""
-    resources = schedule.resources
-    textures = [id for id in ids if isinstance(resources[id].desc, TextureDesc)]
-    items = [
-        Item(resources[id].bytes, lifetimes[id].first, lifetimes[id].last, storage_class(resources[id]))
-        for id in textures
-    ]
-    buffers = [group for group in by_desc if isinstance(resources[group[0]].desc, BufferDesc)]
+    textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
+    items = [Item(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures]
+    buffers = [group for group in by_desc if isinstance(classes[group[0]], BufferDesc)]
     blocks = [[textures[number] for number in block] for block in share_blocks(items)]
     order = {id: place for place, id in enumerate(ids)}
     return sorted([*buffers, *blocks], key=lambda group: order[group[0]])
 
 
-def _bytes(schedule: Schedule, groups: Groups) -> int:
+def _bytes(groups: Groups, sizes: Mapping[str, int]) -> int:
     """What groups take: each as much as its largest member."""
-    return sum(max(schedule.resources[id].desc.bytes for id in group) for group in groups)
+    return sum([max([sizes[id] for id in group]) for group in groups])
 
 
 def _physicals(
-    schedule: Schedule, groups: Groups, copies: Mapping[str, int]
+    schedule: Schedule, groups: Groups, copies: Mapping[str, int], sizes: Mapping[str, int], classes: Kinds
 ) -> tuple[tuple[Physical, ...], dict[str, tuple[int, ...]]]:
     physicals: list[Physical] = []
     placement: dict[str, tuple[int, ...]] = {}
     whole = [id for id in schedule.resources if id in schedule.whole_frame]
     for members in (*groups, *([id] for id in whole)):
-        resource = max((schedule.resources[id] for id in members), key=lambda resource: resource.desc.bytes)
+        resource = schedule.resources[max(members, key=sizes.__getitem__)]
         first = len(physicals)
-        taken = 0 if resource.role == "scene" else resource.desc.bytes
-        block = len({storage_class(schedule.resources[id]) for id in members}) > 1
+        taken = 0 if resource.role == "scene" else sizes[resource.id]
+        block = len({classes[id] for id in members}) > 1
         for _ in range(copies.get(resource.id, 1)):
             physicals.append(Physical(len(physicals), resource.desc, tuple(members), taken, block))
         for id in members:
@@ -296,6 +300,7 @@ def _memory(
     physicals: Sequence[Physical],
     placement: Mapping[str, tuple[int, ...]],
     better: Iterable[tuple[Tier, Groups]],
+    sizes: Mapping[str, int],
 ) -> MemoryFigures:
     resources = schedule.resources
     constant = sum(physicals[place].bytes for id in schedule.whole_frame for place in placement[id])
@@ -304,7 +309,7 @@ def _memory(
     next_tier: Tier | None = None
     next_bytes: int | None = None
     for name, groups in better:
-        total = constant + _bytes(schedule, groups)
+        total = constant + _bytes(groups, sizes)
         if next_bytes is None and total < allocated:
             next_tier, next_bytes = name, total
     return MemoryFigures(
@@ -325,14 +330,14 @@ def _reasons(
     lifetimes: Mapping[str, Lifetime],
     physicals: Sequence[Physical],
     placement: Mapping[str, tuple[int, ...]],
-    alike: tuple[Callable[[Resource], object], str],
+    alike: tuple[Kinds, str],
     *,
     alias: bool,
 ) -> dict[str, str]:
     names = step_names(schedule.steps)
     outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
-    kind, what = alike
-    count = Counter(kind(resource) for id, resource in schedule.resources.items() if id not in schedule.whole_frame)
+    kinds, what = alike
+    count = Counter([kinds[id] for id in schedule.resources if id not in schedule.whole_frame])
     reasons: dict[str, str] = {}
     for id, resource in schedule.resources.items():
         physical = physicals[placement[id][0]]
@@ -352,7 +357,7 @@ def _reasons(
         elif len(physical.members) == 1:
             reasons[id] = (
                 f"no other {word} {what if word == 'texture' else 'is of its size'}"
-                if count[kind(resource)] == 1
+                if count[kinds[id]] == 1
                 else f"whenever it is alive, all {word}s it could share are in use"
             )
         else:
@@ -371,11 +376,11 @@ def _reasons(
     return reasons
 
 
-def _alike(*, views: bool, heap: bool) -> tuple[Callable[[Resource], object], str]:
+def _alike(descs: Kinds, classes: Kinds, *, views: bool, heap: bool) -> tuple[Kinds, str]:
     """What two textures that can share have in common, and how that is said."""
     if heap:
-        return (lambda resource: isinstance(resource.desc, TextureDesc) or resource.desc), "is there"
-    return (storage_class, "is of its texel class and size") if views else (_description, "is of its format and size")
+        return {id: isinstance(desc, TextureDesc) or desc for id, desc in descs.items()}, "is there"
+    return (classes, "is of its texel class and size") if views else (descs, "is of its format and size")
 
 
 def _view(resource: Resource, physical: Physical) -> str:

@@ -71,8 +71,8 @@ def _placed(items: Sequence[Item], alive: Sequence[int], order: Sequence[int]) -
         found, least = -1, (item.bytes, False, 0)
         for place, other in enumerate(taken):
             if not other & now:
-                size = sizes[place]
-                cost = (max(0, item.bytes - size), item.kind not in kinds[place], abs(size - item.bytes))
+                more = item.bytes - sizes[place]
+                cost = (max(0, more), item.kind not in kinds[place], abs(more))
                 if cost < least:
                     found, least = place, cost
         if found < 0:

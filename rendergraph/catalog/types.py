@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path, PurePath
 
 from msgspec import Struct
 
-from rendergraph.declare import Node
+from rendergraph.declare import Input, Node, WrittenPort
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import folder
 from rendergraph.stamps import look
@@ -16,7 +18,7 @@ SHADERS = (".frag", ".comp")
 """Endings of shader files that are nodes by themselves: full-screen and compute."""
 
 
-class NodeType(Struct, frozen=True):
+class NodeType(Struct, frozen=True, dict=True):
     """One node type.
 
     Attributes:
@@ -42,6 +44,16 @@ class NodeType(Struct, frozen=True):
     inherited: tuple[Path, ...] = ()
     missing: bool = False
     text: str = ""
+
+    @cached_property
+    def read(self) -> Mapping[str, Input]:
+        """Those of its inputs that are read, and not continued."""
+        return {name: port for name, port in self.cls.inputs().items() if isinstance(port, Input)}
+
+    @cached_property
+    def written(self) -> Mapping[str, WrittenPort]:
+        """Its textures and buffers: what it makes or continues."""
+        return {name: port for name, port in self.cls.ports().items() if isinstance(port, WrittenPort)}
 
     @property
     def is_shader(self) -> bool:

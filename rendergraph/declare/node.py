@@ -130,7 +130,8 @@ class Node:
         }
 
     @classmethod
-    def groups(cls) -> dict[str, tuple[str, ...]]:
+    @cache
+    def groups(cls) -> Mapping[str, tuple[str, ...]]:
         """Group name to the inputs it stands for."""
         table: dict[str, tuple[str, ...]] = {}
         for name, port in cls.inputs().items():

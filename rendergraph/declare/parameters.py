@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from msgspec import Struct
 
-from rendergraph.annotations import Range, converted, fits, words_for
+from rendergraph.annotations import Range, conversion_to, fits, test_of, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 
 
-class Parameter(Struct, frozen=True):
+class Parameter(Struct, frozen=True, dict=True):
     """What a node declares of one parameter; `Node.parameters()` has them by name.
 
     Attributes:
@@ -40,12 +41,12 @@ class Parameter(Struct, frozen=True):
     name: str = ""
     type: Any = None
 
-    @property
+    @cached_property
     def choices(self) -> tuple[Any, ...]:
         """The values that its type lists, also beside other types."""
         return tuple(_listed(self.type))
 
-    @property
+    @cached_property
     def words(self) -> tuple[str, ...]:
         """Those of its choices that are words."""
         return tuple(choice for choice in self.choices if isinstance(choice, str))
@@ -69,8 +70,9 @@ class Parameter(Struct, frozen=True):
             TypeError: it is not what the type says: `takes a whole number`.
             ValueError: a number in it is not finite or outside the limits: `must be at least 1`.
         """
-        found = converted(value, self.type)
-        if not fits(found, self.type):
+        convert, fits = self._taken
+        found = convert(value)
+        if not fits(found):
             raise TypeError(f"takes {self.takes()}")
         if wrong := self.beyond(found):
             raise ValueError(wrong)
@@ -78,9 +80,15 @@ class Parameter(Struct, frozen=True):
 
     def beyond(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
-        parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
-        wrong = [self.limits.beyond(number) for number in parts if fits(number, float)]
-        return next(filter(None, wrong), None)
+        for number in value if isinstance(value, tuple) else (value,):
+            if fits(number, float) and (wrong := self.limits.beyond(number)):
+                return wrong
+        return None
+
+    @cached_property
+    def _taken(self) -> tuple[Callable[[Any], Any], Callable[[Any], bool]]:
+        """What makes a value of a file one of its type, and what tells whether that fits."""
+        return conversion_to(self.type), test_of(self.type)
 
 
 def _listed(annotation: Any) -> Iterator[Any]:

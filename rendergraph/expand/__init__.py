@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from rendergraph.expand.ending import ended
 from rendergraph.expand.keeping import check_kept
-from rendergraph.expand.model import CAMERA, Expansion, ViewTable, is_empty
+from rendergraph.expand.model import CAMERA, Expansion, ViewTable
 from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.expand.recording import record_all
 from rendergraph.expand.versions import versioned
@@ -22,7 +22,6 @@ __all__ = [
     "ViewTable",
     "define_parameters",
     "expand",
-    "is_empty",
     "param_uniforms",
 ]
 

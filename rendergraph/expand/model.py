@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from msgspec import Struct, field
 
-from rendergraph.declare import TextureInfo
 from rendergraph.link import Endpoint
 from rendergraph.link.infer import CAMERA
 from rendergraph.steps import Resource, Step
@@ -74,9 +73,4 @@ def behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
     return end
 
 
-def is_empty(info: TextureInfo | None) -> bool:
-    """Whether a texture has no layers: no light casts, nothing is drawn, and readers do without."""
-    return info is not None and info.desc is not None and info.desc.layers == 0
-
-
-__all__ = ["CAMERA", "ENVIRONMENT", "Expansion", "Versioned", "ViewTable", "behind", "is_empty"]
+__all__ = ["CAMERA", "ENVIRONMENT", "Expansion", "Versioned", "ViewTable", "behind"]

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from msgspec.structs import replace
-
-from rendergraph.declare import Facts, Function, InOut, Input, Internal, Output, Part, Port, Views
+from rendergraph.declare import Facts, Function, InOut, Input, Part, Port, TextureInfo, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
-from rendergraph.expand.model import ENVIRONMENT, is_empty
+from rendergraph.expand.model import ENVIRONMENT
+from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.steps import MOST_STEPS, StepRequest, Steps
@@ -29,6 +28,9 @@ class Recording:
         unfilled: what it asked to draw and the scene has nothing of; left out where that changes nothing.
         links: connected inputs whose textures have layers; `ENVIRONMENT` stands for the scene's.
         facts: what the node may ask.
+        read: the connected inputs, which a step reads that names none.
+        own: the ends of the textures and buffers that the node makes or continues, by port.
+        defines, uniforms, includes: what its parameters give to each of its steps.
     """
 
     def __init__(self, graph: Graph, node: GraphNode, used: set[str]) -> None:
@@ -37,22 +39,22 @@ class Recording:
         self.used_ports = used
         self.requests: list[StepRequest] = []
         self.unfilled: list[str] = []
-        self.links = {
-            name: tuple(end for end in ends if not is_empty(graph.textures.get(end.now)))
-            for name, ends in node.inputs.items()
-        }
-        of_scene = [name for name, port in node.node.inputs().items() if isinstance(port, Input) and port.takes_scene]
-        inputs = {
-            name: tuple(graph.textures[end.now] for end in ends if end.now in graph.textures)
-            for name, ends in self.links.items()
-            if ends
-        }
-        facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
-        around = [name for name in of_scene if name not in inputs]
-        if around:
-            self.links |= dict.fromkeys(around, (ENVIRONMENT,)) if facts.of_scene else {}
-            facts = replace(facts, inputs=inputs | dict.fromkeys(around, facts.of_scene))
-        self.facts = facts
+        self.links: dict[str, tuple[Endpoint, ...]] = {}
+        inputs: dict[str, tuple[TextureInfo, ...]] = {}
+        for name, ends in node.inputs.items():
+            self.links[name] = there = tuple([end for end in ends if end.now not in graph.empty])
+            if there:
+                inputs[name] = tuple([graph.textures[end.now] for end in there if end.now in graph.textures])
+        self.facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
+        for name, port in node.type.read.items():
+            if port.takes_scene and name not in inputs:
+                inputs[name] = self.facts.of_scene
+                self.links |= {name: (ENVIRONMENT,)} if inputs[name] else {}
+        self.read = {name: port for name, port in node.type.read.items() if self.links.get(name)}
+        self.own = {name: Endpoint(node.id, name) for name in node.type.written}
+        self.defines = tuple(define_parameters(node.node, node.choices))
+        self.uniforms = tuple(param_uniforms(node.node))
+        self.includes = tuple((name.upper(), file) for name, file in node.choices.items())
 
     # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
 
@@ -112,16 +114,13 @@ class Recording:
         """Whether a port goes on with a texture of somebody else's."""
         return isinstance(port, InOut) and bool(self.links.get(port.name))
 
-    def reads_of(self, request: StepRequest) -> Iterator[tuple[str, Port | Part]]:
+    def reads_of(self, request: StepRequest) -> Mapping[str, Port | Part]:
         """Names and ports a request reads, with the default inputs filled in; of what is kept, inputs that are too."""
         if not request.default_inputs:
-            yield from request.bindings.items()
-            return
-        lasting = any(is_kept(part.port) for _, part in request.out)
-        for name, port in self.node.node.inputs().items():
-            ends = self.links.get(name, ()) if isinstance(port, Input) else ()
-            if ends and (not lasting or all(self._lasts(end) for end in ends)):
-                yield name, port
+            return request.bindings
+        if any(is_kept(part.port) for _, part in request.out):
+            return {name: port for name, port in self.read.items() if all(map(self._lasts, self.links[name]))}
+        return self.read
 
     def _lasts(self, end: Endpoint) -> bool:
         return end == ENVIRONMENT or is_kept(self.graph[end.node].node.ports()[end.port])
@@ -131,14 +130,17 @@ class Recording:
         ports = self.node.node.ports()
         names: set[str] = set()
         for request in self.requests:
-            for _, target in self.reads_of(request):
+            for target in self.reads_of(request).values():
                 port = target.port if isinstance(target, Part) else target
-                names |= {port.name, *(port.read_names if isinstance(port, Function) else ())}
-            names |= {part.port.name for _, part in request.out if isinstance(part.port, InOut)}
+                names.add(port.name)
+                if isinstance(port, Function):
+                    names.update(port.read_names)
+            names.update([part.port.name for _, part in request.out if isinstance(part.port, InOut)])
             view = request.options.get("view")
-            names |= {view.name} if isinstance(view, Input) else set()
-            if "view" in self.links:
-                names.add("view")
+            if isinstance(view, Input):
+                names.add(view.name)
+        if self.requests and "view" in self.links:
+            names.add("view")
         for name in self.used_ports:
             used = ports.get(name)
             if isinstance(used, Function):
@@ -151,7 +153,7 @@ class Recording:
 
 def is_kept(port: Port) -> bool:
     """Whether what a port makes outlives the frame."""
-    return isinstance(port, Output | Internal) and port.kept
+    return bool(getattr(port, "kept", False))
 
 
 def record_all(
@@ -244,7 +246,7 @@ def _unread(graph: Graph, node: GraphNode, reached: set[str]) -> str:
     for name in node.node.outputs():
         end = Endpoint(node.id, name)
         links = (ends for reader in graph.nodes if reader.id in reached for ends in reader.inputs.values())
-        if is_empty(graph.textures.get(end)) and any(end in ends for ends in links):
+        if end in graph.empty and any(end in ends for ends in links):
             reached.add(node.id)
             return f"{end} has no layers: {_no_layers(graph, node, name)}"
     return "nothing that is wanted reads its outputs"
@@ -256,7 +258,7 @@ def _no_layers(graph: Graph, node: GraphNode, name: str) -> str:
     named = [getattr(ports[name], rule, None) for rule in ("like", "lights", "view")]
     for source in named:
         ends = node.inputs.get(source, ()) if isinstance(source, str) else ()
-        if ends and is_empty(graph.textures.get(ends[0].now)):
+        if ends and ends[0].now in graph.empty:
             return f"{ends[0]} has none"
     tables = [ports[source] for source in named if isinstance(source, str) and isinstance(ports.get(source), Views)]
     if all(getattr(port, "lights", None) is None for port in (ports[name], *tables)):
@@ -275,13 +277,13 @@ def _pass_on(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) 
 
 def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
     """Why a node has nothing to record: what it would draw, or what it must read, has no layers."""
-    made = [graph.textures.get(Endpoint(node.id, name)) for name in used]
-    if made and all(is_empty(info) for info in made):
+    if not graph.empty:
+        return None
+    if all(Endpoint(node.id, name) in graph.empty for name in used):
         return f"{node.id}.{min(used)} has no layers: {_no_layers(graph, node, min(used))}"
-    for name, port in node.node.inputs().items():
+    for name, port in node.type.read.items():
         ends = node.inputs.get(name, ())
-        required = isinstance(port, Input) and not port.optional
-        if required and ends and all(is_empty(graph.textures.get(end.now)) for end in ends):
+        if ends and not port.optional and all(end.now in graph.empty for end in ends):
             return f"{ends[0]} has no layers: there is nothing to read"
     return None
 

@@ -44,7 +44,7 @@ def target_size(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
 ) -> tuple[tuple[int, int], int]:
     """Width, height and samples of what a step writes."""
-    attached: list[Read | Write] = [*writes, *(read for read in reads if read.use == "depth_test")]
+    attached: tuple[Read | Write, ...] = (*writes, *[read for read in reads if read.use == "depth_test"])
     for touched in attached:
         desc = resources[touched.resource].desc
         if isinstance(desc, TextureDesc):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, ENVIRONMENT, Versioned, ViewTable, behind, is_empty
-from rendergraph.expand.parameters import define_parameters, param_uniforms
+from rendergraph.expand.model import CAMERA, ENVIRONMENT, Versioned, ViewTable, behind
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import (
     feedback,
@@ -32,6 +30,7 @@ _TAKEN_OVER = frozenset(
     """.split()  # noqa: SIM905 - a list of so many words reads best as text
 )
 """Options of a request that a step has as they are."""
+_PLAIN = Sampler()
 
 
 def versioned(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> Versioned:
@@ -89,39 +88,35 @@ class _Versions:
             for port in recording.node.node.outputs().values()
         ):
             self.idle[recording.node.id] = "it recorded no step"
-        for port in recording.node.node.ports().values():
-            if isinstance(port, WrittenPort):
-                self._note_end(recording, port)
+        for end in recording.own.values():
+            if end in self.at_end:
+                resource, _ = self.at_end[end]
+                self.at_end[end] = resource, self.version[resource]
 
     def _declare(self, recording: Recording) -> None:
         """Give every texture the node may write a resource; an `InOut` continues somebody's."""
         node = recording.node
         for port in node.node.ports().values():
-            end = Endpoint(node.id, port.name)
             if isinstance(port, Views):
+                end = Endpoint(node.id, port.name)
                 info = self.graph.textures[end]
                 self.views[str(end)] = ViewTable(info.views, info.lights)
-            if not isinstance(port, WrittenPort) or is_empty(self.graph.textures.get(end)):
+        for name, made in node.type.written.items():
+            end = recording.own[name]
+            if end in self.graph.empty:
                 continue
-            if isinstance(port, InOut) and recording.links.get(port.name):
-                before = behind(self.passed, recording.links[port.name][0])
+            if isinstance(made, InOut) and recording.links.get(name):
+                before = behind(self.passed, recording.links[name][0])
                 if before in self.at_end:  # else nothing that runs touches it, here or where it comes from
                     self.at_end[end] = self.at_end[before]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
-            role: Role = "transient"
-            if is_kept(port):
-                role = "kept"
-            elif isinstance(port, Internal):
-                role = "internal"
-            elif isinstance(port, History):
-                role = "history"
-            resource = Resource(str(end), desc, role, port.first or 0.0, info.view, info.lights)
-            self.resources[resource.id] = resource
-            self.version[resource.id] = 0
-            self.written[resource.id] = set()
-            self.at_end[end] = (resource.id, 0)
+            id = str(end)
+            self.resources[id] = Resource(id, desc, _role(made), made.first or 0.0, info.view, info.lights)
+            self.version[id] = 0
+            self.written[id] = set()
+            self.at_end[end] = id, 0
 
     def _maker(self, end: Endpoint) -> Endpoint:
         """The port that first made what a port carries, however often it is continued between."""
@@ -133,45 +128,39 @@ class _Versions:
                 return end
             end = continued[0].now
 
-    def _note_end(self, recording: Recording, port: WrittenPort) -> None:
-        end = Endpoint(recording.node.id, port.name)
-        if end in self.at_end:
-            resource, _ = self.at_end[end]
-            self.at_end[end] = (resource, self.version[resource])
-
     def _step(self, recording: Recording, request: StepRequest, index: int) -> Step:
         node = recording.node
-        options = dict(request.options)
+        options = request.options
         reads: list[Read] = []
         functions: list[FunctionBinding] = []
         called: set[str] = set()
-        for name, target in recording.reads_of(request):
-            port = target.port if isinstance(target, Part) else target
+        for name, target in recording.reads_of(request).items():
+            part = target if isinstance(target, Part) else target.whole
+            port = part.port
             if isinstance(port, Function):
-                functions += self._own_function(recording, port)
-            elif isinstance(port, Input) and port.kind == "function":
+                functions.append(self._binding(recording, port))
+            elif not isinstance(port, Input) or port.kind not in ("function", "view"):
+                reads += self._reads(recording, name, part)
+            elif port.kind == "function":
                 provided = [f for end in recording.links.get(port.name, ()) for f in self._function(end)]
                 functions += provided
                 called |= {name} if provided else set()
-            elif not (isinstance(port, Input) and port.kind == "view"):
-                reads += self._reads(recording, name, target if isinstance(target, Part) else Part(port))
         writes: list[Write] = []
         for name, part in request.out:
             read, write = self._write(recording, request, name, part, options.get("value"))
             reads += read
             writes.append(write)
-        self._check_targets(recording, request, writes, [*reads, *(read for f in functions for read in f.reads)])
+        self._check_targets(recording, request, writes, [*reads, *[read for f in functions for read in f.reads]])
         view, view_index = self._view(recording, request, options)
         self._carry_view(writes, view if request.kind == "geometry" else None)
         size, samples = target_size(self.resources, writes, reads)
-        attributes = options.pop("attributes", {})
         vertices = options.get("vertices", 3)
         if isinstance(vertices, Port):
-            reads += self._reads(recording, vertices.name, Part(vertices))
+            reads += self._reads(recording, vertices.name, vertices.whole)
             vertices = reads[-1].resource
         held: list[tuple[str, str]] = []
-        for layout, port in attributes.items():
-            reads += self._reads(recording, port.name, Part(port))
+        for layout, port in options.get("attributes", {}).items():
+            reads += self._reads(recording, port.name, port.whole)
             held.append((layout, reads[-1].resource))
         return Step(
             node=node.id,
@@ -181,9 +170,9 @@ class _Versions:
             reads=tuple(reads),
             writes=tuple(writes),
             functions=tuple(functions),
-            includes=_includes(node.choices),
-            defines=(*self._defines(recording, request, reads, called), *request.defines.items()),
-            uniforms=(*param_uniforms(node.node), *request.uniforms.items()),
+            includes=recording.includes,
+            defines=(*_defines(recording, request, reads, called), *recording.defines, *request.defines.items()),
+            uniforms=(*recording.uniforms, *request.uniforms.items()),
             size=size,
             samples=samples,
             view=view,
@@ -196,14 +185,11 @@ class _Versions:
             **{key: value for key, value in options.items() if key in _TAKEN_OVER},
         )
 
-    def _own(self, recording: Recording, port: Port) -> str:
-        return self.at_end[Endpoint(recording.node.id, port.name)][0]
-
     def _reads(self, recording: Recording, name: str, part: Part) -> list[Read]:
         port = part.port
         if isinstance(port, Input):
             ends = recording.links.get(port.name, ())
-            sampler = part.sampler or recording.node.samplers.get(port.name, Sampler())
+            sampler = part.sampler or recording.node.samplers.get(port.name, _PLAIN)
             return [
                 self._read(
                     f"{name}_{number}" if port.many and part.link is None else name,
@@ -217,7 +203,7 @@ class _Versions:
             ]
         own = Endpoint(recording.node.id, port.name, part.previous)
         resource, _ = self.at_end[own.now]
-        return [self._read(name, own, part, part.sampler or Sampler(), "sample", self.version[resource])]
+        return [self._read(name, own, part, part.sampler or _PLAIN, "sample", self.version[resource])]
 
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
@@ -244,7 +230,7 @@ class _Versions:
     ) -> tuple[list[Read], Write]:
         port = part.port
         assert isinstance(port, WrittenPort)  # `steps` has seen to that
-        end = Endpoint(recording.node.id, port.name)
+        end = recording.own[port.name]
         if end not in self.at_end:
             raise self._refused(recording, request, "RG421", f"it writes '{port.name}', which has no layers")
         resource, _ = self.at_end[end]
@@ -292,12 +278,13 @@ class _Versions:
         text = onto_nothing(request, writes)
         if text is not None:
             raise self._refused(recording, request, "RG429", text)
-        if len(writes) > 1 or any(read.use == "depth_test" for read in reads):
+        touching: tuple[Read | Write, ...] = (*writes, *reads)
+        uses = {touched.use for touched in touching}
+        if len(writes) > 1 or "depth_test" in uses:
             text = ill_matched(self.resources, writes, reads)
             if text is not None:
                 raise self._refused(recording, request, "RG425", text)
-        uses: tuple[Read | Write, ...] = (*writes, *reads)
-        for touched in uses:
+        for touched in touching if "image" in uses else ():
             if touched.use == "image":
                 text = no_image(request.kind, touched, self.resources.get(touched.resource))
                 if text is not None:
@@ -310,12 +297,11 @@ class _Versions:
         return InputError(step.problem(code, text))
 
     def _view(
-        self, recording: Recording, request: StepRequest, options: dict[str, Any]
+        self, recording: Recording, request: StepRequest, options: Mapping[str, Any]
     ) -> tuple[str | None, int | None]:
-        port = options.pop("view", None)
-        index = options.pop("view_index", 0)
         if request.kind not in ("geometry", "draw"):
             return None, None
+        port, index = options.get("view"), options.get("view_index", 0)
         if isinstance(port, Views):
             table = str(Endpoint(recording.node.id, port.name))
             count = self.views[table].count
@@ -335,23 +321,7 @@ class _Versions:
             if view is not None and resource.view is None:
                 self.resources[write.resource] = replace(resource, view=view)
 
-    def _defines(
-        self, recording: Recording, request: StepRequest, reads: list[Read], called: set[str]
-    ) -> Iterator[tuple[str, str]]:
-        node = recording.node.node
-        read_names = {read.name for read in reads} | called
-        for name, port in node.inputs().items():
-            many = isinstance(port, Input) and port.many
-            if name in read_names or (many and f"{name}_0" in read_names):
-                yield f"HAS_{name.upper()}", "1"
-        for name, _ in request.out:
-            yield f"WRITES_{name.upper()}", "1"
-        yield from define_parameters(node, recording.node.choices)
-
     # Functions ------------------------------------------------------------------------------------------------------
-
-    def _own_function(self, recording: Recording, port: Function) -> list[FunctionBinding]:
-        return self._binding(recording, port)
 
     def _function(self, end: Endpoint) -> list[FunctionBinding]:
         recording = self.recordings.get(end.node)
@@ -359,9 +329,9 @@ class _Versions:
             return []  # it has nothing to read: the consumer's function is then neutral
         port = recording.node.node.ports()[end.port]
         assert isinstance(port, Function)
-        return self._binding(recording, port)
+        return [self._binding(recording, port)]
 
-    def _binding(self, recording: Recording, port: Function) -> list[FunctionBinding]:
+    def _binding(self, recording: Recording, port: Function) -> FunctionBinding:
         node = recording.node
         reads = []
         ports = node.node.ports()
@@ -369,33 +339,49 @@ class _Versions:
             source = ports[name]
             if isinstance(source, Input) and not recording.links.get(name):
                 continue
-            if not isinstance(source, Input) and is_empty(self.graph.textures.get(Endpoint(node.id, name))):
+            if name in recording.own and recording.own[name] in self.graph.empty:
                 continue
-            if isinstance(source, Internal) and not self.written[self._own(recording, source)]:
+            if isinstance(source, Internal) and not self.written[self.at_end[recording.own[name]][0]]:
                 continue
-            reads += self._reads(recording, name, read if isinstance(read, Part) else Part(source))
+            reads += self._reads(recording, name, read if isinstance(read, Part) else source.whole)
         present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
-        return [
-            FunctionBinding(
-                port.signature.name,
-                node.id,
-                port.shader,
-                tuple(reads),
-                (*present, *define_parameters(node.node, node.choices)),
-                tuple(param_uniforms(node.node)),
-                _includes(node.choices),
-            )
-        ]
+        return FunctionBinding(
+            port.signature.name,
+            node.id,
+            port.shader,
+            tuple(reads),
+            (*present, *recording.defines),
+            recording.uniforms,
+            recording.includes,
+        )
+
+
+def _role(port: WrittenPort) -> Role:
+    if is_kept(port):
+        return "kept"
+    if isinstance(port, Internal):
+        return "internal"
+    return "history" if isinstance(port, History) else "transient"
+
+
+def _defines(
+    recording: Recording, request: StepRequest, reads: Iterable[Read], called: set[str]
+) -> Iterator[tuple[str, str]]:
+    """What a step reads and writes, as macros."""
+    names = called.union([read.name for read in reads])
+    for name, port in recording.node.node.inputs().items():
+        if name in names or (isinstance(port, Input) and port.many and f"{name}_0" in names):
+            yield f"HAS_{name.upper()}", "1"
+    for name, _ in request.out:
+        yield f"WRITES_{name.upper()}", "1"
 
 
 def _numbered(recording: Recording, label: str, index: int) -> int | None:
     """The last step before another that has a label, by its number in the node; None without a label."""
-    numbers = [i for i, one in enumerate(recording.requests[:index]) if label and one.options.get("label") == label]
+    if not label:
+        return None
+    numbers = [i for i, one in enumerate(recording.requests[:index]) if one.options.get("label") == label]
     return numbers[-1] if numbers else None
-
-
-def _includes(choices: Mapping[str, Path]) -> tuple[tuple[str, Path], ...]:
-    return tuple((name.upper(), file) for name, file in choices.items())
 
 
 def _passed(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple[Endpoint, Endpoint]]:

@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import Facts, InOut, Input, LightFacts, TextureInfo, WrittenPort
+from rendergraph.declare import Facts, InOut, Input, LightFacts, TextureInfo
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
 from rendergraph.link.disabled import lost, mark_unlit, past, take_out
-from rendergraph.link.graph import Endpoint, Graph, GraphNode
+from rendergraph.link.graph import Endpoint, Graph, GraphNode, upstream_first
 from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Draft, Link, References, Wrong, line_of
-from rendergraph.link.order import cycles, needs, versions
+from rendergraph.link.order import cycles, needs, sources, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.resolve import NodeSpec, PipelineSpec
@@ -136,7 +136,8 @@ class _Linker:
         for draft in nodes.values():
             self._complete(draft, written)
         outputs = self._outputs(references, written)
-        knots = cycles(nodes)
+        order = upstream_first(sources(nodes))
+        knots = cycles(nodes) if len(order) < len(nodes) else []
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
         infer = Infer(
@@ -148,7 +149,7 @@ class _Linker:
         else:
             self.problems += needs(nodes, outputs, written) + versions(nodes)
             self._crossings(nodes, infer)
-            textures = self._textures(nodes, infer)
+            textures = self._textures(order, nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
             self._check_outputs(nodes, outputs, infer)
         members = {name: _member(draft, infer) for name, draft in nodes.items()}
@@ -338,9 +339,10 @@ class _Linker:
 
     # Textures ---------------------------------------------------------------------------------------------------------
 
-    def _textures(self, nodes: Mapping[str, Draft], infer: Infer) -> dict[Endpoint, TextureInfo]:
+    def _textures(self, order: list[str], nodes: Mapping[str, Draft], infer: Infer) -> dict[Endpoint, TextureInfo]:
+        """What every port turns out to be; in this order a rule hardly ever asks further up."""
         textures: dict[Endpoint, TextureInfo] = {}
-        for name in _upstream_first(nodes):
+        for name in order:
             for end in made_ports(nodes[name]):
                 info = infer.info(end)
                 if info is not None:
@@ -404,35 +406,15 @@ class _Linker:
         return {name: end for name, end in led.items() if not written[end.node].out}
 
 
-def _upstream_first(nodes: Mapping[str, Draft]) -> list[str]:
-    """Ids so that a node comes after what it reads in the same frame: rules then hardly ever ask further up."""
-    done: dict[str, None] = {}
-    for first in nodes:
-        stack = [first]
-        while stack:
-            name = stack[-1]
-            ahead = [
-                link.source.node
-                for links in nodes[name].links.values()
-                for link in links
-                if not link.source.previous and link.source.node not in done
-            ]
-            if ahead:
-                stack += ahead
-            else:
-                done[stack.pop()] = None
-    return list(done)
-
-
 def _member(draft: Draft, infer: Infer) -> GraphNode:
-    spec, ports = draft.spec, draft.ports
-    links = {name: tuple(found.source for found in ends) for name, ends in draft.links.items() if ends}
-    read = {name: port for name, port in draft.inputs.items() if isinstance(port, Input)}
+    spec = draft.spec
+    links = {name: tuple([found.source for found in ends]) for name, ends in draft.links.items() if ends}
     samplers = {
-        name: infer.sampler(Endpoint(spec.id, name)) for name, port in read.items() if name in links or port.takes_scene
+        name: infer.sampler(Endpoint(spec.id, name))
+        for name, port in draft.type.read.items()
+        if name in links or port.takes_scene
     }
-    written = [name for name, port in ports.items() if isinstance(port, WrittenPort)]
-    clears = {name: infer.clear(Endpoint(spec.id, name)) for name in written}
+    clears = {name: infer.clear(Endpoint(spec.id, name)) for name in draft.type.written}
     return GraphNode(spec.id, draft.type, draft.node, links, spec.place, draft.choices, samplers, clears)
 
 

@@ -99,7 +99,6 @@ class Checker:
     def _format(self, draft: Draft, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         texel = FORMATS[info.desc.format]
-        smooth = self.infer.sampler(Endpoint(draft.spec.id, port.name)).filter
         takes = ""
         if port.use == "depth_test" and not texel.is_depth:
             takes = "is attached as depth"
@@ -107,8 +106,9 @@ class Checker:
             takes = "compares with depth"
         elif port.use == "image" and (texel.is_depth or texel.srgb):
             takes = "is loaded as an image, so no depth and no sRGB"
-        elif smooth != "nearest" and not port.compare and texel.family in ("uint", "int"):
-            takes = "is filtered, so no whole numbers"
+        elif texel.family in ("uint", "int") and not port.compare:
+            smooth = self.infer.sampler(Endpoint(draft.spec.id, port.name)).filter
+            takes = "is filtered, so no whole numbers" if smooth != "nearest" else ""
         if takes:
             self._say(draft, port, link, "RG215", takes, f"has the format {info.desc.format}", None)
 
@@ -161,7 +161,7 @@ class Checker:
     def _sizes(self, draft: Draft) -> None:
         """Inputs of size `same` against what the node draws."""
         made: dict[tuple[int, int], str] = {}
-        for name, port in draft.ports.items():
+        for name, port in draft.type.written.items():
             if isinstance(port, Output | InOut):
                 needs = port.needs if isinstance(port, Output) else ()
                 info = self.infer.info(Endpoint(draft.spec.id, name)) if all(map(draft.links.get, needs)) else None
@@ -176,16 +176,15 @@ class Checker:
             text = f"{ends}: one pass draws all its targets in one size"
             self.problems.append(draft.spec.value.problem("RG216", text, key=True))
             return
-        for name, links in draft.links.items():
-            port = draft.inputs[name]
-            for link in links if isinstance(port, Input) and port.size == "same" else ():
+        for name, taken in draft.type.read.items():
+            for link in draft.links[name] if taken.size == "same" else ():
                 info = self.infer.info(link.source)
                 if info is None or info.desc is None or info.desc.size in made:
                     continue
                 (size, target), *_ = made.items()
                 takes = f"takes the size of '{draft.spec.id}.{target}', {_size(size)}"
                 carries = f"is {_size(info.desc.size)}"
-                self._say(draft, port, link, "RG216", takes, carries, self._resizing(info))
+                self._say(draft, taken, link, "RG216", takes, carries, self._resizing(info))
 
     # Ways out ---------------------------------------------------------------------------------------------------------
 

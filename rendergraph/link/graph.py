@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from heapq import heappop, heappush
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from msgspec import Struct, field
 
@@ -18,6 +18,8 @@ from rendergraph.textures import Sampler, TextureDesc
 
 if TYPE_CHECKING:
     import networkx as nx
+
+T = TypeVar("T")
 
 
 class Endpoint(NamedTuple):
@@ -110,6 +112,12 @@ class Graph(Struct, frozen=True, dict=True):
         kinds = {(one.casts_shadow, one.blended) for one in self.objects if not one.hidden}
         return frozenset(name for name, takes in SELECTIONS.items() if not any(takes(*kind) for kind in kinds))
 
+    @cached_property
+    def empty(self) -> frozenset[Endpoint]:
+        """Ports whose texture has no layers: no light casts, nothing is drawn, and readers do without."""
+        descs = ((end, info.desc) for end, info in self.textures.items())
+        return frozenset(end for end, desc in descs if desc is not None and desc.layers == 0)
+
     @property
     def nodes(self) -> list[GraphNode]:
         """All nodes in the file's order."""
@@ -139,23 +147,30 @@ class Graph(Struct, frozen=True, dict=True):
 
         Nodes of a cycle, which only a sketch can have, come last.
         """
-        place = {name: number for number, name in enumerate(self.members)}
-        sources = {
-            name: {end.node for ends in node.inputs.values() for end in ends if not end.previous}
-            for name, node in self.members.items()
-        }
-        readers: dict[str, list[str]] = {name: [] for name in self.members}
-        for name, found in sources.items():
-            for source in found:
-                readers[source].append(name)
-        waiting = {name: len(found) for name, found in sources.items()}
-        ready = [(place[name], name) for name, count in waiting.items() if not count]
-        order: dict[str, None] = {}
-        while ready:
-            _, name = heappop(ready)
-            order[name] = None
-            for reader in readers[name]:
-                waiting[reader] -= 1
-                if not waiting[reader]:
-                    heappush(ready, (place[reader], reader))
-        return [*order, *(name for name in self.members if name not in order)]
+        order = upstream_first(
+            {
+                name: {end.node for ends in node.inputs.values() for end in ends if not end.previous}
+                for name, node in self.members.items()
+            }
+        )
+        return order if len(order) == len(self.members) else [*dict.fromkeys([*order, *self.members])]
+
+
+def upstream_first(sources: Mapping[T, Collection[T]]) -> list[T]:
+    """Names so that each stands behind its sources, else as they come; without those of cycles and what needs them."""
+    place = {name: number for number, name in enumerate(sources)}
+    readers: dict[T, list[T]] = {name: [] for name in sources}
+    for name, found in sources.items():
+        for source in found:
+            readers[source].append(name)
+    waiting = {name: len(found) for name, found in sources.items()}
+    ready = [(place[name], name) for name, count in waiting.items() if not count]
+    order: list[T] = []
+    while ready:
+        _, name = heappop(ready)
+        order.append(name)
+        for reader in readers[name]:
+            waiting[reader] -= 1
+            if not waiting[reader]:
+                heappush(ready, (place[reader], reader))
+    return order

@@ -172,8 +172,10 @@ class Infer:
         Raises:
             _Unknown: it does not, which is said.
         """
+        if not callable(rule):
+            return rule
         value = self._ruled(end, what, rule)
-        if callable(rule) and not fits(value, annotation):
+        if not fits(value, annotation):
             self._stop(end, code, f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}")
         return value
 
@@ -210,10 +212,8 @@ class Infer:
             self._facts[draft.spec.id] = found
         return found
 
-    def _ruled(self, end: Endpoint, what: str, rule: Any) -> Any:
-        """A constant, or what the author's function gives; ports with one function get one answer."""
-        if not callable(rule):
-            return rule
+    def _ruled(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
+        """What the author's function gives; ports with one function get one answer."""
         key = end.node, id(rule)
         if key not in self._answers:
             self._answers[key] = self._asked(end, what, rule)
@@ -325,8 +325,8 @@ class Infer:
                 base = like.size
             elif isinstance(port, WrittenPort) and (seen := self._seen_with(draft)) is not None:
                 base = self._view_size(seen)
-        width, height = (max(1, math.ceil(side * factor - 1e-9)) if factor != 1.0 else side for side in base)
-        if min(width, height) < 1 or max(width, height) > MOST_SIDE:
+        width, height = base if factor == 1.0 else [max(1, math.ceil(side * factor - 1e-9)) for side in base]
+        if not (1 <= width <= MOST_SIDE and 1 <= height <= MOST_SIDE):
             self._stop(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
         return width, height
 
@@ -392,7 +392,7 @@ class Infer:
 def made_ports(draft: Draft) -> Iterator[Endpoint]:
     """Everything of a node that carries something."""
     for name, port in draft.ports.items():
-        if isinstance(port, WrittenPort | Function | Views):
+        if not isinstance(port, Input):
             yield Endpoint(draft.spec.id, name)
 
 

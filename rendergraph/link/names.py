@@ -119,8 +119,8 @@ class References:
         found = self._follow(scope, match[1], match[2], wanted, value, 0)
         if found is None:
             return None
-        source = found.source
-        return replace(found, source=source._replace(previous=source.previous or bool(match[3])), value=value)
+        source = _last(found.source) if match[3] else found.source
+        return found if source is found.source and value is found.value else replace(found, source=source, value=value)
 
     def outputs_of(self, scope: str, name: str) -> list[str]:
         """What a node or sub-pipeline of a scope offers, empty where it is unknown."""
@@ -168,8 +168,7 @@ class References:
         node_type = self.types.get(node.id)
         if node_type is None:
             raise Wrong(None)
-        outputs = node_type.cls.outputs()
-        if (port or wanted) not in outputs:
+        if (port or wanted) not in node_type.cls.outputs():
             raise Wrong(value.problem("RG112", self._no_output(node, node_type, port, wanted, value)))
         return Link(Endpoint(node.id, port or wanted), value)
 
@@ -192,7 +191,7 @@ class References:
         link = self._follow(found.parent, match[1], match[2], port, given, depth + 1)
         if link is None:
             return None
-        source = link.source._replace(previous=link.source.previous or bool(match[3]))
+        source = _last(link.source) if match[3] else link.source
         crossing = Crossing(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
         return replace(link, source=source, declared=(*link.declared, crossing))
 
@@ -211,7 +210,7 @@ class References:
         link = self._follow(scope, match[1], match[2], port or wanted, inner, depth + 1)
         if link is None:
             return None
-        source = link.source._replace(previous=link.source.previous or bool(match[3]))
+        source = _last(link.source) if match[3] else link.source
         return replace(link, source=source)
 
     def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str, value: Value) -> str:
@@ -223,6 +222,10 @@ class References:
         if name in node_type.cls.inputs():
             return f"{text}, only an input of that name{suggestion(name, outputs)}"
         return text + suggestion(name, outputs)
+
+
+def _last(source: Endpoint) -> Endpoint:
+    return source._replace(previous=True)
 
 
 def line_of(place: Place, here: Place) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from graphlib import CycleError, TopologicalSorter
 
 from msgspec.structs import replace
 
@@ -16,11 +15,8 @@ from rendergraph.link.names import Draft, Link, line_of
 
 def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
     """One problem for each knot of nodes that need each other in the same frame."""
-    try:
-        TopologicalSorter(sources(nodes)).prepare()
-        return []
-    except CycleError:
-        import networkx as nx  # for the message of a mistake alone
+    import networkx as nx  # for the message of a mistake alone
+
     links = {
         (link.source.node, draft.spec.id): (name, link)
         for draft in nodes.values()
@@ -84,8 +80,8 @@ def versions(nodes: Mapping[str, Draft]) -> list[Problem]:
     writers: dict[Endpoint, tuple[Draft, Link]] = {}
     problems: list[Problem] = []
     for draft in nodes.values():
-        for name, port in draft.ports.items():
-            for link in draft.links.get(name, ()) if isinstance(port, InOut) else ():
+        for name, port in draft.inputs.items():
+            for link in draft.links[name] if isinstance(port, InOut) else ():
                 if link.source.previous:
                     continue
                 if link.source in writers:

@@ -67,9 +67,10 @@ def choice_files(
     found: dict[str, Path] = {}
     problems: list[Problem] = []
     for name, parameter in node.parameters().items():
-        chosen, value, open_name = getattr(node, name), spec.params.get(name), parameter.open_name
-        if not open_name or not isinstance(chosen, str):
+        open_name = parameter.open_name
+        if not open_name or not isinstance(chosen := getattr(node, name), str):
             continue
+        value = spec.params.get(name)
         try:
             if chosen in parameter.words:
                 file: Path | None = node_type.choice_file(open_name, chosen)

@@ -18,7 +18,7 @@ class TypeNames(Struct, frozen=True):
 
     params: frozenset[str]
     inputs: frozenset[str]
-    groups: dict[str, tuple[str, ...]]
+    groups: Mapping[str, tuple[str, ...]]
     optional: frozenset[str]
     outputs: frozenset[str]
 

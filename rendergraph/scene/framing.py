@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +38,7 @@ def framing_camera(scene: Scene, aspect: float = WIDE) -> Camera:
         aspect: width over height of the picture.
     """
     center, radius = bounding_sphere(scene)
-    axes = look_at(FRAMING_DIRECTION, (0.0, 0.0, 0.0))[:3, :3].T  # rows: right, up, towards the viewer
+    axes = _axes()
     tall = math.tan(FRAMING_FOV / 2) * _MARGIN
     wide = tall * aspect
     # Outward normals of the view's four sides, then the way to the viewer: in the camera's axes, then the world's.
@@ -50,6 +51,12 @@ def framing_camera(scene: Scene, aspect: float = WIDE) -> Camera:
     target = eye - axes[2] * away
     near = min(0.1 * radius, 0.5 * nearest)
     return Camera("default", look_at(eye, target), fov_y=FRAMING_FOV, near=near, far=20 * radius, target=vec3(target))
+
+
+@cache
+def _axes() -> npt.NDArray[np.float64]:
+    """Of the framing camera, as rows: right, up, towards the viewer."""
+    return look_at(FRAMING_DIRECTION, (0.0, 0.0, 0.0))[:3, :3].T
 
 
 def _reaches(

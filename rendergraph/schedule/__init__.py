@@ -79,7 +79,7 @@ class Schedule(Struct, frozen=True, dict=True):
         """Whether the least peak that was found is the least of all legal orders."""
         return self.least_peak_bytes == self.lower_bound_bytes
 
-    @property
+    @cached_property
     def shown(self) -> frozenset[str]:
         """Ids of the resources that keep their memory from their first write to the frame's end."""
         return frozenset(self.wanted.values()) - self.whole_frame
@@ -125,7 +125,7 @@ def schedule(
     touched = {id for step in kept for id in touched_ids(step)}
     shown = set(expansion.wanted.values())
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}
-    kept_versions = Versions.of(kept)
+    kept_versions = Versions.of(kept) if len(kept) < len(expansion.steps) else versions
     waits = dependencies(kept, kept_versions)
     sinks = _sinks(expansion, kept, versions)
     whole_frame = {id: resources[id].bytes for id in alive_all_frame(resources, kept_versions)}

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from rendergraph.errors import InputError, Mistake, Problem
+from rendergraph.link.graph import upstream_first
 from rendergraph.steps import Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
@@ -27,7 +28,7 @@ Waits: TypeAlias = Mapping[StepKey, Mapping[StepKey, tuple[str, str]]]
 
 def touched_ids(step: Step) -> dict[str, None]:
     """Ids of the resources a step reads or writes, each once, in its own order."""
-    return dict.fromkeys([*(read.resource for read in step.all_reads), *(write.resource for write in step.writes)])
+    return dict.fromkeys([*[read.resource for read in step.all_reads], *[write.resource for write in step.writes]])
 
 
 class Versions(Struct, frozen=True):
@@ -157,42 +158,39 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
     is about to overwrite. What a step waits for is in the order of its reads, then its writes, so that nothing depends
     on the order of nodes.
 
+    Args:
+        kept: the steps.
+        versions: what they read and write, and nobody else.
+
     Raises:
         InputError: steps wait for each other (RG602); the message names both nodes.
     """
-    waits: dict[StepKey, dict[StepKey, tuple[str, str]]] = {step.key: {} for step in kept}
-    writers = {
-        id: [(version, step.key) for version, step in found.items() if step.key in waits]
-        for id, found in versions.writers.items()
-    }
     # Readers by the kept version they see: the writers between may have been culled.
     readers: dict[tuple[str, int], list[StepKey]] = defaultdict(list)
-    for id, found in versions.readers.items():
-        known = [0, *(version for version, _ in writers.get(id, ()))]
-        for version, step in found:
-            if step.key in waits:
-                readers[id, known[bisect_right(known, version) - 1]].append(step.key)
-    before = {id: {v: earlier for earlier, (v, _) in pairwise(found)} for id, found in writers.items()}
-
-    def add(source: StepKey, target: StepKey, resource: str, why: str) -> None:
-        if source != target:
-            waits[target].setdefault(source, (resource, why))
-
+    for id, seen in versions.readers.items():
+        known = [0, *versions.writers.get(id, ())]
+        for version, step in seen:
+            readers[id, known[bisect_right(known, version) - 1]].append(step.key)
+    before = {id: {v: earlier for earlier, (v, _) in pairwise(made.items())} for id, made in versions.writers.items()}
+    waits: dict[StepKey, dict[StepKey, tuple[str, str]]] = {}
     for step in kept:
+        mine = waits[step.key] = {}
         for read in step.all_reads:
             writer = None if read.previous else versions.writers.get(read.resource, {}).get(read.version)
             if writer is not None:
-                add(writer.key, step.key, read.resource, "reads")
+                mine.setdefault(writer.key, (read.resource, "reads"))
         for write in step.writes:
             version, earlier = before[write.resource].get(write.version, (0, None))
             if earlier is not None:
-                add(earlier, step.key, write.resource, "continues")
+                mine.setdefault(earlier.key, (write.resource, "continues"))
             for reader in sorted(readers.get((write.resource, version), ())):
-                add(reader, step.key, write.resource, "overwrites")
-    try:
-        TopologicalSorter(waits).prepare()
-    except CycleError as error:
-        raise InputError(_cycle(waits, list(pairwise(error.args[1])))) from None
+                mine.setdefault(reader, (write.resource, "overwrites"))
+        mine.pop(step.key, None)
+    if len(upstream_first(waits)) < len(waits):
+        try:
+            TopologicalSorter(waits).prepare()  # names one cycle
+        except CycleError as error:
+            raise InputError(_cycle(waits, list(pairwise(error.args[1])))) from None
     return waits
 
 

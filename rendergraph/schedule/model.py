@@ -103,6 +103,7 @@ class Model(Struct, frozen=True):
         names: dict[str, int] = {}
         touched: list[tuple[int, ...]] = []
         born = [0] * len(steps)
+        sizes: list[int] = []
         toucher_count: list[int] = []
         for place, step in enumerate(steps):
             mine = []
@@ -112,7 +113,8 @@ class Model(Struct, frozen=True):
                 if id not in names:  # the reading order is legal, so the first to touch is the first writer
                     names[id] = len(names)
                     toucher_count.append(0)
-                    born[place] += resources[id].bytes
+                    sizes.append(resources[id].bytes)
+                    born[place] += sizes[-1]
                 mine.append(names[id])
                 toucher_count[names[id]] += 1
             touched.append(tuple(mine))
@@ -127,7 +129,7 @@ class Model(Struct, frozen=True):
             tuple(map(tuple, after)),
             tuple(touched),
             tuple(born),
-            tuple(resources[id].bytes for id in names),
+            tuple(sizes),
             classes,
             tuple(toucher_count),
             ending,

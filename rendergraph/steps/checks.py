@@ -87,7 +87,7 @@ def own_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
 def part_of(ports: Mapping[str, Port], value: object, what: str) -> Part:
     """A port of the node, or a part of one."""
     port = own_port(ports, value, what)
-    return value if isinstance(value, Part) else Part(port)
+    return value if isinstance(value, Part) else port.whole
 
 
 def within(part: Part, desc: TextureDesc | BufferDesc) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -202,6 +202,8 @@ class Step(Struct, frozen=True):
 
 
 Role = Literal["transient", "internal", "output", "history", "kept", "scene"]
+_COPIES: Mapping[str, int] = {"history": 2, "scene": 0}
+"""Where it is not one."""
 
 
 class Resource(Struct, frozen=True):
@@ -227,4 +229,4 @@ class Resource(Struct, frozen=True):
     @property
     def bytes(self) -> int:
         """Bytes by formula; a history texture has two copies, and the scene's is not the pipeline's."""
-        return self.desc.bytes * {"history": 2, "scene": 0}.get(self.role, 1)
+        return self.desc.bytes * _COPIES.get(self.role, 1)

@@ -351,7 +351,7 @@ class Steps:
     ) -> None:
         if out is None:
             targets = {
-                name: Part(port)
+                name: port.whole
                 for name, port in self.ports.items()
                 if isinstance(port, Output | InOut) and self._recorder.used(port)
             }
@@ -433,15 +433,18 @@ class Steps:
     def _reads(self, named: Mapping[str, Target]) -> Iterator[Part]:
         """What a step reads, every input where it names none."""
         for target in named.values() or (port for port in self.ports.values() if isinstance(port, Input | InOut)):
-            part = target if isinstance(target, Part) else Part(target)
+            part = target if isinstance(target, Part) else target.whole
             if getattr(part.port, "kind", "function") not in ("view", "function"):
                 yield part
+
+
+_HERE = f"{__package__}."
 
 
 def _caller() -> tuple[str, int] | None:
     """The line of an author that asked for a step; None where the framework did by itself."""
     frame: FrameType | None = sys._getframe(1)
-    while frame is not None and str(frame.f_globals.get("__name__")).startswith(f"{__package__}."):
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith(_HERE):
         frame = frame.f_back
     if frame is None or is_framework(str(frame.f_globals.get("__name__"))):
         return None
