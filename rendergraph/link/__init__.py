@@ -351,7 +351,7 @@ class _Linker:
 
     def _crossings(self, nodes: Mapping[str, Draft], infer: Infer) -> None:
         """Links into sub-pipelines against what those declare; a wrong one is cut, so that nothing inside complains."""
-        for draft in nodes.values():
+        for draft in nodes.values() if self.spec.scopes else ():
             for name, links in draft.links.items():
                 for found in [found for found in links if found.declared]:
                     info = infer.info(found.source)

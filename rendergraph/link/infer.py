@@ -301,8 +301,8 @@ class Infer:
         """What a texture follows that says nothing of samples: what it is like, or a depth attached beside it."""
         if like is not None:
             return like.samples
-        tested = (name for name, one in draft.inputs.items() if isinstance(one, Input) and one.use == "depth_test")
-        for info in (self._linked(draft, name) for name in tested):
+        for name in [name for name, port in draft.type.read.items() if port.use == "depth_test"]:
+            info = self._linked(draft, name)
             if info is not None and info.desc is not None and info.desc.size == size:
                 return info.desc.samples
         return 1

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+from msgspec.structs import replace
 
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Extensions, Node, Parameter
@@ -21,22 +23,32 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
     cls, parameters = node_type.cls, node_type.cls.parameters()
     unknown = [name for name in spec.params if name not in parameters]
     problems = [_unknown(spec.params[name], name, node_type) for name in unknown[:MOST_PROBLEMS]]
-    values = {}
-    for name in [name for name in spec.params if name in parameters]:
-        value = spec.params[name]
-        try:
-            values[name] = parameters[name].convert(value.plain())
-        except TypeError as error:
-            hint = suggestion(value.data, parameters[name].words, most=0) if isinstance(value.data, str) else ""
-            problems.append(value.problem("RG104", f"'{spec.id}.{name}' {error}, this is {said(value)}{hint}"))
-        except ValueError as error:
-            problems.append(value.problem("RG104", f"'{spec.id}.{name}' is {said(value)}, it {error}"))
+    values = {name: value.plain() for name, value in spec.params.items() if name in parameters}
     try:
         return cls(**values), problems
     except BaseException as error:  # its own check is the author's code
         if is_interruption(error):
             raise
-        return cls(), problems or [_refused(spec, node_type, values, error)]
+        unfit = dict(_unfit(spec, parameters, values))
+        if not unfit:
+            return cls(), problems or [_refused(spec, node_type, values, error)]
+        fit = {name: value for name, value in spec.params.items() if name in values and name not in unfit}
+        return instance(replace(spec, params=fit), node_type)[0], [*problems, *unfit.values()]
+
+
+def _unfit(
+    spec: NodeSpec, parameters: Mapping[str, Parameter], values: Mapping[str, Any]
+) -> Iterator[tuple[str, Problem]]:
+    """The values that their parameters do not take."""
+    for name, plain in values.items():
+        value = spec.params[name]
+        try:
+            parameters[name].convert(plain)
+        except TypeError as error:
+            hint = suggestion(value.data, parameters[name].words, most=0) if isinstance(value.data, str) else ""
+            yield name, value.problem("RG104", f"'{spec.id}.{name}' {error}, this is {said(value)}{hint}")
+        except ValueError as error:
+            yield name, value.problem("RG104", f"'{spec.id}.{name}' is {said(value)}, it {error}")
 
 
 def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], error: BaseException) -> Problem:

@@ -55,8 +55,11 @@ def resolve(
     wanted = settings(sets)
     files = Files(catalog, asset_roots, limits)
     document = _entry(source, limits)
-    files.plugins.start(*_home(document, files))
-    files.own(document)
+    is_shipped = document.path is not None and shipped_pipelines().get(document.path.stem) == document.path
+    home = Path() if is_shipped or document.path is None else document.path.parent  # where the resolved file will stand
+    roots = Roots.around(home / "x", files.asset_roots)
+    files.plugins.start(home, roots)
+    files.own(document, None if is_shipped else roots)
     tree = files.chain(document)
     for patch in patches:
         tree = files.patched(tree, _patch(patch, files, limits))
@@ -113,14 +116,6 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
             raise InputError(Problem("RG015", f"there is no shipped pipeline '{source}'{hint}"))
         return read(shipped[source], None, limits, keep_going=True)
     return read(Path(source), None, limits, keep_going=True)
-
-
-def _home(document: Document, files: Files) -> tuple[Path, Roots]:
-    """Where the resolved file will stand, and what may be reached from there."""
-    path = document.path
-    shipped = path is not None and path in shipped_pipelines().values()
-    home = Path() if path is None or shipped else path.parent
-    return home, Roots.around(home / "x", files.asset_roots)
 
 
 def _patch(patch: Path | Mapping[str, Any], files: Files, limits: YamlLimits) -> Value:

@@ -75,31 +75,30 @@ class Flattener:
         sets: Sequence[Setting],
     ) -> Value:
         node_id = f"{scope}{name}"
+        parts = entries(node)
         params: dict[str, Value] = {}
-        for key, value in entries(node, "params").items():
+        for key, value in entries(parts.get("params")).items():
             replaced = self._replaced(value, values, used)
             if replaced is not None and replaced.data is not None:
                 params[key] = replaced
-        given = node.get("inputs")
-        inputs: dict[str, Value] = dict(given.items()) if given is not None else {}
-        node_type = node.get("type")
-        sub = self.files.sub_pipeline(node_type) if node_type is not None and node_type.data is not None else None
+        inputs: dict[str, Value] = dict(parts["inputs"].items()) if "inputs" in parts else {}
+        disabled = self._disabled(parts, scope)
+        node_type = parts.get("type")
+        sub = self.files.sub_pipeline(node_type) if node_type is not None else None
         if sub is None or node_type is None:
             if sets:
                 text = f"node '{node_id}' is no sub-pipeline; there is nothing inside it to set"
                 for setting in sets:
                     self.files.say(setting.problem("RG109", text))
-            problem = self.files.missing(node_type) if node_type is not None and node_type.data is not None else None
+            problem = self.files.missing(node_type) if node_type is not None else None
             if problem:
                 self.files.say(problem)
-            name_of = self.files.type_name(node_type) if node_type is not None and node_type.data is not None else ""
-            type_name = "" if problem else name_of
-            self._add(NodeSpec(node_id, type_name, scope, inputs, params, node, self._disabled(node, scope)))
-            said = ("nodes", name, "type") in self.files.dropped
-            if (node_type is None or node_type.data is None) and not said:
+            name_of = self.files.type_name(node_type) if node_type is not None else ""
+            self._add(NodeSpec(node_id, "" if problem else name_of, scope, inputs, params, node, disabled))
+            if node_type is None and ("nodes", name, "type") not in self.files.dropped:
                 self._without_type(name, node)
             return _typed(node, node_type, name_of)
-        return self._composite(name, node, node_type, sub, scope, params, inputs, sets)
+        return self._composite(name, node, node_type, sub, scope, params, inputs, disabled, sets)
 
     def _composite(
         self,
@@ -110,6 +109,7 @@ class Flattener:
         scope: str,
         params: Mapping[str, Value],
         inputs: dict[str, Value],
+        disabled: Value | None,
         sets: Sequence[Setting],
     ) -> Value:
         inside = f"{scope}{name}/"
@@ -131,7 +131,6 @@ class Flattener:
                     f"sub-pipeline '{display(node_type.data)}' has no input '{key}'{suggestion(key, declared_inputs)}"
                 )
                 self.files.say(link.problem("RG111", text, key=True))
-        disabled = self._disabled(node, scope)
         for key, declared in declared_inputs.items() if disabled is None else ():
             optional = declared.get("optional")
             if (key not in inputs or inputs[key].data is None) and not (optional and optional.data):
@@ -151,9 +150,9 @@ class Flattener:
         parts = dict(node.data) if isinstance(node.data, dict) else {}
         return node.with_data({**parts, "type": node_type.with_data(whole.data)})
 
-    def _disabled(self, node: Value, scope: str) -> Value | None:
+    def _disabled(self, parts: Mapping[str, Value], scope: str) -> Value | None:
         """The `false` that takes a node out."""
-        own = node.get("enabled")
+        own = parts.get("enabled")
         if own is not None and own.data is False:
             return own
         return self.scopes[scope].disabled if scope else None
