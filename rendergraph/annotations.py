@@ -11,7 +11,8 @@ import re
 import types
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from functools import cache, partial
+from functools import cache, partial, reduce
+from operator import call
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -105,21 +106,15 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
     if annotation is None:
         return lambda value: value is None
     if origin is Annotated:
-        plain = test_of(annotation.__origin__)
-        rules = [rule for rule in annotation.__metadata__ if not isinstance(rule, str)]
-        return lambda value: plain(value) and all(rule.holds(value) for rule in rules)
+        rules = [rule.holds for rule in annotation.__metadata__ if not isinstance(rule, str)]
+        return reduce(_both, rules, test_of(annotation.__origin__))
     if origin in (Union, types.UnionType):
-        either = [test_of(part) for part in arguments]
-        return lambda value: any(test(value) for test in either)
+        return reduce(_either, map(test_of, arguments))
     if origin is Literal:
         return lambda value: any(type(value) is type(choice) and value == choice for choice in arguments)
     if origin is tuple and Ellipsis not in arguments:
         tests = [test_of(part) for part in arguments]
-        return lambda value: (
-            isinstance(value, tuple)
-            and len(value) == len(tests)
-            and all(test(entry) for test, entry in zip(tests, value, strict=True))
-        )
+        return lambda value: isinstance(value, tuple) and len(value) == len(tests) and all(map(call, tests, value))
     if origin in (tuple, list, Sequence):
         entries = test_of(arguments[0])
         return lambda value: isinstance(value, tuple | list | range) and all(map(entries, value))
@@ -133,6 +128,14 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
         return lambda value: isinstance(value, kinds) and not isinstance(value, bool)
     kind = origin or annotation
     return lambda value: isinstance(value, kind)
+
+
+def _both(one: Callable[[Any], bool], other: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: one(value) and other(value)
+
+
+def _either(one: Callable[[Any], bool], other: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: one(value) or other(value)
 
 
 @cache

@@ -13,7 +13,7 @@ from rendergraph.annotations import (
     Length,
     Matching,
     Range,
-    converted,
+    conversion_to,
     fits,
     mistakes_in,
     mistakes_of,
@@ -86,7 +86,7 @@ CONVERTED: list[tuple[Any, object, object]] = [
 
 @pytest.mark.parametrize(("annotation", "value", "made"), CONVERTED)
 def test_what_a_file_means(annotation: Any, value: object, made: object) -> None:
-    assert repr(converted(value, annotation)) == repr(made)
+    assert repr(conversion_to(annotation)(value)) == repr(made)
 
 
 BEYOND: list[tuple[Range, float, str | None]] = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 
 from rendergraph.declare import Part
 from rendergraph.steps import Read, Resource, State, StepRequest, Write
@@ -44,7 +45,7 @@ def target_size(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
 ) -> tuple[tuple[int, int], int]:
     """Width, height and samples of what a step writes."""
-    attached: tuple[Read | Write, ...] = (*writes, *[read for read in reads if read.use == "depth_test"])
+    attached: Iterable[Read | Write] = chain(writes, (read for read in reads if read.use == "depth_test"))
     for touched in attached:
         desc = resources[touched.resource].desc
         if isinstance(desc, TextureDesc):
@@ -83,7 +84,7 @@ def onto_nothing(request: StepRequest, writes: Iterable[Write]) -> str | None:
     state = request.options.get("state")
     if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):
         return None
-    colors = [write for write in writes if write.use == "color"]
+    colors = [write for write in writes if write.use == "color"] if state.blend is not None else []
     blends = state.blend if isinstance(state.blend, tuple) else (state.blend,) * len(colors)
     for write, blend in zip(colors, blends, strict=False):
         if write.load == "discard" and blend is not None and blend.takes_destination:

@@ -359,8 +359,8 @@ class Steps:
             targets = checks.targets(self.ports, out)
         textures, uniforms = self._bindings(bindings)
         named = len(uniforms) < len(bindings)
-        for part in (*targets.values(), *(value for value in textures.values() if isinstance(value, Part))):
-            if part.mip is not None or part.layer is not None:
+        for part in (*targets.values(), *textures.values()):
+            if isinstance(part, Part) and (part.mip is not None or part.layer is not None):
                 desc = self._desc(part.port)
                 if desc is not None:
                     checks.within(part, desc)
@@ -438,13 +438,10 @@ class Steps:
                 yield part
 
 
-_HERE = f"{__package__}."
-
-
 def _caller() -> tuple[str, int] | None:
     """The line of an author that asked for a step; None where the framework did by itself."""
     frame: FrameType | None = sys._getframe(1)
-    while frame is not None and str(frame.f_globals.get("__name__")).startswith(_HERE):
+    while frame is not None and frame.f_globals.get("__package__") == __package__:
         frame = frame.f_back
     if frame is None or is_framework(str(frame.f_globals.get("__name__"))):
         return None
