@@ -29,6 +29,7 @@ from rendergraph.declare import Added
 from rendergraph.declare.extension import Metric
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.images import from_srgb, to_srgb
+from rendergraph.installed import version
 
 Pixels: TypeAlias = npt.NDArray[Any]
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -227,8 +228,6 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
 
 def description() -> dict[str, Any]:
     """Versions and parameters of the metrics, for results that outlive the program."""
-    from importlib.metadata import version  # for a report alone
-
     return {
         "rmse": {"on": "sRGB-encoded R, G, B, 0…1; linear values for scene-linear references"},
         "psnr": {"peak": 1.0},

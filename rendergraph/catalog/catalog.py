@@ -11,11 +11,12 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from rendergraph.catalog import find, modules
-from rendergraph.catalog.configured import Named, configured, plain, projects
+from rendergraph.catalog.configured import Named, configured, projects
 from rendergraph.catalog.extensions import extensions
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
+from rendergraph.installed import entry_points, plain
 
 GROUP = "rendergraph.nodes"
 """The entry point group; an entry's value is a package of node modules in folders by family."""
@@ -54,16 +55,13 @@ class Catalog:
         Raises:
             InputError: a path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
         """
-        from importlib.metadata import entry_points  # takes longer than reading a pipeline
-
         named = {entry.path.resolve(): entry for entry in configured()} if installed else {}
         named |= {path.resolve(): Named(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
         own = projects(path for path in named if path.is_dir())
-        for entry in entry_points(group=GROUP) if installed else ():
-            if entry.dist is not None and plain(entry.dist.name) in own:
-                continue
-            _add(listed, find.package(entry.name, entry.value.partition(":")[0]))
+        for entry in entry_points(GROUP) if installed else ():
+            if plain(entry.package.name) not in own:
+                _add(listed, find.package(entry.name, entry.module))
         notes = []
         for plugin in named.values():
             try:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from msgspec import Struct
 
 from rendergraph.errors import Place, shown_file
+from rendergraph.installed import plain
 from rendergraph.settings import at_home, nearest
 from rendergraph.stamps import look
 
@@ -59,11 +59,6 @@ def projects(folders: Iterable[Path]) -> frozenset[str]:
     """
     names = {_project(folder) for folder in folders} - {"", OWN}
     return frozenset(names)
-
-
-def plain(name: str) -> str:
-    """A package's name as indexes compare them (PEP 503)."""
-    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def _project(folder: Path) -> str:

@@ -6,14 +6,13 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
-from rendergraph.catalog.configured import plain
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
 from rendergraph.declare.blame import raised_at, told
 from rendergraph.errors import Place, Problem, is_interruption, shown_file
+from rendergraph.installed import EntryPoint, entry_points, plain
 from rendergraph.stamps import look
 
 GROUP = "rendergraph.extensions"
@@ -38,11 +37,9 @@ def extensions(
 
 
 def _sources(folders: Iterable[tuple[str, Path]], installed: bool, without: Collection[str]) -> Iterator[Source]:
-    from importlib.metadata import entry_points  # takes longer than reading a pipeline
-
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.value) if installed else ():
-        plugin = entry.dist.name if entry.dist is not None else entry.name
-        if entry.dist is not None and plain(plugin) in without:
+    for entry in sorted(entry_points(GROUP), key=lambda entry: entry.value) if installed else ():
+        plugin = entry.package.name
+        if plain(plugin) in without:
             continue
         yield _source(plugin, _file(entry), entry.load, entry.value)
     for package, folder in folders:

@@ -12,6 +12,7 @@ from typing import Any
 from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json, table
 from rendergraph.cli.words import click
+from rendergraph.installed import version
 
 _OPTIONAL_FEATURES = ("memory objects", "depth bounds")
 _SECONDS = 60
@@ -47,7 +48,7 @@ def examine() -> dict[str, Any]:
     usable = [device for device in devices if device["usable"]]
     return {
         "ok": bool(usable) and None not in packages.values(),
-        "rendergraph": _version("rendergraph"),
+        "rendergraph": version("rendergraph"),
         "python": platform.python_version(),
         "platform": platform.platform(),
         "packages": packages,
@@ -87,16 +88,7 @@ def _packages() -> dict[str, str | None]:
     except PackageNotFoundError:
         needed = []
     names = [re.split(r"[^A-Za-z0-9._-]", line, maxsplit=1)[0] for line in needed if "extra ==" not in line]
-    return {name: _version(name) for name in names}
-
-
-def _version(name: str) -> str | None:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
+    return {name: version(name) for name in names}
 
 
 def _advice(asked: dict[str, Any], devices: list[dict[str, Any]], packages: dict[str, str | None]) -> list[str]:

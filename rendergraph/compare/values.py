@@ -14,6 +14,7 @@ from rendergraph.compare.axes import typed
 from rendergraph.compare.timing import Times
 from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Place, Problem
+from rendergraph.installed import version
 from rendergraph.metrics import Encoding, Metrics, colors, description, rmse
 from rendergraph.session.frame import not_finite
 
@@ -276,14 +277,12 @@ def not_finite_pixels(graph: Graph, arrays: Mapping[str, Pixels]) -> int:
 
 def machine() -> dict[str, str]:
     """The computer and the versions, in words."""
-    from importlib.metadata import version  # takes longer than a check, and only reports ask
-
     names = ("rendergraph", "moderngl", "numpy", "OpenImageIO")
     return {
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "processor": _processor(),
         "python": platform.python_version(),
-        **{name: version(name) for name in names},
+        **{name: version(name) or "" for name in names},
     }
 
 

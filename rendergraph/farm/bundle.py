@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from rendergraph.catalog.configured import OWN, VARIABLE, configured
 from rendergraph.errors import InputError, Place, Problem, RendergraphError
+from rendergraph.installed import version
 from rendergraph.resources import folder
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def bundled(looked_at: Iterable[Path], plugins: Sequence[Path], modules: Iterabl
         tuple(sorted(folders)),
         os.getcwd(),
         os.environ.get(VARIABLE, ""),
-        {name: (version_of(name) or "", digest_of(name)) for name in (OWN, *sorted(needed - {OWN}))},
+        {name: (version(name) or "", digest_of(name)) for name in (OWN, *sorted(needed - {OWN}))},
     )
 
 
@@ -128,14 +129,6 @@ def _distributions(modules: Iterable[str]) -> set[str]:
         return set()
     known = metadata.packages_distributions()
     return {name for package in packages for name in known.get(package, ())}
-
-
-def version_of(name: str) -> str | None:
-    """The version of an installed distribution, None where it is not installed."""
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return None
 
 
 def digest_of(name: str) -> str:
@@ -165,16 +158,14 @@ def unfit(needed: Mapping[str, tuple[str, str]], worker: str) -> InputError | No
         worker: what it is called.
     """
     problems = []
-    for name, (version, digest) in needed.items():
-        here, what = version_of(name), "rendergraph" if name == OWN else f"the plugin '{name}'"
+    for name, (there, digest) in needed.items():
+        here, what = version(name), "rendergraph" if name == OWN else f"the plugin '{name}'"
         if here is None:
-            text = f"worker '{worker}' lacks {what}; install it there: pip install {name}=={version}"
-        elif here != version:
-            text = f"worker '{worker}' has {what} {here}, and here is {version}; install the same on both"
+            text = f"worker '{worker}' lacks {what}; install it there: pip install {name}=={there}"
+        elif here != there:
+            text = f"worker '{worker}' has {what} {here}, and here is {there}; install the same on both"
         elif digest_of(name) != digest:
-            text = (
-                f"worker '{worker}' has other files in {what} {version} than there are here; install the same on both"
-            )
+            text = f"worker '{worker}' has other files in {what} {there} than there are here; install the same on both"
         else:
             continue
         problems.append(Problem("RG642", text))

@@ -15,8 +15,9 @@ from typing import Any, TypeAlias
 from uuid import uuid4
 
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
-from rendergraph.farm.bundle import Bundle, bundled, version_of
+from rendergraph.farm.bundle import Bundle, bundled
 from rendergraph.farm.tasks import ATTEMPTS, Event, Executor, Failed, Finished, Handle, Item, Lost, Task, of_the_worker
+from rendergraph.installed import version
 
 Client: TypeAlias = Any  # an extra, of which most is not typed
 Cluster: TypeAlias = Any
@@ -151,7 +152,7 @@ class Dask(Executor):
 
     @staticmethod
     def _without(error: str) -> InputError:
-        way = f"install it there: pip install 'rendergraph[farm]=={version_of('rendergraph')}'"
+        way = f"install it there: pip install 'rendergraph[farm]=={version('rendergraph')}'"
         return InputError(Problem("RG642", f"a worker cannot use rendergraph ({' '.join(error.split())[:200]}); {way}"))
 
     def _scattered(self, contents: dict[str, bytes]) -> dict[str, Future]:

@@ -10,12 +10,12 @@ import re
 import shlex
 from collections.abc import Callable
 from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
 
 from rendergraph.catalog import SHADERS, Catalog, find
 from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, shown_file
+from rendergraph.installed import version
 from rendergraph.resolve.words import is_bare
 from rendergraph.settings import Roots
 
@@ -95,14 +95,11 @@ class Plugins:
             self._say(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
             return
         self.written.setdefault(name, value)
-        try:
-            metadata.distribution(name)
-        except metadata.PackageNotFoundError:
-            # While it is being written, its folder is named and it is not installed.
-            if name not in self.missing and not self.catalog.has_plugin(name):
-                self.missing.append(name)
-                text = f"the pipeline needs the plugin '{name}', which is not installed: pip install {name}"
-                self._say(value.problem("RG130", text))
+        # While it is being written, its folder is named and it is not installed.
+        if version(name) is None and name not in self.missing and not self.catalog.has_plugin(name):
+            self.missing.append(name)
+            text = f"the pipeline needs the plugin '{name}', which is not installed: pip install {name}"
+            self._say(value.problem("RG130", text))
 
     def _shaders(self, value: Value, text: str, folder: Path, roots: Roots) -> None:
         try:

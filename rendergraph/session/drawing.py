@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from importlib.metadata import version
 from time import perf_counter
 
 from msgspec import Struct, field
@@ -13,6 +12,7 @@ from rendergraph.compile import Executable, GpuScene
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.execute import FrameTimes, Runner
 from rendergraph.images import PictureInfo, channel_names
+from rendergraph.installed import version
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
