@@ -7,9 +7,8 @@ such a function may ask, and a link asks it once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -41,16 +40,17 @@ SizeRule: TypeAlias = Annotated[
 """A factor of the viewport, or of a view's own size; width and height; an input, also with a factor; a function."""
 
 
-@dataclass(frozen=True, eq=False)
-class Port:
+class Port(Struct, frozen=True, eq=False, dict=True):
     """One named connection point or texture of a node; its name is the class attribute's."""
 
-    name: str = field(init=False, default="")
-    owner: str = field(init=False, default="", repr=False)
+    name: ClassVar[str] = ""
+    owner: ClassVar[str] = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "owner", owner.__name__)
+        vars(self).update(name=name, owner=owner.__name__)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}('{self.name}')"
 
     @cached_property
     def whole(self) -> Part:
@@ -104,8 +104,7 @@ class Part(Struct, frozen=True):
         return replace(self, sampler=right(Sampler(filter, wrap, compare), "sampled"))
 
 
-@dataclass(frozen=True, eq=False)
-class Input(Port):
+class Input(Port, frozen=True, eq=False):
     """Something read.
 
     Attributes:
@@ -145,8 +144,7 @@ class Input(Port):
         return self.semantic == EnvironmentMap
 
 
-@dataclass(frozen=True, eq=False)
-class WrittenPort(Port):
+class WrittenPort(Port, frozen=True, eq=False):
     """A texture or buffer that the node makes: the shared part of `Output`, `InOut`, `Internal` and `History`.
 
     Attributes:
@@ -187,8 +185,7 @@ class WrittenPort(Port):
     doc: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Output(WrittenPort):
+class Output(WrittenPort, frozen=True, eq=False):
     """Something made for others.
 
     Attributes:
@@ -201,8 +198,7 @@ class Output(WrittenPort):
     kept: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class InOut(WrittenPort):
+class InOut(WrittenPort, frozen=True, eq=False):
     """A texture somebody else made, continued: each write is a new version, and readers of the old one run before.
 
     Attributes:
@@ -212,8 +208,7 @@ class InOut(WrittenPort):
     optional: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Internal(WrittenPort):
+class Internal(WrittenPort, frozen=True, eq=False):
     """A scratch texture or buffer of the node's own, aliased like any other.
 
     Attributes:
@@ -223,8 +218,7 @@ class Internal(WrittenPort):
     kept: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class History(WrittenPort):
+class History(WrittenPort, frozen=True, eq=False):
     """A texture of the node's own that outlives the frame: write `self.x`, read last frame's `self.x.previous`."""
 
     @property
@@ -233,8 +227,7 @@ class History(WrittenPort):
         return Part(self, previous=True)
 
 
-@dataclass(frozen=True, eq=False)
-class Views(Port):
+class Views(Port, frozen=True, eq=False):
     """A table of views that the node computes in `update`, one a layer of what it draws.
 
     Attributes:
@@ -253,8 +246,7 @@ class Views(Port):
     doc: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Function(Port):
+class Function(Port, frozen=True, eq=False):
     """A GLSL function that another node calls inside its own shader.
 
     Attributes:

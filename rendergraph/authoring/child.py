@@ -13,9 +13,11 @@ import resource
 import signal
 import sys
 import traceback
-from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
+
+from msgspec import to_builtins
+from msgspec.structs import replace
 
 from rendergraph.declare.blame import causes, raised_at, told
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
@@ -51,14 +53,14 @@ def main() -> None:
 
         plugins = [Path(plugin) for plugin in asked["plugins"]]
         report = examine_file(file, plugins, asked["scene"], lambda stage, what: send(stage=stage, what=what))
-        problems = [asdict(_shown(problem)) for problem in report.problems]
+        problems = [to_builtins(_shown(problem)) for problem in report.problems]
         send(report={"node": report.node, "variants": report.variants, "problems": problems})
     except RendergraphError as error:
         found = [_memory(file, asked["memory"], error) or problem for problem in error.problems]
-        send(failed=[asdict(_shown(problem)) for problem in dict.fromkeys(found)], exit_code=error.exit_code)
+        send(failed=[to_builtins(_shown(problem)) for problem in dict.fromkeys(found)], exit_code=error.exit_code)
     except BaseException as error:  # whatever a stranger's code can raise, and our own mistakes
         memory = _memory(file, asked["memory"], error)
-        send(**{"failed": [asdict(memory)], "exit_code": 3} if memory else _other(file, error))
+        send(**{"failed": [to_builtins(memory)], "exit_code": 3} if memory else _other(file, error))
     leave(0)  # no handlers and threads of a stranger's at the end
 
 
@@ -82,4 +84,4 @@ def _other(file: Path, error: BaseException) -> dict[str, Any]:
     place = raised_at(error, file)
     if place is None:
         return {"mistake": "".join(traceback.format_exception(error))}
-    return {"failed": [asdict(Problem(ENDED, f"it raises {told(error)}", place))], "exit_code": 3}
+    return {"failed": [to_builtins(Problem(ENDED, f"it raises {told(error)}", place))], "exit_code": 3}

@@ -110,7 +110,7 @@ class Trial:
                 here = self._own(problem, error)
                 if unfit is not None:
                     text = f"{here.text}; tried without '{unfit}', which is inherited"
-                    here = replace(here, text=text, severity="warning")
+                    here = structs.replace(here, text=text, severity="warning")
                 self.say(here)
             self.avoided |= set() if unfit is None else {unfit}
         else:
@@ -301,7 +301,7 @@ class Trial:
         place = mistake.place or (raised_at(error, self.type.file) if error is not None else None)
         if place is None and error is not None:
             place = self.port_place(mistake.subject.rpartition(".")[2])
-        return replace(problem, text=mistake.text, place=place, line_text="")
+        return structs.replace(problem, text=mistake.text, place=place, line_text="")
 
     def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:
         met = list(dict.fromkeys(names))
@@ -309,7 +309,7 @@ class Trial:
             return problem
         more = f" and {len(met) - 3} more" if len(met) > 3 else ""
         word = "" if met[0].startswith("without ") else "with "
-        return replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
+        return structs.replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
 
 
 def _is_beyond(error: RendergraphError) -> bool:

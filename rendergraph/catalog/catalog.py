@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -70,7 +69,7 @@ class Catalog:
             except InputError as error:
                 if not plugin.where or plugin.path.exists():
                     raise
-                notes += [dataclasses.replace(problem, severity="warning") for problem in error.problems]
+                notes += [replace(problem, severity="warning") for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         return cls(listed, extensions=extensions(folders, installed=installed, without=own), notes=tuple(notes))
 

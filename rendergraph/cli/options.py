@@ -7,10 +7,11 @@ import math
 import re
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+from msgspec import Struct
 
 from rendergraph.cli.output import emit, emit_json, warn
 from rendergraph.cli.words import click
@@ -29,8 +30,7 @@ _NAME = r"[A-Za-z_][A-Za-z0-9_-]*"
 _NODE = rf"{_NAME}(?:/{_NAME})*"
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(Struct, frozen=True):
     """A file, and the output or port it shows; of an output without a name the extension chooses it.
 
     What is `on_sheet` is one of all ports, and on their contact sheet.

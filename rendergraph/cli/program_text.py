@@ -35,9 +35,8 @@ def shown_at_work(found: NodeType, catalog: Catalog, select: Select) -> tuple[Li
     Raises:
         InputError: there is none, as no shipped pipeline has what the node needs.
     """
-    from dataclasses import replace
-
     import yaml
+    from msgspec.structs import replace
 
     from rendergraph.example import example
     from rendergraph.resources import shipped_pipelines

@@ -11,6 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from msgspec import structs
+
 from rendergraph.compare.ranges import MOST_VALUES, Span, parse_range
 from rendergraph.compare.sampling import Sampling, places
 from rendergraph.document import parse
@@ -323,9 +325,9 @@ def _of_axis(problem: Problem, run: Mapping[str, str]) -> Problem:
     where = problem.place.file if problem.place else ""
     for path, value in run.items():
         if where == f"--set {path}={value}":
-            return replace(problem, place=Place(f"-x {path}={value}"))
+            return structs.replace(problem, place=Place(f"-x {path}={value}"))
     if problem.place is None:
-        return replace(problem, place=Place(", ".join(f"{path}={value}" for path, value in run.items())))
+        return structs.replace(problem, place=Place(", ".join(f"{path}={value}" for path, value in run.items())))
     return problem
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import moderngl
 import numpy as np
 import numpy.typing as npt
-from msgspec import Struct
+from msgspec import Struct, field
 
 from rendergraph.compile.culling import commands
 from rendergraph.compile.programs import ProgramCache
@@ -87,8 +86,7 @@ class MeshIndices(Struct, frozen=True, eq=False):
     mode: int
 
 
-@dataclass(eq=False)
-class GpuScene:
+class GpuScene(Struct, eq=False, dict=True):
     """Buffers, material textures and the macros a scene gives to shaders.
 
     Attributes:
@@ -103,14 +101,14 @@ class GpuScene:
     decode: Decode
     decode_light: DecodeLight
     changes: Counter[str] = field(default_factory=Counter)
-    _streams: dict[str, tuple[moderngl.Buffer, str]] = field(default_factory=dict)
-    _constants: dict[str, moderngl.Buffer] = field(default_factory=dict)
-    _images: dict[tuple[ImageSource, bool], GpuTexture] = field(default_factory=dict)
-    _samplers: dict[tuple[int, ...], int] = field(default_factory=dict)
-    _blocks: dict[str, tuple[moderngl.Buffer, bool]] = field(default_factory=dict)
+    _streams: dict[str, tuple[moderngl.Buffer, str]] = {}
+    _constants: dict[str, moderngl.Buffer] = {}
+    _images: dict[tuple[ImageSource, bool], GpuTexture] = {}
+    _samplers: dict[tuple[int, ...], int] = {}
+    _blocks: dict[str, tuple[moderngl.Buffer, bool]] = {}
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
-    _behind: set[int] = field(default_factory=set)  # objects that have moved since the frame before was kept
+    _behind: set[int] = set()  # objects that have moved since the frame before was kept
 
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed

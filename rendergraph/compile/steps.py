@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import moderngl
+from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.allocate import ResourcePlan
@@ -95,8 +95,7 @@ def compile_plan(
         raise
 
 
-@dataclass(eq=False)
-class _Compiler:
+class _Compiler(Struct, eq=False, dict=True):
     device: Device
     plan: ResourcePlan
     types: Mapping[str, NodeType]

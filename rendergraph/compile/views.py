@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
+from msgspec import Struct
 
 from rendergraph.errors import Misuse, Problem, RenderError
 from rendergraph.expand import CAMERA, ViewTable
@@ -25,8 +25,7 @@ FIXED_BLOCKS = {
 """Binding points of the blocks the framework keeps; view tables follow."""
 
 
-@dataclass(eq=False)
-class ViewBuffers:
+class ViewBuffers(Struct, eq=False, dict=True):
     """One buffer a view table, and the frame block.
 
     Attributes:
@@ -36,13 +35,13 @@ class ViewBuffers:
 
     device: Device
     tables: Mapping[str, ViewTable]
-    current: dict[str, tuple[ViewMatrices, ...]] = field(default_factory=dict)
-    changed: set[str] = field(default_factory=set)
-    moved_before: set[str] = field(default_factory=set)
-    _buffers: dict[str, moderngl.Buffer] = field(default_factory=dict)
-    _packed: dict[str, bytes] = field(default_factory=dict)
-    _before: dict[str, moderngl.Buffer] = field(default_factory=dict)
-    _packed_before: dict[str, bytes] = field(default_factory=dict)
+    current: dict[str, tuple[ViewMatrices, ...]] = {}
+    changed: set[str] = set()
+    moved_before: set[str] = set()
+    _buffers: dict[str, moderngl.Buffer] = {}
+    _packed: dict[str, bytes] = {}
+    _before: dict[str, moderngl.Buffer] = {}
+    _packed_before: dict[str, bytes] = {}
     _frame_bytes: bytes = b""
 
     def __post_init__(self) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from msgspec import Struct
 
 from rendergraph.annotations import Matching, mistakes_of
 from rendergraph.errors import Mistake
@@ -30,8 +31,7 @@ Ending: TypeAlias = Annotated[
 ]
 
 
-@dataclass(frozen=True, eq=False)
-class MeshData:
+class MeshData(Struct, frozen=True, eq=False):
     """Triangles of one material, as a mesh loader gives them: right-handed, +Y up, metres.
 
     Attributes:
@@ -56,8 +56,7 @@ class MeshData:
     roughness: float = 1.0
 
 
-@dataclass(frozen=True)
-class Extension:
+class Extension(Struct, frozen=True):
     """What a plugin adds beside node types, each by name; nothing of it is imported before a name is asked for.
 
     It is found by the entry point group `rendergraph.extensions`, or as `EXTENSION` in `extension.py` at the top of a
@@ -76,10 +75,10 @@ class Extension:
     """
 
     semantics: tuple[Semantic, ...] = ()
-    choices: Mapping[str, Mapping[Word, Include]] = field(default_factory=dict)
-    meshes: Mapping[Ending, MeshLoader] = field(default_factory=dict)
-    images: Mapping[Ending, ImageLoader] = field(default_factory=dict)
-    metrics: Mapping[Word, Metric] = field(default_factory=dict)
+    choices: Mapping[str, Mapping[Word, Include]] = {}
+    meshes: Mapping[Ending, MeshLoader] = {}
+    images: Mapping[Ending, ImageLoader] = {}
+    metrics: Mapping[Word, Metric] = {}
 
 
 _READ_MESHES = (".yaml", ".yml", ".obj", ".gltf", ".glb")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -22,8 +21,7 @@ _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # what YAML takes for the en
 _LONGEST_LINE = 400
 
 
-@dataclass(eq=False)
-class Source:
+class Source(Struct, eq=False, dict=True):
     """Where values come from: a file, or an option of the command line.
 
     Attributes:
@@ -34,7 +32,7 @@ class Source:
 
     name: str
     path: Path | None = None
-    text: str = field(default="", repr=False)
+    text: str = ""
 
     @cached_property
     def _starts(self) -> list[int]:

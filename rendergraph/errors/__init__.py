@@ -8,17 +8,18 @@ docs and `rendergraph explain RG103` read it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar, Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 _WIDEST = 200
 """Characters of a file's line that a message shows, those around the place."""
 
 
-@dataclass(frozen=True, order=True)
-class Place:
+class Place(Struct, frozen=True, order=True):
     """A place in a file; line and column start at 1, 0 where a file has none (a mesh, a command-line option)."""
 
     file: str
@@ -31,8 +32,7 @@ class Place:
         return self.file
 
 
-@dataclass(frozen=True)
-class Mistake:
+class Mistake(Struct, frozen=True):
     """What is wrong with one thing, as a value: a problem is made of it by whoever knows the file and the code.
 
     Code that must tell one mistake from another, or find its place, asks these fields and never the text.
@@ -60,8 +60,7 @@ class Mistake:
         return Problem(code, f"{before}: {self}", place, mistake=replace(self, text=f"{before}: {self.text}"))
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(Struct, frozen=True, eq=False):
     """One mistake: `file:line:col: RG103 text`, with the line of the file beneath.
 
     Attributes:
@@ -78,7 +77,18 @@ class Problem:
     place: Place | None = None
     line_text: str = ""
     severity: Literal["error", "warning"] = "error"
-    mistake: Mistake | None = field(default=None, compare=False, repr=False)
+    mistake: Mistake | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Problem) and self._read == other._read
+
+    def __hash__(self) -> int:
+        return hash(self._read)
+
+    @property
+    def _read(self) -> tuple[object, ...]:
+        """What a user reads of it: two of one text are one."""
+        return self.code, self.text, self.place, self.line_text, self.severity
 
     def __str__(self) -> str:
         head = f"{self.place}: " if self.place else ""

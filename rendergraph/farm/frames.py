@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
+from msgspec import structs
 
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.farm.bundle import placed
@@ -115,7 +116,7 @@ def chunks(expanded: Expanded, wanted: Sequence[Wanted], workers: int, warm_up: 
     frames = expanded.options.frames
     each = max(1, min(MOST, -(-len(frames) // (PARTS * workers))), 2 * lead if remembers else 1)
     parts = [frames[at : at + each] for at in range(0, len(frames), each)]
-    options = [replace(expanded.options, frames=part) for part in parts]
+    options = [structs.replace(expanded.options, frames=part) for part in parts]
     return [Chunk(expanded.linked.selection, own, lead, tuple(wanted)) for own in options]
 
 

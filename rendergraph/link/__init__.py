@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Facts, InOut, Input, LightFacts, TextureInfo

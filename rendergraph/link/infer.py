@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Annotated, Any, NoReturn, Optional, overload
 
 import msgspec
+from msgspec.structs import replace
 
 from rendergraph import textures
 from rendergraph.annotations import fits, quoted, words_for

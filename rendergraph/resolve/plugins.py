@@ -9,8 +9,9 @@ import os
 import re
 import shlex
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from rendergraph.catalog import SHADERS, Catalog, find
 from rendergraph.document import Value, shown

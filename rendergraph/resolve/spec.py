@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +76,7 @@ class PipelineParameter(Struct, frozen=True):
     doc: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class PipelineSpec:
+class PipelineSpec(Struct, frozen=True, eq=False):
     """A pipeline with `extends`, patches, settings, parameters and sub-pipelines applied.
 
     Attributes:
@@ -112,14 +110,14 @@ class PipelineSpec:
     outputs: Mapping[str, Value]
     parameters: Mapping[str, PipelineParameter]
     scopes: Mapping[str, Scope]
-    tree: Value = field(repr=False)
+    tree: Value
     notes: tuple[Problem, ...] = ()
     problems: tuple[Problem, ...] = ()
     dropped: frozenset[tuple[str, ...]] = frozenset()
-    removed: Mapping[str, Value] = field(default_factory=dict, repr=False)
-    catalog: Catalog | None = field(default=None, repr=False)
+    removed: Mapping[str, Value] = {}
+    catalog: Catalog | None = None
     missing: tuple[str, ...] = ()
-    unrun: Mapping[str, str] = field(default_factory=dict)
+    unrun: Mapping[str, str] = {}
 
     def check(self) -> None:
         """Stop here if anything is wrong so far; for callers that do not go on to `link`.

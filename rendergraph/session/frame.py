@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
+from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, suggestion
 
@@ -16,8 +17,7 @@ if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
 
 
-@dataclass(frozen=True)
-class OutputInfo:
+class OutputInfo(Struct, frozen=True):
     """What an array's texels are.
 
     Attributes:

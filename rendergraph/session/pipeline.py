@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack
+
+from msgspec import structs
 
 from rendergraph.session import stages
 from rendergraph.session.progress import shown
@@ -87,7 +89,7 @@ class Pipeline:
     _done: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __repr__(self) -> str:
-        said = ((each, getattr(self.selection, each.name)) for each in fields(self.selection)[1:])
+        said = ((each, getattr(self.selection, each.name)) for each in structs.fields(self.selection)[1:])
         given = "".join(f", {each.name}={value!r}" for each, value in said if value != each.default)
         return f"load({self.selection.source!r}{given})"
 
@@ -112,7 +114,7 @@ class Pipeline:
 
     def select(self, **fields: Any) -> Pipeline:
         """The same with other values of these fields of its selection."""
-        return replace(self, selection=replace(self.selection, **fields))
+        return replace(self, selection=structs.replace(self.selection, **fields))
 
     # Stages ----------------------------------------------------------------------------------------------------------
 

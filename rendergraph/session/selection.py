@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from numbers import Integral
 from pathlib import Path
 from typing import Any, TypedDict
+
+from msgspec import Struct
+from msgspec.structs import force_setattr
 
 from rendergraph.errors import Problem, UsageError, suggestion
 
@@ -23,8 +25,7 @@ MOST_FRAMES = 100_000
 """Of one run: an hour at 30 frames a second."""
 
 
-@dataclass(frozen=True)
-class Selection:
+class Selection(Struct, frozen=True):
     """A pipeline's name with everything that changes it, as the options of every verb say it.
 
     Attributes:
@@ -56,7 +57,7 @@ class Selection:
 
     def __post_init__(self) -> None:
         if self.size is not None:
-            object.__setattr__(self, "size", _pair(self.size))
+            force_setattr(self, "size", _pair(self.size))
         if not self.limits:
             return
         known = {name for names in _limit_names().values() for name in names}
@@ -109,8 +110,7 @@ class RenderKeywords(TypedDict, total=False):
     cull: bool
 
 
-@dataclass(frozen=True)
-class RenderOptions:
+class RenderOptions(Struct, frozen=True):
     """What is drawn of a pipeline, and how; keywords of `render`, `frames` and `plan`.
 
     Attributes:

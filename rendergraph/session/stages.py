@@ -9,9 +9,10 @@ scenes in use (`scenes`) and, from `draw` on, what a `Gpu` keeps. GL is imported
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from msgspec.structs import asdict, replace
 
 import rendergraph.allocate
 import rendergraph.expand
@@ -79,7 +80,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         text = "the file does not say which version of the format it is written in; begin it with rendergraph: 1"
         note = replace(spec.tree.problem("RG016", text), severity="warning")
         spec = replace(spec, notes=(*spec.notes, note))
-    return Resolved(selection, catalog, spec, frames=frames, fps=fps)
+    return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps)
 
 
 def _environment(selection: Selection, picture: Made) -> Path | None:
@@ -97,14 +98,14 @@ def link(resolved: Resolved) -> Linked:
     Raises:
         InputError: with all mistakes of the file.
     """
-    selection, catalog, spec = resolved.selection, resolved.catalog, resolved.spec
+    spec, catalog = resolved.spec, resolved.catalog
     try:
         scene = scene_of(resolved)
     except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
         raise InputError([*spec.problems, *error.problems]) from None
     around = environment_facts(scene)
     graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene), around)
-    return Linked(selection, catalog, spec, scene, graph, frames=resolved.frames, fps=resolved.fps)
+    return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 
 def sketch(resolved: Resolved) -> Linked:
@@ -113,7 +114,7 @@ def sketch(resolved: Resolved) -> Linked:
     Raises:
         InputError: something else is wrong; with all mistakes of the file.
     """
-    selection, catalog, spec = resolved.selection, resolved.catalog, resolved.spec
+    spec, catalog = resolved.spec, resolved.catalog
     try:
         return link(resolved)
     except InputError as error:
@@ -125,9 +126,7 @@ def sketch(resolved: Resolved) -> Linked:
                 raise error from None
             scene, unread = complete(Scene("missing")), lacking.problems
         graph, missing = rendergraph.link.sketch(spec, catalog, light_facts(scene), environment_facts(scene))
-        return Linked(
-            selection, catalog, spec, scene, graph, (*missing, *unread), frames=resolved.frames, fps=resolved.fps
-        )
+        return Linked(**asdict(resolved), scene=scene, graph=graph, missing=(*missing, *unread))
 
 
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from rendergraph.textures import FORMATS, TextureDesc
 
@@ -48,8 +48,7 @@ class Wanted(Struct, frozen=True):
         return None
 
 
-@dataclass(frozen=True, eq=False)
-class Resolved:
+class Resolved(Struct, frozen=True, eq=False, kw_only=True):
     """The file with everything applied.
 
     Attributes:
@@ -62,15 +61,14 @@ class Resolved:
     selection: Selection
     catalog: Catalog
     spec: PipelineSpec
-    frames: range = field(default=range(1, 2), kw_only=True)
-    fps: float = field(default=30.0, kw_only=True)
+    frames: range = range(1, 2)
+    fps: float = 30.0
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.selection.source}>"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Linked(Resolved):
+class Linked(Resolved, frozen=True, eq=False, kw_only=True):
     """The checked graph with its scene.
 
     Attributes:
@@ -89,8 +87,7 @@ class Linked(Resolved):
         return (*self.spec.notes, *self.graph.warnings, *self.scene.warnings, *self.missing)
 
 
-@dataclass(frozen=True, eq=False)
-class Expanded:
+class Expanded(Struct, frozen=True, eq=False):
     """The steps of what is wanted.
 
     Attributes:
@@ -113,8 +110,7 @@ class Expanded:
         return replace(self, options=replace(self.options, frames=frames, warm_up=warm_up, timed=timed))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Planned(Expanded):
+class Planned(Expanded, frozen=True, eq=False):
     """Steps with their order and their memory."""
 
     plan: ResourcePlan

@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from msgspec import structs
 
 from rendergraph.errors import Problem, RendergraphError, UsageError
 from rendergraph.resources import shipped_pipelines
@@ -75,7 +77,7 @@ class Desk:
     @property
     def selection(self) -> Selection:
         """The pipeline with everything that was changed."""
-        return replace(self._selected, sets=(*self.opened.sets, *self.edits.sets))
+        return structs.replace(self._selected, sets=(*self.opened.sets, *self.edits.sets))
 
     @property
     def other(self) -> Selection | None:
@@ -187,7 +189,7 @@ class Desk:
             name = message["name"]
             if name is not None and not isinstance(name, str):
                 raise ValueError("a camera has a name")
-            self._selected, self.camera = replace(self._selected, camera=name), None
+            self._selected, self.camera = structs.replace(self._selected, camera=name), None
             return
         now = self.camera or self._seen
         if now is None:
@@ -233,7 +235,7 @@ class Desk:
         if name is not None and name not in self._others:
             if name not in shipped_pipelines():
                 raise ValueError("it is compared with a shipped pipeline, a snapshot, or what was named with --against")
-            self._keep(name, replace(self.opened, source=name, sets=(), patches=()))
+            self._keep(name, structs.replace(self.opened, source=name, sets=(), patches=()))
         self._other = name
         return True
 

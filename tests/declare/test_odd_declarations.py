@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -91,12 +91,7 @@ PORTS: dict[str, tuple[type[Any], dict[str, Any]]] = {
     "views": (Views, {"doc": "D."}),
     "function": (Function, {"signature": ShadowLookup, "shader": "a.glsl", "doc": "D."}),
 }
-FIELDS = [
-    (port, entry.name)
-    for port, (cls, _) in PORTS.items()
-    for entry in fields(cls)
-    if entry.name not in ("name", "owner")
-]
+FIELDS = [(port, name) for port, (cls, _) in PORTS.items() for name in cls.__struct_fields__]
 
 
 def kind(port: object) -> type[Node]:

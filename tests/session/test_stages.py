@@ -5,12 +5,12 @@ from __future__ import annotations
 import inspect
 import pickle
 from collections import Counter
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import fields, replace
 
 import rendergraph as rg
 import rendergraph.allocate
@@ -122,7 +122,7 @@ def test_keywords_become_options() -> None:
     assert RenderOptions.of({"outputs": "image", "taps": ["a.b"]}) == RenderOptions(outputs=("image",), taps=("a.b",))
     assert RenderOptions.of({"outputs": None, "shuffle": None}) == RenderOptions()
     assert RenderOptions.of({"outputs": ()}).outputs == ()
-    with pytest.raises(TypeError, match="unexpected keyword argument 'frame'"):
+    with pytest.raises(TypeError, match="Unexpected keyword argument 'frame'"):
         rg.load("forward").expand(frame=1)  # type: ignore[call-arg]
 
 

@@ -31,7 +31,7 @@ CALLS = {
     'steps.fullscreen("wrong.frag", out="color")': "RG423 out is the text 'color'; give the port itself, self.color",
     'steps.fullscreen("wrong.frag", out="colour")': "RG423 out is the text 'colour'; give the port itself; did you mean 'color'?",
     'steps.fullscreen("wrong.frag", out=7)': "RG423 out is 7, not a port",
-    'steps.fullscreen("wrong.frag", out=[self.color])': "RG423 out is [Output(name='color', semantic=Semantic(name='radiance', ..., not a port",
+    'steps.fullscreen("wrong.frag", out=[self.color])': "RG423 out is [Output('color')], not a port",
     'steps.fullscreen("wrong.frag", out={})': "RG423 out is empty; name what the step writes, or leave it out for every output that is used",
     'steps.fullscreen("wrong.frag", out={1: self.color})': "RG423 out has the key 1; the keys are the shader's names",
     'steps.fullscreen("wrong.frag", out={"color": "color"})': "RG423 out['color'] is the text 'color'; give the port itself, self.color",
@@ -93,7 +93,7 @@ CALLS = {
     "'3f 2f in_position in_uv'",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"vec3 in_position": self.numbers})': "RG423 attributes has the layout 'vec3 in_position'; it reads like '3f 2f in_position in_uv'",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_position": self.small})': "RG423 attributes['3f in_position'] is the Internal 'small', which is no buffer",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])': "RG423 attributes is [Internal(name='numbers', semantic=None, like=None, kind=..., not a mapping from "
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])': "RG423 attributes is [Internal('numbers')], not a mapping from "
     "layouts to buffers or None",
     # compute
     'steps.compute("a.comp", groups=(1, 0, 1), out=self.small)': "RG423 groups is (1, 0, 1), not one to three whole numbers from 1 up or None",
