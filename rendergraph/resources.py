@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, lru_cache
-from importlib import resources
+from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def folder(package: str) -> Path:
     Raises:
         ModuleNotFoundError: there is no such package.
     """
-    return Path(str(resources.files(package)))
+    return Path(import_module(package).__path__[0])
 
 
 def opening(path: Path) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.cli import options
@@ -27,8 +27,7 @@ _LIMITED = ("flip", "rmse", "radiance_rmse")
 SOFTWARE = "times on a software rasteriser: no measure of a GPU"
 
 
-@dataclass(frozen=True)
-class Threshold:
+class Threshold(Struct, frozen=True):
     """A metric and what it may not exceed."""
 
     metric: str

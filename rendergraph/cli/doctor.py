@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import platform
 import re
-import subprocess
 import sys
 from typing import Any
 
@@ -62,6 +61,8 @@ def examine() -> dict[str, Any]:
 def _probe(*arguments: str) -> dict[str, Any]:
     """What `probe` says, or what became of it."""
     words = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
+    import subprocess
+
     try:
         done = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False)
     except subprocess.TimeoutExpired:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import math
 import re
-import shlex
 from collections.abc import Callable
 from functools import partial, wraps
 from pathlib import Path
@@ -87,6 +86,8 @@ def settings(text: str) -> tuple[str, ...]:
     Raises:
         ValueError: one of them is none, or a quote is not closed.
     """
+    import shlex
+
     return tuple(_setting(word) for word in shlex.split(text))
 
 

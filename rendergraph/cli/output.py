@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -203,6 +202,8 @@ def terminal_width() -> int:
     """Columns of the terminal that stdout is, without bound elsewhere."""
     stream = data_stream()
     if stream is not None and stream.isatty():
+        import shutil
+
         return shutil.get_terminal_size().columns
     return 1 << 20
 

@@ -11,10 +11,10 @@ from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, outputs_of
-from rendergraph.program import Texts, declared_at, named_reads, unfit_sampler
+from rendergraph.program import Texts, named_reads, unfit_sampler
 from rendergraph.steps import Read, Resource, Step, Write
 
-_FORMAT = re.compile(r"(?P<count>\d*)(?P<kind>[fiux])(?P<bytes>[1248]?)(?P<step>(?:/[vi])?)\Z")
+_FORMAT = r"(?P<count>\d*)(?P<kind>[fiux])(?P<bytes>[1248]?)(?P<step>(?:/[vi])?)\Z"
 
 
 def check_uniforms(
@@ -169,6 +169,8 @@ def attributes_of(program: Program) -> dict[str, str]:
 
 def _placed(problem: Problem, name: str, texts: Texts) -> Problem:
     """The problem at the line where the shader declares a name, if it is found."""
+    from rendergraph.program.messages import declared_at  # where something is wrong alone
+
     for mentions, text in product((False, True), texts().values()):
         found = declared_at(text.source, [name], mentions=mentions)
         if found is not None:
@@ -187,13 +189,13 @@ def layout_for(layout: str, program: Program) -> tuple[str, list[str]]:
         moderngl's format and the names in it, which may be none.
     """
     words = layout.split()
-    formats = [word for word in words if _FORMAT.match(word)]
+    formats = [word for word in words if re.match(_FORMAT, word)]
     names = words[len(formats) :]
     wanted = set(attributes_of(program))
     kept: list[str] = []
     waiting = iter(names)
     for number, word in enumerate(formats):
-        match = _FORMAT.match(word)
+        match = re.match(_FORMAT, word)
         assert match is not None  # it did a moment ago
         if match["kind"] == "x":
             continue
@@ -209,5 +211,5 @@ def layout_for(layout: str, program: Program) -> tuple[str, list[str]]:
 def attribute_formats(layout: str) -> dict[str, str]:
     """The attributes of a buffer's layout with their formats."""
     words = layout.split()
-    formats = [word for word in words if _FORMAT.match(word)]
+    formats = [word for word in words if re.match(_FORMAT, word)]
     return dict(zip(words[len(formats) :], [word for word in formats if "x" not in word], strict=True))

@@ -12,7 +12,7 @@ from rendergraph.gl import programs
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.glsl.expansion import check_expansion
-from rendergraph.program import StageText, compile_problems, link_problems
+from rendergraph.program import StageText
 from rendergraph.resources import folder
 
 
@@ -40,6 +40,8 @@ class ProgramCache(Struct, eq=False):
         try:
             program = programs.link(self.device, sources, outputs)
         except programs.ProgramError as error:
+            from rendergraph.program.messages import compile_problems, link_problems  # where a driver refuses alone
+
             stage, message = programs.driver_message(error)
             found = (
                 compile_problems(message, texts[stage]) if stage and stage in texts else link_problems(message, texts)

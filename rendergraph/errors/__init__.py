@@ -8,7 +8,6 @@ docs and `rendergraph explain RG103` read it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -208,6 +207,8 @@ def nearest(word: str, words: Iterable[str]) -> str | None:
     `difflib` alone misses shared beginnings (`kernal` for `kernel_size`), so words that are
     near to one of the tokens count too.
     """
+    from difflib import get_close_matches  # where something is misspelt alone
+
     known = sorted(words)
     lowered = {candidate.lower(): candidate for candidate in reversed(known)}
     close = get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)

@@ -4,7 +4,6 @@
 into something an eye can read, and `save_outputs` says what of a frame goes into which kind of file.
 """
 
-from rendergraph.images.contact import contact_sheet
 from rendergraph.images.decode import decode, decode_light, read, read_metadata
 from rendergraph.images.encode import EXTENSIONS, write
 from rendergraph.images.pixels import ImageLimits
@@ -31,7 +30,6 @@ __all__ = [
     "Saved",
     "channel_names",
     "check_target",
-    "contact_sheet",
     "decode",
     "decode_light",
     "encoded",

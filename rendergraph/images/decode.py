@@ -21,7 +21,6 @@ from rendergraph.errors import InputError, Place, Problem
 from rendergraph.images.encode import PREFIX
 from rendergraph.images.files import is_text
 from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, check_shape, finite, name_of, not_negative
-from rendergraph.images.plugin_image import decode_by_plugin
 from rendergraph.images.view import from_srgb
 from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, image_kind
 from rendergraph.scene.model import ImageSource, MadeImage
@@ -59,6 +58,8 @@ def decode(
         InputError: missing, of another kind, broken, or beyond a limit.
     """
     if source.loader is not None:
+        from rendergraph.images.plugin_image import decode_by_plugin  # for such images alone
+
         return decode_by_plugin(source, source.loader, srgb=srgb, warn=warn, limits=limits)
     with _opened(source, limits) as image:
         light = image.kind in (".hdr", ".exr")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -178,7 +177,8 @@ def _safe_place(path: Path, part: Path) -> Iterator[str]:
         yield f"/proc/self/fd/{memory}"
         try:
             with open(memory, "rb", closefd=False) as source, open(part, "wb") as target:
-                shutil.copyfileobj(source, target, 1 << 20)
+                while bytes_read := source.read(1 << 20):
+                    target.write(bytes_read)
         except OSError as error:
             raise failed(path, error.strerror or str(error)) from error
     finally:

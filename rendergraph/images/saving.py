@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -115,6 +114,8 @@ def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
     Raises:
         UsageError, InputError, RenderError: as from `save_outputs`.
     """
+    import tempfile  # brings random numbers along, which nobody else needs
+
     with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
         path = Path(folder) / file.path.name
         save_outputs([file._replace(path=path)], metadata)

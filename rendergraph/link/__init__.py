@@ -19,7 +19,6 @@ from rendergraph.link.infer import Infer, made_ports
 from rendergraph.link.names import Draft, Link, References, Wrong, line_of
 from rendergraph.link.order import cycles, needs, sources, versions
 from rendergraph.link.params import choice_files, instance
-from rendergraph.link.unknown import stand_in, unknown_type
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature, TextureDesc
 
@@ -187,6 +186,8 @@ class _Linker:
                 continue  # said by resolve
             try:
                 if node.type not in self.catalog:
+                    from rendergraph.link.unknown import unknown_type  # where one is missing alone
+
                     raise InputError(value.problem("RG102", unknown_type(self.spec, self.catalog, node.type)))
                 found[node.id] = self.catalog.get(node.type)
             except InputError as error:
@@ -195,6 +196,8 @@ class _Linker:
                     self.problems += error.problems
                 failed.add(node.type)
                 if self.sketching:
+                    from rendergraph.link.unknown import stand_in  # where one is missing alone
+
                     found[node.id] = stand_in(self.spec, node)
                 elif len(self.problems) >= MOST_PROBLEMS:
                     raise InputError(_in_order([*self.spec.problems, *self.problems])) from None

@@ -6,7 +6,8 @@
 
 with a `steps.Step`, node id to `catalog.NodeType`, and `Expansion.resources` and `Expansion.views`; `defines` are
 the macros of the scene and the batch (`LIGHT_COUNT`, `MATERIAL_COUNT`, `HAS_UV0`, `PASS_VIEW_COUNT`, ...).
-`StageText.text` goes to the driver; what it answers goes through `compile_problems` and `link_problems`.
+`StageText.text` goes to the driver; what it answers goes through `messages.compile_problems` and
+`messages.link_problems`.
 
 Names of a function's text are `prefix(node id) + name`: its textures (`shadows_shadow_map`), uniforms
 (`shadows_bias`), view blocks (`shadows_shadow_map_view_block`). The consumer's own texture reads keep their names, with
@@ -22,7 +23,6 @@ from __future__ import annotations
 
 from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
 from rendergraph.program.macros import positions_macro
-from rendergraph.program.messages import compile_problems, declared_at, link_problems
 from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts
 
@@ -33,9 +33,6 @@ __all__ = [
     "Texts",
     "check_kept_text",
     "check_texts",
-    "compile_problems",
-    "declared_at",
-    "link_problems",
     "looked_at",
     "named_reads",
     "positions_macro",

@@ -15,7 +15,6 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
 from rendergraph.glsl.reached import reached
-from rendergraph.program.messages import declared_at, mentioned_at
 from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.program.text import StageText, prefix, stage_texts
 from rendergraph.steps import Read, Resource, Step
@@ -238,5 +237,7 @@ def looked_at(text: str) -> frozenset[str]:
 
 def _placed(problem: Problem, text: StageText, names: Sequence[str]) -> Problem:
     """The problem at the author's line that has one of the names, if there is one."""
+    from rendergraph.program.messages import declared_at, mentioned_at  # where something is wrong alone
+
     found = declared_at(text.source, names) or mentioned_at(text.source, names)
     return replace(problem, place=found[0], line_text=found[1]) if found is not None else problem

@@ -57,6 +57,9 @@ class StageText(Struct, frozen=True):
         return self.source.text
 
 
+_EXTENSION = re.compile(r"\s*#\s*extension\b")
+
+
 def prefix(node: str) -> str:
     """What stands before every name of a function's text: the providing node's id and an underscore.
 
@@ -165,7 +168,7 @@ def _stage(
         return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
 
     key = file, include_folder, root, step.includes, versions, node.inherited
-    called = _CALLED.get(key, lambda: expanded(Includes(include_folder)).text)
+    called = _CALLED.get(key, lambda: expanded(Includes(include_folder)).text) if wanted else ""
     functions = SourceText()
     for signature in wanted.values():
         if calls(called, signature.name):
@@ -186,7 +189,7 @@ def _stage(
 
 def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
     """`#extension` lines, which must come before everything else, and the text without them."""
-    is_extension = [re.match(r"\s*#\s*extension\b", line) is not None for line in source.lines]
+    is_extension = ["#" in line and _EXTENSION.match(line) is not None for line in source.lines]
     found = [line.strip() for line, yes in zip(source.lines, is_extension, strict=True) if yes]
     if not found:
         return [], source

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -115,6 +114,8 @@ class Plugins:
         self.catalog = self.catalog.with_shaders((name, one) for name, one in found if one.file not in outside)
         strange = [file for file in python if file not in self.catalog.files()]
         if strange:
+            import shlex  # for a warning alone
+
             names = ", ".join(sorted(file.name for file in strange)[:3]) + (", …" if len(strange) > 3 else "")
             words = f"'{shown(text)}' has Python ({names}), which is not run because a pipeline file names it; "
             named = shlex.quote(shown_file(folder))

@@ -26,10 +26,8 @@ from rendergraph.schedule.dependencies import (
     readers_first,
     touched_ids,
 )
-from rendergraph.schedule.improve import improve
 from rendergraph.schedule.model import Cost, Model, alive_all_frame
 from rendergraph.schedule.reasons import culled_reasons, order_reasons, step_names
-from rendergraph.schedule.search import search
 from rendergraph.schedule.seeds import program_order, random_order, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
@@ -248,6 +246,8 @@ def _ordered(model: Model, budget_s: float) -> tuple[Cost, Sequence[int], int, i
             break
     least = min(cost.peak for cost, _ in orders)
     if least > bound and len(model) <= MOST_SEARCHED:
+        from rendergraph.schedule.search import search  # most pipelines are decided by now
+
         found = search(model, below=least, bound=bound, budget=int(budget_s * MOVES_PER_SECOND))
         bound = found.bound
         if found.order is not None:
@@ -256,6 +256,8 @@ def _ordered(model: Model, budget_s: float) -> tuple[Cost, Sequence[int], int, i
     # Equal costs go to the order found first: the reading order wherever nothing is better.
     cost, best = min(orders, key=lambda pair: (pair[0].pool, pair[0].peak))
     if cost.pool > pool_bound and len(model) <= MOST_SEARCHED:
+        from rendergraph.schedule.improve import improve  # as above
+
         better, improved = improve(model, best, pool_bound=pool_bound, budget=int(budget_s * TOUCHES_PER_SECOND))
         least = min(least, improved.peak)
         if (improved.pool, improved.peak) < (cost.pool, cost.peak):

@@ -12,7 +12,7 @@ from rendergraph.compile import Executable, GpuScene
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.execute import FrameTimes, Runner
 from rendergraph.images import PictureInfo, channel_names
-from rendergraph.installed import version
+from rendergraph.installed import packages
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
@@ -156,7 +156,9 @@ class Drawing(Struct, eq=False, dict=True):
 
     @cached_property
     def _metadata(self) -> Mapping[str, str]:
-        versions = {"rendergraph": __version__} | {name: version(name) for name in ("moderngl", "numpy", "OpenImageIO")}
+        installed = packages()
+        found = {name: installed.get(name.lower()) for name in ("moderngl", "numpy", "OpenImageIO")}
+        versions = {"rendergraph": __version__} | {name: one.version for name, one in found.items() if one is not None}
         device = self.gpu.device
         return {
             **described(self.expanded.linked),

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import asdict
 
 from rendergraph.cli.app import main
 from rendergraph.session import RenderOptions, Selection
@@ -75,7 +76,7 @@ class FakeStages:
         return nullcontext()
 
     def draw(self, expanded: Any, gpu: Any) -> Iterator[Any]:
-        self.calls = vars(expanded.options) | {"device": self.device}
+        self.calls = asdict(expanded.options) | {"device": self.device}
         for number in expanded.options.frames:
             if self.fail and number == 2:
                 raise self.fail

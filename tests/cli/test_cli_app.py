@@ -18,7 +18,18 @@ from rendergraph.cli.app import VERBS
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError
 
 PROGRAM = [sys.executable, "-m", "rendergraph"]
-HEAVY = {"numpy", "moderngl", "networkx", "OpenImageIO", "msgspec", "yaml", "rich", "rich_click", "scipy", "trimesh"}
+HEAVY = {
+    "numpy",
+    "moderngl",
+    "networkx",
+    "OpenImageIO",
+    "dataclasses",
+    "yaml",
+    "rich",
+    "rich_click",
+    "scipy",
+    "trimesh",
+}
 
 
 def test_help_imports_nothing_heavy_and_is_quick() -> None:

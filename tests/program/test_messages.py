@@ -14,7 +14,8 @@ from rendergraph.catalog import NodeType
 from rendergraph.errors import Problem
 from rendergraph.expand import ViewTable
 from rendergraph.glsl import strip_comments
-from rendergraph.program import StageText, compile_problems, link_problems, stage_texts
+from rendergraph.program import StageText, stage_texts
+from rendergraph.program.messages import compile_problems, link_problems
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
 

@@ -15,7 +15,8 @@ from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.source import Origin, SourceText
-from rendergraph.program import StageText, StepTexts, compile_problems, link_problems, prefix, stage_texts
+from rendergraph.program import StageText, StepTexts, prefix, stage_texts
+from rendergraph.program.messages import compile_problems, link_problems
 from rendergraph.resources import folder as folder_of
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import TextureDesc
