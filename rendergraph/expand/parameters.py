@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from rendergraph.declare import Node
@@ -10,34 +10,36 @@ from rendergraph.glsl.source import needs
 from rendergraph.steps import UniformValue, define_text
 
 
-def define_parameters(node: Node, choices: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
+def define_parameters(node: Node, choices: Mapping[str, Path]) -> tuple[tuple[str, str], ...]:
     """Macros of a node's `define` parameters: numbers and switches as they are, a choice as one of its numbers.
 
     Args:
         node: the node.
         choices: parameters whose choice is an include; what it needs, the macros say.
     """
+    macros: list[tuple[str, str]] = []
     for name, parameter in node.parameters().items():
         if parameter.role != "define":
             continue
         value = getattr(node, name)
         if name in choices:
-            for need in needs(choices[name]):
-                yield f"NEEDS_{need}".upper(), "1"
+            macros += [(f"NEEDS_{need}".upper(), "1") for need in needs(choices[name])]
         elif isinstance(value, str):
-            for number, choice in enumerate(parameter.words):
-                yield f"{name}_{choice}".upper().replace("-", "_"), str(number)
-            yield name.upper(), f"{name}_{value}".upper().replace("-", "_")
+            words = [f"{name}_{choice}".upper().replace("-", "_") for choice in parameter.words]
+            macros += [(word, str(number)) for number, word in enumerate(words)]
+            macros.append((name.upper(), f"{name}_{value}".upper().replace("-", "_")))
         else:
-            yield name.upper(), define_text(value)
+            macros.append((name.upper(), define_text(value)))
+    return tuple(macros)
 
 
-def param_uniforms(node: Node) -> Iterator[tuple[str, UniformValue]]:
+def param_uniforms(node: Node) -> tuple[tuple[str, UniformValue], ...]:
     """Names and values of a node's `param` parameters; a number given for a vector fills it."""
+    uniforms: list[tuple[str, UniformValue]] = []
     for name, parameter in node.parameters().items():
-        if parameter.role != "param":
-            continue
-        value = getattr(node, name)
-        if parameter.glsl.startswith("vec") and not isinstance(value, tuple):
-            value = (float(value),) * int(parameter.glsl[3])
-        yield name, value
+        if parameter.role == "param":
+            value = getattr(node, name)
+            if parameter.glsl.startswith("vec") and not isinstance(value, tuple):
+                value = (float(value),) * int(parameter.glsl[3])
+            uniforms.append((name, value))
+    return tuple(uniforms)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
 from rendergraph.declare import Facts, Function, InOut, Input, Part, Port, TextureInfo, Views
 from rendergraph.declare.blame import happened
@@ -28,7 +28,6 @@ class Recording:
         unfilled: what it asked to draw and the scene has nothing of; left out where that changes nothing.
         links: connected inputs whose textures have layers; `ENVIRONMENT` stands for the scene's.
         facts: what the node may ask.
-        read: the connected inputs, which a step reads that names none.
         own: the ends of the textures and buffers that the node makes or continues, by port.
         defines, uniforms, includes: what its parameters give to each of its steps.
     """
@@ -42,7 +41,8 @@ class Recording:
         self.links: dict[str, tuple[Endpoint, ...]] = {}
         inputs: dict[str, tuple[TextureInfo, ...]] = {}
         for name, ends in node.inputs.items():
-            self.links[name] = there = tuple([end for end in ends if end.now not in graph.empty])
+            there = tuple([end for end in ends if end.now not in graph.empty]) if graph.empty else ends
+            self.links[name] = there
             if there:
                 inputs[name] = tuple([graph.textures[end.now] for end in there if end.now in graph.textures])
         self.facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
@@ -50,11 +50,10 @@ class Recording:
             if port.takes_scene and name not in inputs:
                 inputs[name] = self.facts.of_scene
                 self.links |= {name: (ENVIRONMENT,)} if inputs[name] else {}
-        self.read = {name: port for name, port in node.type.read.items() if self.links.get(name)}
         self.own = {name: Endpoint(node.id, name) for name in node.type.written}
-        self.defines = tuple(define_parameters(node.node, node.choices))
-        self.uniforms = tuple(param_uniforms(node.node))
-        self.includes = tuple((name.upper(), file) for name, file in node.choices.items())
+        self.defines = define_parameters(node.node, node.choices)
+        self.uniforms = param_uniforms(node.node)
+        self.includes = tuple([(name.upper(), file) for name, file in node.choices.items()])
 
     # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
 
@@ -73,6 +72,16 @@ class Recording:
     def needs(self, parameter: str) -> tuple[str, ...]:
         """What the choice of a parameter needs."""
         return needs(self.node.choices[parameter]) if parameter in self.node.choices else ()
+
+    def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
+        """The inputs that a step reads which names none: those connected; what is kept reads those that are kept."""
+        connected = {name: port for name, port in self.node.type.read.items() if self.links.get(name)}
+        if any(is_kept(part.port) for part in out):
+            return {name: port for name, port in connected.items() if all(map(self._lasts, self.links[name]))}
+        return connected
+
+    def _lasts(self, end: Endpoint) -> bool:
+        return end == ENVIRONMENT or is_kept(self.graph[end.node].node.ports()[end.port])
 
     def add(self, request: StepRequest) -> None:
         """Keep a request, unless it would draw nothing onto what is there already."""
@@ -114,23 +123,12 @@ class Recording:
         """Whether a port goes on with a texture of somebody else's."""
         return isinstance(port, InOut) and bool(self.links.get(port.name))
 
-    def reads_of(self, request: StepRequest) -> Mapping[str, Port | Part]:
-        """Names and ports a request reads, with the default inputs filled in; of what is kept, inputs that are too."""
-        if not request.default_inputs:
-            return request.bindings
-        if any(is_kept(part.port) for _, part in request.out):
-            return {name: port for name, port in self.read.items() if all(map(self._lasts, self.links[name]))}
-        return self.read
-
-    def _lasts(self, end: Endpoint) -> bool:
-        return end == ENVIRONMENT or is_kept(self.graph[end.node].node.ports()[end.port])
-
-    def demands(self) -> Iterator[Endpoint]:
+    def demands(self) -> list[Endpoint]:
         """The ports of other nodes that the recorded steps and the used functions read."""
         ports = self.node.node.ports()
         names: set[str] = set()
         for request in self.requests:
-            for target in self.reads_of(request).values():
+            for target in request.bindings.values():
                 port = target.port if isinstance(target, Part) else target
                 names.add(port.name)
                 if isinstance(port, Function):
@@ -147,8 +145,7 @@ class Recording:
                 names.update(used.read_names)
             elif isinstance(used, InOut):  # whether or not a step writes it
                 names.add(name)
-        for name in names:
-            yield from (end for end in self.links.get(name, ()) if end != ENVIRONMENT)
+        return [end for name in names for end in self.links.get(name, ()) if end != ENVIRONMENT]
 
 
 def is_kept(port: Port) -> bool:

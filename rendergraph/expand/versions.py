@@ -134,7 +134,7 @@ class _Versions:
         reads: list[Read] = []
         functions: list[FunctionBinding] = []
         called: set[str] = set()
-        for name, target in recording.reads_of(request).items():
+        for name, target in request.bindings.items():
             part = target if isinstance(target, Part) else target.whole
             port = part.port
             if isinstance(port, Function):
@@ -171,7 +171,7 @@ class _Versions:
             writes=tuple(writes),
             functions=tuple(functions),
             includes=recording.includes,
-            defines=(*_defines(recording, request, reads, called), *recording.defines, *request.defines.items()),
+            defines=(*_uses(recording, request, reads, called), *recording.defines, *request.defines.items()),
             uniforms=(*recording.uniforms, *request.uniforms.items()),
             size=size,
             samples=samples,
@@ -364,16 +364,14 @@ def _role(port: WrittenPort) -> Role:
     return "history" if isinstance(port, History) else "transient"
 
 
-def _defines(
-    recording: Recording, request: StepRequest, reads: Iterable[Read], called: set[str]
-) -> Iterator[tuple[str, str]]:
+def _uses(recording: Recording, request: StepRequest, reads: Iterable[Read], called: set[str]) -> list[tuple[str, str]]:
     """What a step reads and writes, as macros."""
     names = called.union([read.name for read in reads])
-    for name, port in recording.node.node.inputs().items():
-        if name in names or (isinstance(port, Input) and port.many and f"{name}_0" in names):
-            yield f"HAS_{name.upper()}", "1"
-    for name, _ in request.out:
-        yield f"WRITES_{name.upper()}", "1"
+    inputs = recording.node.node.inputs().items()
+    read = [name for name, port in inputs if name in names or (getattr(port, "many", False) and f"{name}_0" in names)]
+    return [(f"HAS_{name.upper()}", "1") for name in read] + [
+        (f"WRITES_{name.upper()}", "1") for name, _ in request.out
+    ]
 
 
 def _numbered(recording: Recording, label: str, index: int) -> int | None:

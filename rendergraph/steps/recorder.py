@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import FrameType
 from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
@@ -37,6 +37,10 @@ class Recorder(Protocol):
         """What the choice of a parameter needs."""
         ...
 
+    def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
+        """The inputs that a step reads which names none."""
+        ...
+
     def add(self, request: StepRequest) -> None:
         """Keep a request."""
         ...
@@ -52,7 +56,6 @@ class StepRequest(Struct, frozen=True):
     shaders: tuple[tuple[str, str], ...] = ()
     out: tuple[tuple[str, Part], ...] = ()
     bindings: Mapping[str, Port | Part] = field(default_factory=dict)
-    default_inputs: bool = False
     uniforms: Mapping[str, UniformValue] = field(default_factory=dict)
     defines: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -358,7 +361,6 @@ class Steps:
         else:
             targets = checks.targets(self.ports, out)
         textures, uniforms = self._bindings(bindings)
-        named = len(uniforms) < len(bindings)
         for part in (*targets.values(), *textures.values()):
             if isinstance(part, Part) and (part.mip is not None or part.layer is not None):
                 desc = self._desc(part.port)
@@ -367,13 +369,15 @@ class Steps:
         self._check_options(options)
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
+        reads: Mapping[str, Target] = textures
+        if len(uniforms) == len(bindings) and kind in ("fullscreen", "geometry", "draw", "compute"):
+            reads = self._recorder.reads(targets.values())
         self._recorder.add(
             StepRequest(
                 kind=kind,
-                shaders=tuple((stage, file) for stage, file in shaders.items() if file is not None),
+                shaders=tuple([(stage, file) for stage, file in shaders.items() if file is not None]),
                 out=tuple(targets.items()),
-                bindings=textures,
-                default_inputs=not named and kind in ("fullscreen", "geometry", "draw", "compute"),
+                bindings=reads,
                 uniforms=uniforms,
                 defines={name: checks.macro(name, value) for name, value in (defines or {}).items()},
                 options=options,
