@@ -233,10 +233,10 @@ class TextureDesc(Struct, frozen=True):
     @property
     def bytes(self) -> int:
         """Bytes of all mips, layers and samples by formula; a driver may pad."""
-        texels = 0
-        for mip in range(self.mips):
-            w, h = self.mip_size(mip)
-            texels += w * h
+        texels, width, height = 0, self.width, self.height
+        for _ in range(self.mips):
+            texels += width * height
+            width, height = max(1, width >> 1), max(1, height >> 1)
         return texels * self.layers * self.samples * FORMATS[self.format].bytes
 
     def mip_size(self, mip: int) -> tuple[int, int]:

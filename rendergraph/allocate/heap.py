@@ -75,6 +75,8 @@ def _placed(items: Sequence[Item], alive: Sequence[int], order: Sequence[int]) -
                 cost = (max(0, more), item.kind not in kinds[place], abs(more))
                 if cost < least:
                     found, least = place, cost
+                if cost == (0, False, 0):
+                    break
         if found < 0:
             blocks.append([number])
             sizes.append(item.bytes)

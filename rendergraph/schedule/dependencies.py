@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Mistake, Problem
 from rendergraph.link.graph import upstream_first
-from rendergraph.steps import Resource, Step, Write
+from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
 MOST_TURNS = 720
@@ -28,7 +28,8 @@ Waits: TypeAlias = Mapping[StepKey, Mapping[StepKey, tuple[str, str]]]
 
 def touched_ids(step: Step) -> dict[str, None]:
     """Ids of the resources a step reads or writes, each once, in its own order."""
-    return dict.fromkeys([*[read.resource for read in step.all_reads], *[write.resource for write in step.writes]])
+    touched: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
+    return dict.fromkeys([one.resource for one in touched])
 
 
 class Versions(Struct, frozen=True):
@@ -201,7 +202,7 @@ def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> 
     """
     copies = {id: 1 for id, resource in resources.items() if resource.role == "history"}
     written: set[str] = set()
-    for step in steps:
+    for step in steps if copies else ():
         written |= {write.resource for write in step.writes}
         copies |= {read.resource: 2 for read in step.all_reads if read.previous and read.resource in written}
     return copies
