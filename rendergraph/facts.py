@@ -143,7 +143,7 @@ class ObjectFacts:
         return gap and f"object '{self.name}' is not closed: in its mesh '{self.mesh}' {gap}"
 
 
-class TextureInfo(Struct, frozen=True):
+class TextureInfo(Struct, frozen=True, gc=False):
     """What an output has turned out to be.
 
     Attributes:

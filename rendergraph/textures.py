@@ -205,7 +205,7 @@ class Sampler(Struct, frozen=True):
     anisotropy: int = 1
 
 
-class TextureDesc(Struct, frozen=True):
+class TextureDesc(Struct, frozen=True, gc=False):
     """What a texture is allocated from; equal descriptions can share one texture.
 
     Attributes:

@@ -31,14 +31,14 @@ Tier: TypeAlias = Literal["descriptor", "view", "heap"]
 """How textures share memory: equal descriptions, equal texel classes through views, or blocks of a heap."""
 
 
-class Lifetime(Struct, frozen=True):
+class Lifetime(Struct, frozen=True, gc=False):
     """First and last position in the schedule at which a resource must hold its values, inclusive."""
 
     first: int
     last: int
 
 
-class Physical(Struct, frozen=True):
+class Physical(Struct, frozen=True, gc=False):
     """One texture or buffer that is really allocated.
 
     Attributes:

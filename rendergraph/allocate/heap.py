@@ -17,7 +17,7 @@ WORK = 10_000
 RESTARTS = 100
 
 
-class Item(Struct, frozen=True):
+class Item(Struct, frozen=True, gc=False):
     """What lies in a block: bytes, first and last position in the schedule, and what it is alike with."""
 
     bytes: int

@@ -35,7 +35,7 @@ class Crossing(Struct, frozen=True, eq=False):
     given: Value
 
 
-class Link(Struct, frozen=True, eq=False):
+class Link(Struct, frozen=True, eq=False, gc=False):
     """One link as it was written, with what it leads to.
 
     Attributes:

@@ -22,7 +22,7 @@ MOST_STEPS = 10_000
 """Of one pipeline."""
 
 
-class Read(Struct, frozen=True):
+class Read(Struct, frozen=True, gc=False):
     """A resource a step reads, and how.
 
     Attributes:
@@ -48,7 +48,7 @@ class Read(Struct, frozen=True):
     kind: str = "texture2d"
 
 
-class Write(Struct, frozen=True):
+class Write(Struct, frozen=True, gc=False):
     """A resource a step writes: version `version` comes into being.
 
     Attributes:
@@ -93,7 +93,7 @@ class FunctionBinding(Struct, frozen=True):
     includes: tuple[tuple[str, Path], ...] = ()
 
 
-class Where(Struct, frozen=True, eq=False):
+class Where(Struct, frozen=True, eq=False, gc=False):
     """Where a step is written. All are equal: steps that do the same are, wherever they come from.
 
     Attributes:
@@ -111,7 +111,7 @@ class Where(Struct, frozen=True, eq=False):
         return 0
 
 
-class Step(Struct, frozen=True):
+class Step(Struct, frozen=True, gc=False):
     """One draw, dispatch, clear or mip chain.
 
     Attributes:
@@ -206,7 +206,7 @@ _COPIES: Mapping[str, int] = {"history": 2, "scene": 0}
 """Where it is not one."""
 
 
-class Resource(Struct, frozen=True):
+class Resource(Struct, frozen=True, gc=False):
     """A texture or buffer of the pipeline before it has memory.
 
     Attributes:

@@ -46,7 +46,7 @@ class Recorder(Protocol):
         ...
 
 
-class StepRequest(Struct, frozen=True):
+class StepRequest(Struct, frozen=True, gc=False):
     """What a node asked for, before its ports are mapped to resources.
 
     `caller` is the author's file and line of the call, None where the framework recorded the step by itself.
