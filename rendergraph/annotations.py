@@ -124,7 +124,7 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
     if Callable in (origin, annotation):
         return callable
     if annotation in (int, float):
-        kinds = int if annotation is int else int | float
+        kinds = (int,) if annotation is int else (int, float)
         return lambda value: isinstance(value, kinds) and not isinstance(value, bool)
     kind = origin or annotation
     return lambda value: isinstance(value, kind)

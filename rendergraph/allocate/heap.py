@@ -67,24 +67,24 @@ def _placed(items: Sequence[Item], alive: Sequence[int], order: Sequence[int]) -
     taken: list[int] = []  # of each block the positions at which one of its items is alive
     kinds: list[set[object]] = []
     for number in order:
-        item, now = items[number], alive[number]
-        found, least = -1, (item.bytes, False, 0)
+        bytes, kind, now = items[number].bytes, items[number].kind, alive[number]
+        found, least = -1, (bytes, False, 0)
         for place, other in enumerate(taken):
             if not other & now:
-                more = item.bytes - sizes[place]
-                cost = (max(0, more), item.kind not in kinds[place], abs(more))
+                more = bytes - sizes[place]
+                cost = (max(0, more), kind not in kinds[place], abs(more))
                 if cost < least:
                     found, least = place, cost
                 if cost == (0, False, 0):
                     break
         if found < 0:
             blocks.append([number])
-            sizes.append(item.bytes)
+            sizes.append(bytes)
             taken.append(now)
-            kinds.append({item.kind})
+            kinds.append({kind})
         else:
             blocks[found].append(number)
-            sizes[found] = max(sizes[found], item.bytes)
+            sizes[found] = max(sizes[found], bytes)
             taken[found] |= now
-            kinds[found].add(item.kind)
+            kinds[found].add(kind)
     return blocks, sum(sizes)

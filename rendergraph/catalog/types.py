@@ -9,7 +9,7 @@ from pathlib import Path, PurePath
 
 from msgspec import Struct
 
-from rendergraph.declare import Input, Node, WrittenPort
+from rendergraph.declare import Input, Node, Views, WrittenPort
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import folder
 from rendergraph.stamps import look
@@ -54,6 +54,11 @@ class NodeType(Struct, frozen=True, dict=True):
     def written(self) -> Mapping[str, WrittenPort]:
         """Its textures and buffers: what it makes or continues."""
         return {name: port for name, port in self.cls.ports().items() if isinstance(port, WrittenPort)}
+
+    @cached_property
+    def views(self) -> Mapping[str, Views]:
+        """Its tables of views."""
+        return {name: port for name, port in self.cls.ports().items() if isinstance(port, Views)}
 
     @property
     def is_shader(self) -> bool:

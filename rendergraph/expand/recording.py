@@ -176,14 +176,15 @@ def record_all(
 
 def _remembering(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
     """Nodes that read last frame's values and that something wanted can be reached from."""
+    remembering = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
     reached: set[str] = set()
-    stack = [end.node for end in wanted.values()]
+    stack = [end.node for end in wanted.values()] if remembering else []
     while stack:
         name = stack.pop()
         if name not in reached:
             reached.add(name)
             stack += [end.node for ends in graph[name].inputs.values() for end in ends]
-    return {name for name in reached if any(end.previous for ends in graph[name].inputs.values() for end in ends)}
+    return remembering & reached
 
 
 def _recorded(

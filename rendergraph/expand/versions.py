@@ -96,11 +96,10 @@ class _Versions:
     def _declare(self, recording: Recording) -> None:
         """Give every texture the node may write a resource; an `InOut` continues somebody's."""
         node = recording.node
-        for port in node.node.ports().values():
-            if isinstance(port, Views):
-                end = Endpoint(node.id, port.name)
-                info = self.graph.textures[end]
-                self.views[str(end)] = ViewTable(info.views, info.lights)
+        for name in node.type.views:
+            end = Endpoint(node.id, name)
+            info = self.graph.textures[end]
+            self.views[str(end)] = ViewTable(info.views, info.lights)
         for name, made in node.type.written.items():
             end = recording.own[name]
             if end in self.graph.empty:
