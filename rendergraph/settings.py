@@ -7,6 +7,7 @@ is believed only where the user stands in that project, so that a downloaded fol
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import islice
@@ -61,17 +62,16 @@ class Settings(Struct, frozen=True):
         return self.file.parent
 
 
-def nearest(start: Path) -> Settings | None:
-    """The settings file in a folder or the nearest one above it.
+def nearest(folder: Path) -> Settings | None:
+    """The settings file in a folder, links followed, or the nearest one above it.
 
     Raises:
         InputError: it is malformed.
     """
-    folder = _resolved(start)
     for candidate in (folder, *folder.parents):
         file = candidate / FILE_NAME
         look(file)
-        if file.is_file():
+        if os.path.isfile(file):
             return load(file)
     return None
 

@@ -84,10 +84,9 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
     name = shown(name or str(path))
     look(path)
     try:
-        if path.is_dir():
-            raise InputError(Problem("RG011", f"'{name}' is a folder, a file is needed"))
-        if path.exists() and not path.is_file():
-            raise InputError(Problem("RG011", f"'{name}' is not a regular file"))
+        if not path.is_file() and path.exists():
+            what = "is a folder, a file is needed" if path.is_dir() else "is not a regular file"
+            raise InputError(Problem("RG011", f"'{name}' {what}"))
         with path.open("rb") as file:
             raw = file.read(most + 1)
     except FileNotFoundError:
