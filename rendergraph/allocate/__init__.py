@@ -8,7 +8,7 @@ no assignment uses fewer.
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import Literal, TypeAlias
@@ -330,14 +330,17 @@ def _reasons(
     lifetimes: Mapping[str, Lifetime],
     physicals: Sequence[Physical],
     placement: Mapping[str, tuple[int, ...]],
-    alike: tuple[Kinds, str],
+    sharing: tuple[Kinds, str],
     *,
     alias: bool,
 ) -> dict[str, str]:
     names = step_names(schedule.steps)
     outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
-    kinds, what = alike
-    count = Counter([kinds[id] for id in schedule.resources if id not in schedule.whole_frame])
+    kinds, what = sharing
+    alike: dict[object, list[str]] = defaultdict(list)
+    for id in schedule.resources:
+        if id not in schedule.whole_frame:
+            alike[kinds[id]].append(id)
     reasons: dict[str, str] = {}
     for id, resource in schedule.resources.items():
         physical = physicals[placement[id][0]]
@@ -357,7 +360,7 @@ def _reasons(
         elif len(physical.members) == 1:
             reasons[id] = (
                 f"no other {word} {what if word == 'texture' else 'is of its size'}"
-                if count[kinds[id]] == 1
+                if len(alike[kinds[id]]) == 1
                 else f"whenever it is alive, all {word}s it could share are in use"
             )
         else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Hashable, Mapping, Sequence
 
 from msgspec import Struct
@@ -222,8 +221,8 @@ class Model(Struct, frozen=True):
                 number_alive[step] += 1
                 visits -= 1
         size_of = dict(zip(self.classes, self.sizes, strict=True))
-        at_end = Counter(self.classes[resource] for resource in self.shown)
-        pool = sum(size_of[kind] * max(*numbers, at_end[kind]) for kind, numbers in alive.items())
+        at_end = [self.classes[resource] for resource in self.shown]
+        pool = sum(size_of[kind] * max(*numbers, at_end.count(kind)) for kind, numbers in alive.items())
         least = self.constant + sum(self.sizes[resource] for resource in self.shown)
         return self.constant + pool, max(least, *live)
 
