@@ -3,7 +3,7 @@
 
 WORKERS ?= 2
 
-.PHONY: check format lint types imports docs pages test quick clean
+.PHONY: check format lint types imports docs pages pictures test quick clean
 
 check:
 	$(MAKE) --jobs=2 --output-sync --no-print-directory lint types imports pages
@@ -30,6 +30,10 @@ docs:
 # The same without drawing pictures for the reference: that what is shipped draws, the tests find.
 pages:
 	sphinx-build -q -W --keep-going -D pictures=0 -b html docs docs/_build/pages
+
+# The stored pictures of docs/images, as their list says; all take some minutes. ONLY=ssao: those with that in their names.
+pictures:
+	python docs/images/draw.py $(ONLY)
 
 test:
 	pytest -n $(WORKERS)
