@@ -139,6 +139,11 @@ class Input(Port, frozen=True, eq=False):
         return Part(self, link=number)
 
     @cached_property
+    def sampler(self) -> Sampler | None:
+        """How it is sampled; None where a rule says its filter."""
+        return None if callable(self.filter) else Sampler(self.filter, self.wrap, self.compare, self.anisotropy)
+
+    @cached_property
     def takes_scene(self) -> bool:
         """Whether it reads the scene's environment where nothing is linked to it."""
         return self.semantic == EnvironmentMap

@@ -414,11 +414,9 @@ def _member(draft: Draft, infer: Infer) -> GraphNode:
     spec = draft.spec
     links = {name: tuple([found.source for found in ends]) for name, ends in draft.links.items() if ends}
     samplers = {
-        name: infer.sampler(Endpoint(spec.id, name))
-        for name, port in draft.type.read.items()
-        if name in links or port.takes_scene
+        name: infer.sampler(draft, port) for name, port in draft.type.read.items() if name in links or port.takes_scene
     }
-    clears = {name: infer.clear(Endpoint(spec.id, name)) for name in draft.type.written}
+    clears = {name: infer.clear(draft, port) for name, port in draft.type.written.items()}
     return GraphNode(spec.id, draft.type, draft.node, links, spec.place, draft.choices, samplers, clears)
 
 

@@ -107,7 +107,7 @@ class Checker:
         elif port.use == "image" and (texel.is_depth or texel.srgb):
             takes = "is loaded as an image, so no depth and no sRGB"
         elif texel.family in ("uint", "int") and not port.compare:
-            smooth = self.infer.sampler(Endpoint(draft.spec.id, port.name)).filter
+            smooth = self.infer.sampler(draft, port).filter
             takes = "is filtered, so no whole numbers" if smooth != "nearest" else ""
         if takes:
             self._say(draft, port, link, "RG215", takes, f"has the format {info.desc.format}", None)

@@ -144,11 +144,12 @@ class Infer:
             raise _Unknown
         return info
 
-    def sampler(self, end: Endpoint) -> Sampler:
+    def sampler(self, draft: Draft, port: Input) -> Sampler:
         """How an input is sampled; `nearest` where the rule for its filter fails, which is said."""
+        if port.sampler is not None:
+            return port.sampler
+        end = Endpoint(draft.spec.id, port.name)
         if end not in self._samplers:
-            port = self.nodes[end.node].inputs[end.port]
-            assert isinstance(port, Input)
             try:
                 smooth = self._fitting(end, "filter", port.filter, Filter)
             except _Unknown:
@@ -156,12 +157,12 @@ class Infer:
             self._samplers[end] = Sampler(smooth, port.wrap, port.compare, port.anisotropy)
         return self._samplers[end]
 
-    def clear(self, end: Endpoint) -> Texel | None:
+    def clear(self, draft: Draft, port: WrittenPort) -> Texel | None:
         """What a texture or buffer first holds; None for whatever is there, and where its rule fails, which is said."""
-        port = self.nodes[end.node].ports[end.port]
-        assert isinstance(port, WrittenPort)
+        if not callable(port.clear):
+            return port.clear
         try:
-            value: Texel | None = self._fitting(end, "clear", port.clear, _TEXEL)
+            value: Texel | None = self._fitting(Endpoint(draft.spec.id, port.name), "clear", port.clear, _TEXEL)
         except _Unknown:
             return None
         return value

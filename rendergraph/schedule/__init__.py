@@ -24,7 +24,6 @@ from rendergraph.schedule.dependencies import (
     dependencies,
     history_copies,
     readers_first,
-    touched_ids,
 )
 from rendergraph.schedule.model import Cost, Model, alive_all_frame
 from rendergraph.schedule.reasons import culled_reasons, order_reasons, step_names
@@ -120,7 +119,8 @@ def schedule(
         raise InputError(Problem("RG606", text))
     versions = Versions.of(expansion.steps)
     kept = contributing(expansion.steps, expansion.resources, expansion.wanted, versions, expansion.idle)
-    touched = {id for step in kept for id in touched_ids(step)}
+    touched = {read.resource for step in kept for read in step.all_reads}
+    touched |= {write.resource for step in kept for write in step.writes}
     shown = set(expansion.wanted.values())
     resources = {id: expansion.resources[id] for id in sorted(expansion.resources) if id in touched or id in shown}
     kept_versions = Versions.of(kept) if len(kept) < len(expansion.steps) else versions

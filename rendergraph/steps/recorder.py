@@ -157,8 +157,10 @@ class Steps:
         **bindings: Target | UniformValue,
     ) -> None:
         """One fragment shader over the whole target."""
-        options = {"label": label, "state": state, "region": region, "if_drawn": if_drawn}
-        self._add("fullscreen", {"fragment": shader}, out, bindings, defines, **options)
+        shaders = {"fragment": shader}
+        self._add(
+            "fullscreen", shaders, out, bindings, defines, label=label, state=state, region=region, if_drawn=if_drawn
+        )
 
     @checked
     def geometry(
