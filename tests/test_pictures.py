@@ -67,7 +67,7 @@ def test_the_commands_of_a_picture_pass_check(
             others = [word for word in kept if words[0] == "compare" and word.endswith(".yaml")][1:]
             kept = tuple(word for word in kept if word not in others)
             assert (words[0], len(others)) in {("run", 0), ("compare", 1)}
-            once = (*kept, name if picture.page or picture.scenes else "")
+            once = (*kept, name if picture.page or picture.files else "")
             if once in CHECKED or (str(draw.SHARED) in " ".join(kept) and not draw.SHARED.is_dir()):
                 continue
             CHECKED.add(once)

@@ -68,7 +68,7 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
         gap: white pixels between panels.
         crop, enlarge, shrink: of panels that say nothing else.
         page: a page whose named blocks of code the commands find as files.
-        scenes: further files, scenes: `of` names a shipped one or one above, into which the rest is merged.
+        files: further files: text, or a scene, whose `of` names a shipped one or one above that it is merged into.
         program: a Python program in `docs` or `tests` and its words, which writes the file into the current folder.
         measured: commands that measure what it shows anew. They take long, and their times are one machine's.
         by_hand: what was done instead, where no program draws it.
@@ -82,7 +82,7 @@ class Picture(Struct, frozen=True, forbid_unknown_fields=True):
     enlarge: int = 1
     shrink: int = 1
     page: str = ""
-    scenes: dict[str, dict[str, Any]] = {}
+    files: dict[str, str | dict[str, Any]] = {}
     program: str = ""
     measured: str = ""
     by_hand: str = ""
@@ -132,13 +132,15 @@ def prepare(picture: Picture, place: Path) -> None:
         for file, block in re.findall(r"^```\w+\n(?:#|//) ([\w/-]+\.\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL):
             (place / file).parent.mkdir(parents=True, exist_ok=True)
             (place / file).write_text(block, encoding="utf-8")
-    for file, changes in picture.scenes.items():
-        scene = dict(changes)
-        if "of" in scene:
-            other = str(scene.pop("of"))
-            base = place / other if other in picture.scenes else SCENES / f"{other}.yaml"
-            scene = _merged(yaml.safe_load(base.read_text(encoding="utf-8")), scene)
-        (place / file).write_text(yaml.safe_dump(scene, sort_keys=False), encoding="utf-8")
+    for file, content in picture.files.items():
+        if isinstance(content, dict):
+            scene = dict(content)
+            if "of" in scene:
+                other = str(scene.pop("of"))
+                base = place / other if other in picture.files else SCENES / f"{other}.yaml"
+                scene = _merged(yaml.safe_load(base.read_text(encoding="utf-8")), scene)
+            content = yaml.safe_dump(scene, sort_keys=False)
+        (place / file).write_text(content, encoding="utf-8")
 
 
 def draw(name: str, picture: Picture, place: Path) -> Path:
