@@ -16,7 +16,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.declare import Extensions, Function, InOut, Input, Node, Parameter, Port, Views
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
-from rendergraph.glsl.source import about
+from rendergraph.glsl import about
 from rendergraph.keys import Schema, as_markdown, file_schema
 from rendergraph.keys import schema as schema_of
 from rendergraph.read import NODE, PIPELINE, entries, read, word

@@ -13,7 +13,7 @@ from rendergraph import document
 from rendergraph.catalog import entries, find
 from rendergraph.cli.explain import file_keys
 from rendergraph.compare.axes import MOST_RUNS
-from rendergraph.glsl import expansion, source
+from rendergraph.glsl import MAX_BYTES, expansion, source
 from rendergraph.resolve import flatten
 from rendergraph.scene import files, image_header
 from rendergraph.steps import MOST_STEPS
@@ -73,7 +73,7 @@ def _limits() -> str:
         ("a pipeline", "sub-pipelines inside each other", flatten.MOST_NESTED, ""),
         ("a pipeline", "steps", MOST_STEPS, ""),
         ("a picture", "pixels along one side; a driver's own limit may be lower", MOST_SIDE, ""),
-        ("a shader", "bytes with its includes", source.MAX_BYTES, ""),
+        ("a shader", "bytes with its includes", MAX_BYTES, ""),
         ("a shader", "includes inside each other", source.MAX_DEPTH, ""),
         ("a shader", "words that its macros may make", expansion.MOST_WORDS, ""),
         ("a shader", "macros inside each other", expansion.MOST_NESTED, ""),

@@ -12,8 +12,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Node, Views, WrittenPort
 from rendergraph.errors import Mistake
-from rendergraph.glsl import expand, strip_comments
-from rendergraph.glsl.source import read_text
+from rendergraph.glsl import expand, read_text, strip_comments
 
 LONGEST_DOC = 160
 

@@ -16,8 +16,7 @@ from rendergraph.catalog.threads import Record, compute, fullscreen
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Extensions, Node, declaration_mistakes
 from rendergraph.errors import InputError, Problem, shown_file
-from rendergraph.glsl import Includes, SourceText
-from rendergraph.glsl.source import read_text
+from rendergraph.glsl import Includes, SourceText, read_text
 from rendergraph.resources import folder
 from rendergraph.textures import SEMANTICS, SIGNATURES
 

@@ -148,7 +148,8 @@ def _size(rule: Any) -> str:
 
 
 def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
-    from rendergraph.glsl.source import about, needs  # only where a plugin is asked what it adds
+    from rendergraph.glsl import about  # only where a plugin is asked what it adds
+    from rendergraph.glsl.source import needs  # likewise
 
     open_name, default = parameter.open_name, parameter.default
     added = extensions.choices(open_name) if open_name else []

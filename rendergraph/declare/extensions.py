@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from rendergraph.declare.blame import raised_at, told
 from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
-from rendergraph.glsl.source import about
+from rendergraph.glsl import about
 from rendergraph.stamps import Stamp, again, looking
 from rendergraph.textures import SEMANTICS, Semantic
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from rendergraph.glsl.files import MAX_BYTES, Links, about, read_text, strip_comments
 from rendergraph.glsl.names import declared
-from rendergraph.glsl.source import MAX_BYTES, MAX_DEPTH, Includes, Origin, SourceText, expand, strip_comments
+from rendergraph.glsl.source import MAX_DEPTH, Includes, Origin, SourceText, expand
 
 __all__ = [
     "MAX_BYTES",
     "MAX_DEPTH",
     "Includes",
+    "Links",
     "Origin",
     "SourceText",
+    "about",
     "declared",
     "expand",
+    "read_text",
     "strip_comments",
 ]

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
+import os
 import re
-from collections.abc import Iterable, Mapping
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.stamps import Stamp, look, stamp
+from rendergraph.glsl.files import MAX_BYTES, Links, parts
+from rendergraph.stamps import look
 
-MAX_BYTES = 1_000_000
-"""Bytes of one stage's text after includes."""
 MAX_DEPTH = 32
 """Includes inside each other."""
 
@@ -74,29 +72,8 @@ def generated(lines: Iterable[str], made: str = "") -> SourceText:
     return SourceText(rows, (Origin(made=made),) * len(rows))
 
 
-_COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?(?:\*/|(?P<open>\Z))", re.DOTALL)
-
-
-def strip_comments(text: str) -> str:
-    """The text with comments replaced by as many blanks: lines and columns stay where they are.
-
-    One that has no end is left as it is, for the driver to say so.
-    """
-
-    def blanks(match: re.Match[str]) -> str:
-        return match.group() if match["open"] is not None else re.sub(r"[^\n]", " ", match.group())
-
-    return _COMMENT.sub(blanks, text)
-
-
-_INCLUDE = re.compile(r"\s*#\s*include\b(.*)\Z", re.DOTALL)
 _PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")
 _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
-_OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
-_CLOSES = re.compile(r"\s*#\s*endif\b")
-_FORBIDDEN = re.compile(r"\s*#\s*(version|line)\b")
-_NEEDS = re.compile(r"\s*#\s*pragma\s+needs\b\s*(.*)\Z")
-_VERSION = re.compile(r"\s*#\s*version\s+(?:3[3-9]0|4[0-6]0)(?:\s+(?:core|compatibility))?\s*\Z")
 
 
 class Includes:
@@ -106,15 +83,19 @@ class Includes:
     between guards and is written again where it is included again.
     """
 
-    def __init__(self, include_folder: Path) -> None:
+    def __init__(self, include_folder: Path, links: Links | None = None) -> None:
         self.include_folder = include_folder
+        self._links = Links() if links is None else links
         self.bytes = 0
-        self._certain: set[tuple[Path, str]] = set()
-        self._guards: dict[tuple[Path, str], str] = {}
+        self._certain: set[tuple[str, str]] = set()
+        self._guards: dict[tuple[str, str], str] = {}
         self._plugged: dict[str, Path] = {}
         self._versions = False
         self._inherited: tuple[Path, ...] = ()
-        self._resolved: dict[Path, Path] = {}
+
+    def fresh(self) -> Includes:
+        """Those of another stage, which follow the same links."""
+        return Includes(self.include_folder, self._links)
 
     def expand(
         self,
@@ -140,10 +121,10 @@ class Includes:
         Raises:
             InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
         """
-        root = self._resolve(root or source.parent)
+        root = Path(self._follow(root or source.parent))
         lines: list[str] = []
         origins: list[Origin] = []
-        self._certain.add((self._resolve(source), prefix))
+        self._certain.add((self._follow(source), prefix))
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._inherited = inherited
@@ -155,35 +136,30 @@ class Includes:
         file: Path,
         root: Path,
         base: Origin,
-        stack: list[Path],
+        stack: list[str],
         lines: list[str],
         origins: list[Origin],
         depth: list[int],
     ) -> None:
-        raw, stripped = _lines(file)
-        stack = [*stack, self._resolve(file)]
-        for number, line in enumerate(stripped, start=1):
-            origin = Origin(file, number, base.column, base.shared, base.prefix, base.by)
-            if "#" not in line:
-                self._take(line, origin, raw, lines, origins)
-                continue
-            if self._versions and len(stack) == 1 and _VERSION.match(line):
+        raw, found = parts(file)
+        stack = [*stack, self._follow(file)]
+        for first, plain, line in found:
+            self._take(plain, first, replace(base, file=file), raw, lines, origins)
+            if line is None:
+                return
+            origin = replace(base, file=file, line=line.number)
+            if line.needs is not None or (line.is_version and self._versions and len(stack) == 1):
                 lines.append("")
                 origins.append(origin)
                 continue
-            if _NEEDS.match(line):  # said to rendergraph, not to the driver
-                lines.append("")
-                origins.append(origin)
+            if line.forbidden is not None:
+                text = f"'#{line.forbidden}' is written by rendergraph; take the line out"
+                raise _error("RG404", text, origin, raw)
+            if line.included is None:
+                depth[0] += line.nests
+                self._take((line.text,), line.number, origin, raw, lines, origins)
                 continue
-            if _FORBIDDEN.match(line):
-                word = _FORBIDDEN.match(line)[1]  # type: ignore[index]  # it has just matched
-                raise _error("RG404", f"'#{word}' is written by rendergraph; take the line out", origin, raw)
-            include = _INCLUDE.match(line)
-            if include is None:
-                depth[0] += bool(_OPENS.match(line)) - bool(_CLOSES.match(line))
-                self._take(line, origin, raw, lines, origins)
-                continue
-            written = include[1].strip()
+            written = line.included
             parameter = _PARAMETER.match(written)
             if parameter is not None and parameter[1] not in self._plugged:
                 lines.append("")
@@ -193,38 +169,40 @@ class Includes:
                 target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
             else:
                 target, shared, home = self._find(written, file, root, origin, raw, base.shared)
-            if self._resolve(target) in stack:
-                chain = " includes ".join(path.name for path in [*stack, target])
+            if self._follow(target) in stack:
+                chain = " includes ".join(os.path.basename(path) for path in [*stack, str(target)])
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
             if len(stack) > MAX_DEPTH:
                 raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)
             self._include(target, home, inner, stack, lines, origins, depth)
 
-    def _take(self, line: str, origin: Origin, raw: str, lines: list[str], origins: list[Origin]) -> None:
-        self.bytes += len(line) + 1
-        if self.bytes > MAX_BYTES:
-            raise _error("RG403", f"the shader with its includes is larger than {MAX_BYTES:,} bytes", origin, raw)
-        lines.append(line)
-        origins.append(origin)
+    def _take(
+        self, plain: Sequence[str], first: int, base: Origin, raw: str, lines: list[str], origins: list[Origin]
+    ) -> None:
+        """Lines of a file as they stand there, the first of them by its number."""
+        for number, line in enumerate(plain, start=first):
+            self.bytes += len(line) + 1
+            origin = Origin(base.file, number, base.column, base.shared, base.prefix, base.by)
+            if self.bytes > MAX_BYTES:
+                raise _error("RG403", f"the shader with its includes is larger than {MAX_BYTES:,} bytes", origin, raw)
+            origins.append(origin)
+        lines += plain
 
-    def _resolve(self, path: Path) -> Path:
-        """A path with links followed; asked for again and again, and slow."""
-        if path not in self._resolved:
-            self._resolved[path] = path.resolve()
-        return self._resolved[path]
+    def _follow(self, path: Path) -> str:
+        return self._links.follow(os.path.join(os.getcwd(), path))
 
     def _include(
         self,
         file: Path,
         root: Path,
         base: Origin,
-        stack: list[Path],
+        stack: list[str],
         lines: list[str],
         origins: list[Origin],
         depth: list[int],
     ) -> None:
-        key = (self._resolve(file), base.prefix)
+        key = (self._follow(file), base.prefix)
         if key in self._certain:
             return
         certain = depth[0] <= 0
@@ -260,8 +238,8 @@ class Includes:
         if beside and not in_shared:
             places += [(home, home) for home in self._inherited]
         for folder, home in places:
-            target, inside = folder / name, self._resolve(home)
-            if not self._resolve(target).is_relative_to(inside):
+            target, inside = folder / name, self._follow(home)
+            if not self._follow(target).startswith(os.path.join(inside, "")):
                 text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
                 raise _error("RG406", text, origin, raw)
             look(target)
@@ -291,71 +269,29 @@ def expand(
     return Includes(include_folder).expand(source, root=root, versions=versions, inherited=inherited)
 
 
-def read_text(file: Path) -> str:
-    """A shader's text, with `\n` at the end of lines.
-
-    Raises:
-        InputError: there is none, it is too large, or no UTF-8.
-    """
-    look(file)
-    if not file.is_file():
-        beside = file.parent.glob("*") if file.parent.is_dir() else ()
-        known = {path.name for path in beside if path.suffix == file.suffix and path.is_file()}
-        text = f"there is no shader '{shown_file(file)}'{suggestion(file.name, known)}"
-        raise InputError(Problem("RG400", text))
-    if file.stat().st_size > MAX_BYTES:
-        raise InputError(Problem("RG403", f"the shader is larger than {MAX_BYTES:,} bytes", Place(shown_file(file))))
-    try:
-        return file.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError as error:
-        raise InputError(Problem("RG407", f"the shader is not UTF-8 text: {error}", Place(shown_file(file)))) from error
-
-
 def needs(file: Path) -> tuple[str, ...]:
     """What the include of a choice says that it needs: the words of its `#pragma needs(…)`.
 
     Raises:
         InputError: the file cannot be read, or the line is written in another way (RG405).
     """
-    raw, stripped = _lines(file)
+    raw, found = parts(file)
     words: list[str] = []
-    for number, line in enumerate(stripped, start=1):
-        if match := _NEEDS.match(line):
-            listed = re.fullmatch(r"\(\s*(\w+(?:\s*,\s*\w+)*)\s*\)", match[1])
+    for _, _, line in found:
+        if line is not None and line.needs is not None:
+            listed = re.fullmatch(r"\(\s*(\w+(?:\s*,\s*\w+)*)\s*\)", line.needs)
             if listed is None:
-                text = f"'{line.strip()[:60]}' is not '#pragma needs(word)' or '#pragma needs(word, word)'"
-                raise _error("RG405", text, Origin(file, number), raw)
+                text = f"'{line.text.strip()[:60]}' is not '#pragma needs(word)' or '#pragma needs(word, word)'"
+                raise _error("RG405", text, Origin(file, line.number), raw)
             words += re.findall(r"\w+", listed[1])
     return tuple(words)
 
 
 def needs_place(file: Path) -> tuple[Place, str]:
     """Where an include says what it needs, and that line."""
-    raw, stripped = _lines(file)
-    number = next((n for n, line in enumerate(stripped, start=1) if _NEEDS.match(line)), 1)
+    raw, found = parts(file)
+    number = next((line.number for _, _, line in found if line is not None and line.needs is not None), 1)
     return Place(shown_file(file), number, 1), raw.split("\n")[number - 1]
-
-
-def about(file: Path) -> str:
-    """A shader's opening comment as one line; empty where it has none.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
-    opening = itertools.takewhile(lambda line: line.startswith("//"), read_text(file).split("\n"))
-    return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
-
-
-def _lines(file: Path) -> tuple[str, tuple[str, ...]]:
-    """A file's text, and its lines without comments and blanks at their ends."""
-    look(file)
-    return _stripped(file, stamp(file))
-
-
-@lru_cache(maxsize=256)
-def _stripped(file: Path, stamp: Stamp) -> tuple[str, tuple[str, ...]]:
-    raw = read_text(file)
-    return raw, tuple(line.rstrip() for line in strip_comments(raw).split("\n"))
 
 
 def _error(code: str, text: str, origin: Origin, raw: str) -> InputError:

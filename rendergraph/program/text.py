@@ -13,6 +13,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.declare import Function, Input
 from rendergraph.errors import InputError, Problem, node_named
 from rendergraph.expand import ViewTable
+from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Includes, Origin, SourceText, generated
 from rendergraph.program.images import with_formats
@@ -79,6 +80,7 @@ def stage_texts(
     *,
     defines: Mapping[str, str] | None = None,
     include_folder: Path | None = None,
+    links: Links | None = None,
 ) -> dict[str, StageText]:
     """The text of every stage of a step.
 
@@ -91,6 +93,7 @@ def stage_texts(
         views: view tables by id, for their length.
         defines: macros the framework adds: lights, materials, batch, `PASS_VIEW_COUNT`.
         include_folder: where `#include <…>` looks; the shipped one by default.
+        links: what links have been followed so far, for whoever asks for many steps at once.
 
     Returns:
         Stage to text, in the pipeline's order.
@@ -98,7 +101,7 @@ def stage_texts(
     Raises:
         InputError: a file is missing or cannot be put together (RG400 to RG409).
     """
-    include_folder = include_folder or folder("rendergraph.shaders") / "include"
+    includes = Includes(include_folder or folder("rendergraph.shaders") / "include", links)
     shaders = dict(step.shaders)
     if step.kind == "fullscreen":
         shaders.setdefault("vertex", "<fullscreen.vert>")
@@ -109,7 +112,7 @@ def stage_texts(
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
         if stage in shaders:
-            args = (step, types, resources, views, macros, wanted, include_folder)
+            args = (step, types, resources, views, macros, wanted, includes.fresh())
             try:
                 texts[stage] = _stage(stage, shaders[stage], *args)
             except InputError as error:  # a file that is not there stands nowhere but in the call that names it
@@ -128,6 +131,7 @@ class StepTexts(Struct, eq=False):
     resources: Mapping[str, Resource]
     views: Mapping[str, ViewTable]
     _made: dict[object, dict[str, StageText]] = field(default_factory=dict)
+    _links: Links = field(default_factory=Links)
 
     def of(self, step: Step, defines: Mapping[str, str]) -> dict[str, StageText]:
         """The text of every stage of a step with these macros.
@@ -137,7 +141,9 @@ class StepTexts(Struct, eq=False):
         """
         key = text_key(step, self.types, self.resources, self.views), tuple(defines.items())
         if key not in self._made:
-            self._made[key] = stage_texts(step, self.types, self.resources, self.views, defines=defines)
+            self._made[key] = stage_texts(
+                step, self.types, self.resources, self.views, defines=defines, links=self._links
+            )
         return {stage: replace(text, node=step.node) for stage, text in self._made[key].items()}
 
 
@@ -153,9 +159,9 @@ def _stage(
     views: Mapping[str, ViewTable],
     macros: Mapping[str, str],
     wanted: Mapping[str, Signature],
-    include_folder: Path,
+    includes: Includes,
 ) -> StageText:
-    includes = Includes(include_folder)
+    include_folder = includes.include_folder
     view = includes.expand(include_folder / "view.glsl")
     view = SourceText(view.lines, tuple(replace(origin, shared=True) for origin in view.origins))
     node = types[step.node]
@@ -168,7 +174,7 @@ def _stage(
         return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
 
     key = file, include_folder, root, step.includes, versions, node.inherited
-    called = _CALLED.get(key, lambda: expanded(Includes(include_folder)).text) if wanted else ""
+    called = _CALLED.get(key, lambda: expanded(includes.fresh()).text) if wanted else ""
     functions = SourceText()
     for signature in wanted.values():
         if calls(called, signature.name):
