@@ -8,6 +8,8 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from types import FunctionType, MethodType
 
+from msgspec.structs import asdict
+
 from rendergraph.catalog import NodeType
 from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Node, Views, WrittenPort
@@ -87,7 +89,7 @@ def _python_text(node: NodeType) -> str:
     if node.is_shader:
         return ""
     modules = {cls.__module__ for cls in node.cls.__mro__ if issubclass(cls, Node) and cls is not Node}
-    said = [value for port in node.cls.ports().values() for value in vars(port).values()]
+    said = [value for port in node.cls.ports().values() for value in asdict(port).values()]
     modules |= {rule.__module__ for rule in said if isinstance(rule, FunctionType | MethodType)}
     files = {Path(sys.modules[module].__file__ or "") for module in modules}
     return "".join(file.read_text(encoding="utf-8", errors="replace") for file in files)
