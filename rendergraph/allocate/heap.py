@@ -53,9 +53,9 @@ def share_blocks(items: Sequence[Item], *, seed: int = 0) -> list[list[int]]:
 def least_bytes(items: Sequence[Item]) -> int:
     """Bytes that no blocks are below: the n-th largest block holds the n-th largest item of every moment."""
     most = [0] * len(items)
-    ordered = sorted(items, key=lambda item: -item.bytes)
+    ordered = sorted([(item.bytes, item.first, item.last) for item in items], reverse=True)
     for now in {item.first for item in items}:
-        live = [item.bytes for item in ordered if item.first <= now <= item.last]
+        live = [bytes for bytes, first, last in ordered if first <= now <= last]
         most[: len(live)] = map(max, most, live)
     return sum(most)
 
