@@ -12,7 +12,6 @@ import types
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, partial, reduce
-from operator import call
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -114,7 +113,11 @@ def test_of(annotation: Any) -> Callable[[Any], bool]:
         return lambda value: any(type(value) is type(choice) and value == choice for choice in arguments)
     if origin is tuple and Ellipsis not in arguments:
         tests = [test_of(part) for part in arguments]
-        return lambda value: isinstance(value, tuple) and len(value) == len(tests) and all(map(call, tests, value))
+        return lambda value: (
+            isinstance(value, tuple)
+            and len(value) == len(tests)
+            and all(test(entry) for test, entry in zip(tests, value, strict=True))
+        )
     if origin in (tuple, list, Sequence):
         entries = test_of(arguments[0])
         return lambda value: isinstance(value, tuple | list | range) and all(map(entries, value))

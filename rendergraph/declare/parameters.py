@@ -80,7 +80,8 @@ class Parameter(Struct, frozen=True, dict=True):
 
     def beyond(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
-        for number in value if isinstance(value, tuple) else (value,):
+        parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
+        for number in parts:
             if fits(number, float) and (wrong := self.limits.beyond(number)):
                 return wrong
         return None
