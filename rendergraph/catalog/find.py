@@ -72,19 +72,20 @@ def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> I
     files = list(_files(folder))
     has_python = any(suffix == ".py" for _, _, _, suffix in files)
     for where, family, stem, suffix in files:
-        file = where / f"{stem}{suffix}"
+        file = os.path.join(where, stem + suffix)
         if suffix == ".py":
             module = ".".join([package, *filter(None, family.split("/")), stem])
-            yield stem, Listed(module, family, file, where if shaders is None else shaders / family, plugin)
+            beside = Path(where) if shaders is None else shaders / family
+            yield stem, Listed(module, family, Path(file), beside, plugin)
         elif not has_python or _has_header(file):
-            yield stem, Listed("", family, file, where, plugin)
+            yield stem, Listed("", family, Path(file), Path(where), plugin)
     for where, family, stem, suffix in _files(shaders) if shaders is not None else ():
-        file = where / f"{stem}{suffix}"
+        file = os.path.join(where, stem + suffix)
         if suffix in SHADERS and _has_header(file):
-            yield stem, Listed("", family, file, where, plugin)
+            yield stem, Listed("", family, Path(file), Path(where), plugin)
 
 
-def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[Path, str, str, str]]:
+def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str, str]]:
     """Folder, family, stem and ending of everything that may be a node type.
 
     Raises:
@@ -102,17 +103,18 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[Path, str, st
             stem, suffix = os.path.splitext(file)
             is_module = suffix == ".py" and not _NO_NODE.match(stem) and (family, stem) != ("", MODULE)
             if is_module or (suffix in SHADERS and _STEM.match(stem)):
-                yield Path(where), family, stem, suffix
+                yield where, family, stem, suffix
 
 
-def _has_header(file: Path) -> bool:
-    if not file.is_file():  # opening a pipe would wait for somebody to write
+def _has_header(file: str) -> bool:
+    if not os.path.isfile(file):  # opening a pipe would wait for somebody to write
         return False
     try:
-        with file.open("rb") as opened:
-            return header.is_in(opened.read(_HEAD_BYTES).decode("utf-8", "replace"))
+        with open(file, "rb") as opened:
+            text = opened.read(_HEAD_BYTES)
     except OSError:
         return False
+    return header.BEGIN.encode() in text and header.is_in(text.decode("utf-8", "replace"))
 
 
 def shaders(folder: Path) -> tuple[list[tuple[str, Listed]], list[Path]]:
@@ -122,11 +124,11 @@ def shaders(folder: Path) -> tuple[list[tuple[str, Listed]], list[Path]]:
         ValueError: it has more files than any plugin.
     """
     files = list(_files(folder, MOST_FILES))
-    python = [where / f"{stem}{suffix}" for where, _, stem, suffix in files if suffix == ".py"]
+    python = [Path(where, stem + suffix) for where, _, stem, suffix in files if suffix == ".py"]
     found = [
-        (stem, Listed("", family, file, where, folder.name))
+        (stem, Listed("", family, Path(file), Path(where), folder.name))
         for where, family, stem, suffix in files
-        if suffix in SHADERS and (file := where / f"{stem}{suffix}") and (not python or _has_header(file))
+        if suffix in SHADERS and (file := os.path.join(where, stem + suffix)) and (not python or _has_header(file))
     ]
     return found, python
 
