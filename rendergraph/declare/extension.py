@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -31,7 +32,8 @@ Ending: TypeAlias = Annotated[
 ]
 
 
-class MeshData(Struct, frozen=True, eq=False):
+@dataclass(frozen=True, eq=False)  # and no struct, whose signature wants NumPy's types when help() asks for it
+class MeshData:
     """Triangles of one material, as a mesh loader gives them: right-handed, +Y up, metres.
 
     Attributes:
