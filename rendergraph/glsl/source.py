@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 
 from msgspec import Struct
@@ -181,12 +182,14 @@ class Includes:
         self, plain: Sequence[str], first: int, base: Origin, raw: str, lines: list[str], origins: list[Origin]
     ) -> None:
         """Lines of a file as they stand there, the first of them by its number."""
-        for number, line in enumerate(plain, start=first):
-            self.bytes += len(line) + 1
-            origin = Origin(base.file, number, base.column, base.shared, base.prefix, base.by)
-            if self.bytes > MAX_BYTES:
-                raise _error("RG403", f"the shader with its includes is larger than {MAX_BYTES:,} bytes", origin, raw)
-            origins.append(origin)
+        sizes = [len(line) + 1 for line in plain]
+        if self.bytes + sum(sizes) > MAX_BYTES:
+            beyond = sum(self.bytes + size <= MAX_BYTES for size in accumulate(sizes))
+            text = f"the shader with its includes is larger than {MAX_BYTES:,} bytes"
+            raise _error("RG403", text, replace(base, line=first + beyond), raw)
+        self.bytes += sum(sizes)
+        file, column, shared, prefix, by = base.file, base.column, base.shared, base.prefix, base.by
+        origins += [Origin(file, number, column, shared, prefix, by) for number in range(first, first + len(plain))]
         lines += plain
 
     def _follow(self, path: Path) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 import yaml
 
 from rendergraph.errors import InputError, Problem
-from rendergraph.glsl import Includes, expand, strip_comments
+from rendergraph.glsl import Includes, Links, expand, strip_comments
 from rendergraph.resources import folder as folder_of
 
 
@@ -112,6 +113,27 @@ def test_a_link_does_not_lead_out_of_the_root(shaders: Path, tmp_path: Path) -> 
         expand(shaders / "a.frag", shaders.parent / "include")
 
 
+def test_links_are_followed_as_the_system_does(tmp_path: Path) -> None:
+    (tmp_path / "far" / "deep").mkdir(parents=True)
+    (tmp_path / "near").symlink_to("far/deep", target_is_directory=True)
+    (tmp_path / "far" / "a.glsl").touch()
+    (tmp_path / "far" / "deep" / "b.glsl").symlink_to("../a.glsl")
+    (tmp_path / "round").symlink_to("round")
+    links = Links()
+    for name in (
+        "near/b.glsl",
+        "near/../a.glsl",
+        "far/../near/../a.glsl",
+        "none/../near/b.glsl",
+        "round/a.glsl",
+        "near/",
+        "",
+        ".",
+    ):
+        path = os.path.join(tmp_path, name)
+        assert links.follow(path) == os.path.realpath(path) == links.follow(path)
+
+
 @pytest.mark.slow
 def test_limits_of_depth_and_size(shaders: Path) -> None:
     for number in range(40):
@@ -123,8 +145,12 @@ def test_limits_of_depth_and_size(shaders: Path) -> None:
         expand(shaders / "big.frag", shaders.parent / "include")
     write(shaders, half__glsl="int a;\n" * 100_000)
     write(shaders, b__frag='#if A\n#include "half.glsl"\n#endif\n#if B\n#include "half.glsl"\n#endif\n')
-    with pytest.raises(InputError, match="with its includes is larger than 1,000,000 bytes"):
+    with pytest.raises(InputError, match="with its includes is larger than 1,000,000 bytes") as error:
         expand(shaders / "b.frag", shaders.parent / "include")
+    place = problem(error).place
+    taken = 6 + 700_000 + 7 + 6  # three directives, and all of the file once
+    assert place is not None
+    assert (Path(place.file).name, place.line) == ("half.glsl", (1_000_000 - taken) // 7 + 1)
 
 
 def test_missing_and_unreadable_files(shaders: Path) -> None:
