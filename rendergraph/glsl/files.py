@@ -88,8 +88,11 @@ class Links:
         found = self._followed.get(path)
         if found is None:
             folder, name = os.path.split(path)
-            plain = folder not in ("", path) and name not in ("", "..") and not os.path.islink(path)
-            found = os.path.join(self.follow(folder), name) if plain else os.path.realpath(path)
+            if folder in ("", path) or name in ("", ".", ".."):
+                found = os.path.realpath(path)
+            else:
+                found = os.path.join(self.follow(folder), name)
+                found = os.path.realpath(found) if os.path.islink(found) else found
             self._followed[path] = found
         return found
 
