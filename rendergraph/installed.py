@@ -2,7 +2,7 @@
 
 `importlib.metadata` tells the same of every kind of archive, and its parsers of e-mails take longer to import than a
 pipeline takes to plan; here a package is a folder of `sys.path` that ends in `.dist-info` (PyPA, "Recording installed
-projects") or `.egg-info`, as every installer of today leaves one.
+projects") or `.egg-info`, or an unpacked egg. What lies in a zip archive is not found.
 """
 
 from __future__ import annotations
@@ -11,38 +11,40 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import reduce
 from typing import Any
 
 from msgspec import Struct
 
-_FOLDER = (".dist-info", ".egg-info")
+_ENDINGS = (".dist-info", ".egg-info")
 
 
 class Package(Struct, frozen=True):
-    """An installed package.
-
-    Attributes:
-        folder: its metadata.
-        version: as its folder is called; empty where a folder that is worked on has none.
-    """
+    """An installed package, by the folder of its metadata."""
 
     folder: str
-    version: str
 
     @property
     def name(self) -> str:
         """As it calls itself, which need not be how indexes compare it."""
+        return self._said("Name") or _parts(self.folder)[0]
+
+    @property
+    def version(self) -> str:
+        """As its folder is called, or as it says where that has none: one that is worked on."""
+        return _parts(self.folder)[1] or self._said("Version")
+
+    def _said(self, word: str) -> str:
         for file in ("METADATA", "PKG-INFO"):
             for line in _lines(self.folder, file):
-                if line.startswith("Name:"):
-                    return line.removeprefix("Name:").strip()
-        return os.path.basename(self.folder).partition("-")[0]
+                if line.startswith(f"{word}:"):
+                    return line.partition(":")[2].strip()
+        return ""
 
 
 class EntryPoint(Struct, frozen=True):
-    """A name under which a package offers something to others, written `name = module:attribute`."""
+    """A name under which a package offers something to others, written `name = module:attribute [extra]`."""
 
     name: str
     value: str
@@ -51,12 +53,16 @@ class EntryPoint(Struct, frozen=True):
     @property
     def module(self) -> str:
         """The module to import."""
-        return self.value.partition(":")[0].strip()
+        return self._target[0].strip()
 
     def load(self) -> Any:
         """Import it; raises whatever the module raises."""
-        attributes = self.value.partition(":")[2].partition("[")[0].strip()
+        attributes = self._target[2].strip()
         return reduce(getattr, filter(None, attributes.split(".")), importlib.import_module(self.module))
+
+    @property
+    def _target(self) -> tuple[str, str, str]:
+        return self.value.partition("[")[0].partition(":")
 
 
 def plain(name: str) -> str:
@@ -69,19 +75,26 @@ def packages() -> dict[str, Package]:
     found: dict[str, Package] = {}
     for root in dict.fromkeys(sys.path):
         try:
-            inside = sorted(name for name in os.listdir(root or ".") if name.endswith(_FOLDER))
+            inside = sorted(name for name in os.listdir(root or ".") if name.endswith(_ENDINGS))
         except OSError:
             continue
-        for name in inside:
-            project, _, rest = name.rpartition(".")[0].partition("-")
-            found.setdefault(plain(project), Package(os.path.join(root, name), rest.partition("-")[0]))
+        if root.endswith(".egg"):
+            inside.append("EGG-INFO")
+        for folder in (os.path.join(root, name) for name in inside):
+            found.setdefault(plain(_parts(folder)[0]), Package(folder))
     return found
 
 
 def version(name: str) -> str | None:
     """The version of a package; None where it is not installed."""
-    package = packages().get(plain(name))
-    return package.version if package is not None else None
+    return versions([name])[name]
+
+
+def versions(names: Iterable[str]) -> dict[str, str | None]:
+    """The versions of packages by their names; None of those that are not installed."""
+    known = packages()
+    found = {name: known.get(plain(name)) for name in names}
+    return {name: package.version if package is not None else None for name, package in found.items()}
 
 
 def entry_points(group: str) -> Iterator[EntryPoint]:
@@ -94,6 +107,13 @@ def entry_points(group: str) -> Iterator[EntryPoint]:
             elif within and "=" in line and line[0] not in "#;":
                 name, _, value = line.partition("=")
                 yield EntryPoint(name.strip(), value.strip(), package)
+
+
+def _parts(folder: str) -> tuple[str, str]:
+    """Name and version that a folder of metadata has in its own name, or an egg in its."""
+    home, name = os.path.split(folder)
+    project, _, rest = (os.path.basename(home) if name == "EGG-INFO" else name).rpartition(".")[0].partition("-")
+    return project, rest.partition("-")[0]
 
 
 def _lines(folder: str, file: str) -> list[str]:

@@ -41,7 +41,7 @@ SizeRule: TypeAlias = Annotated[
 
 
 class Port(Struct, frozen=True, eq=False, dict=True):
-    """One named connection point or texture of a node; its name is the class attribute's."""
+    """One named connection point or texture of a node; its name is the class attribute's, which no copy of it has."""
 
     name: ClassVar[str] = ""
     owner: ClassVar[str] = ""

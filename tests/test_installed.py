@@ -18,6 +18,7 @@ glow = glow.cli:main
 # another
 glow = glow.nodes
 deep=glow.more : Tools.table [extra]
+bare=glow.nodes [extra, other]
 [other]
 more = elsewhere
 """
@@ -39,10 +40,7 @@ def package(site: Path, folder: str, metadata: str = "METADATA", text: str = INF
 def test_every_package_here_and_its_version() -> None:
     known = {installed.plain(found.name): found.version for found in reversed([*importlib.metadata.distributions()])}
     ours = {name: package.version for name, package in installed.packages().items()}
-    assert {name: version for name, version in ours.items() if version} == {
-        name: known[name] for name in ours if ours[name]
-    }
-    assert ours.keys() == known.keys()
+    assert ours == known
     assert {installed.plain(package.name) for package in installed.packages().values()} == ours.keys()
 
 
@@ -54,14 +52,33 @@ def test_every_entry_point_here(group: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("folder", "metadata"), [("my_glow-1.2.dist-info", "METADATA"), ("my_glow-1.2-py3.11.egg-info", "PKG-INFO")]
+    ("folder", "metadata"),
+    [
+        ("my_glow-1.2.dist-info", "METADATA"),
+        ("my_glow-1.2-py3.11.egg-info", "PKG-INFO"),
+        ("my_glow.egg-info", "PKG-INFO"),  # as a folder that is worked on has it
+    ],
 )
 def test_one_that_is_written_by_hand(folder: str, metadata: str, site: Path) -> None:
     package(site, folder, metadata)
-    plain, deep = (entry for entry in installed.entry_points("rendergraph.nodes") if entry.package.name == "My.Glow")
-    assert (plain.name, plain.module, deep.name, deep.module) == ("glow", "glow.nodes", "deep", "glow.more")
+    plain, deep, bare = (
+        entry for entry in installed.entry_points("rendergraph.nodes") if entry.package.name == "My.Glow"
+    )
+    assert [(entry.name, entry.module) for entry in (plain, deep, bare)] == [
+        ("glow", "glow.nodes"),
+        ("deep", "glow.more"),
+        ("bare", "glow.nodes"),
+    ]
     assert installed.version("my-glow") == installed.version("My_Glow") == "1.2"
     assert installed.version("no-such-package") is None
+
+
+def test_an_egg(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package(site, "my_glow-1.2-py3.11.egg/EGG-INFO", "PKG-INFO")
+    assert installed.version("my-glow") is None
+    monkeypatch.syspath_prepend(str(site / "my_glow-1.2-py3.11.egg"))
+    assert installed.versions(["My.Glow"]) == {"My.Glow": "1.2"}
+    assert [entry.package.name for entry in installed.entry_points("rendergraph.nodes")][:2] == ["My.Glow", "My.Glow"]
 
 
 def test_what_is_loaded(site: Path) -> None:
@@ -70,8 +87,10 @@ def test_what_is_loaded(site: Path) -> None:
     (site / "glow" / "__init__.py").touch()
     (site / "glow" / "more.py").write_text("class Tools:\n    table = 7\n")
     (site / "glow" / "nodes.py").write_text("")
-    plain, deep = (entry for entry in installed.entry_points("rendergraph.nodes") if entry.package.name == "My.Glow")
-    assert (plain.load().__name__, deep.load()) == ("glow.nodes", 7)
+    plain, deep, bare = (
+        entry for entry in installed.entry_points("rendergraph.nodes") if entry.package.name == "My.Glow"
+    )
+    assert (plain.load().__name__, deep.load(), bare.load()) == ("glow.nodes", 7, plain.load())
 
 
 def test_the_first_of_two_counts_and_what_cannot_be_read_says_nothing(
@@ -82,7 +101,7 @@ def test_the_first_of_two_counts_and_what_cannot_be_read_says_nothing(
     (site / "bare-3.dist-info").mkdir()
     (site / "file-4.egg-info").touch()
     monkeypatch.setattr("sys.path", [str(site), str(site / "second"), str(site / "none")])
-    assert [entry.name for entry in installed.entry_points("rendergraph.nodes")] == ["glow", "deep"]
+    assert [entry.name for entry in installed.entry_points("rendergraph.nodes")] == ["glow", "deep", "bare"]
     assert {name: package.version for name, package in installed.packages().items()} == {
         "my-glow": "1.2",
         "bare": "3",

@@ -147,7 +147,8 @@ def signature(thing: Any, *, method: bool = False) -> str:
     shown, keyword_only = [], False
     # A struct's signature has its types worked out; the page shows them by the names that it explains.
     is_struct = inspect.isclass(thing) and issubclass(thing, msgspec.Struct)
-    written = inspect.get_annotations(thing) if is_struct else {}
+    lines = [inspect.get_annotations(base) for base in reversed(thing.__mro__)] if is_struct else []
+    written = {name: text for line in lines for name, text in line.items()}
     for parameter in found.parameters.values():
         parameter = parameter.replace(annotation=written.get(parameter.name, parameter.annotation))
         if method and parameter.name in ("self", "cls"):

@@ -174,7 +174,10 @@ def draw(name: str, picture: Picture, place: Path) -> Path:
                 file.write_bytes(b64decode(re.findall(r'base64,([^"]+)" alt="FLIP', text)[-1]))
             total = total + images.read(file)[..., :3].astype(np.uint16)
         panels.append(_shown(np.minimum(total, 255), Panel("") if isinstance(panel, str) else panel, picture))
-    if len(panels) == 1 and not picture.crop:
+    panel = picture.panels[0]
+    asked = Panel(panel) if isinstance(panel, str) else panel
+    untouched = asked == Panel(asked.run) and (picture.crop, picture.enlarge, picture.shrink) == (None, 1, 1)
+    if untouched and len(panels) == 1 and len(commands(picture)[0]) == 1:
         shutil.copy(file, made)
         return made
     columns = picture.columns or len(panels)

@@ -56,11 +56,10 @@ def _bases(cls: type) -> list[type]:
 
 def _is_importable(found: NodeType) -> bool:
     """Whether others get the class by an import: it comes with an installed package."""
-    from importlib.metadata import entry_points
-
     from rendergraph.catalog.catalog import GROUP
+    from rendergraph.installed import entry_points
 
-    return not found.is_shader and any(entry.name == found.plugin for entry in entry_points(group=GROUP))
+    return not found.is_shader and any(entry.name == found.plugin for entry in entry_points(GROUP))
 
 
 def _group(group: str | None) -> dict[str, str]:

@@ -11,7 +11,7 @@ from typing import Any
 from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json, table
 from rendergraph.cli.words import click
-from rendergraph.installed import version
+from rendergraph.installed import version, versions
 
 _OPTIONAL_FEATURES = ("memory objects", "depth bounds")
 _SECONDS = 60
@@ -61,7 +61,7 @@ def examine() -> dict[str, Any]:
 def _probe(*arguments: str) -> dict[str, Any]:
     """What `probe` says, or what became of it."""
     words = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
-    import subprocess
+    import subprocess  # this module is loaded for `--help`, too
 
     try:
         done = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False)
@@ -89,7 +89,7 @@ def _packages() -> dict[str, str | None]:
     except PackageNotFoundError:
         needed = []
     names = [re.split(r"[^A-Za-z0-9._-]", line, maxsplit=1)[0] for line in needed if "extra ==" not in line]
-    return {name: version(name) for name in names}
+    return versions(names)
 
 
 def _advice(asked: dict[str, Any], devices: list[dict[str, Any]], packages: dict[str, str | None]) -> list[str]:

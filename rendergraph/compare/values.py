@@ -14,7 +14,7 @@ from rendergraph.compare.axes import typed
 from rendergraph.compare.timing import Times
 from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Place, Problem
-from rendergraph.installed import version
+from rendergraph.installed import versions
 from rendergraph.metrics import Encoding, Metrics, colors, description, rmse
 from rendergraph.session.frame import not_finite
 
@@ -282,7 +282,7 @@ def machine() -> dict[str, str]:
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "processor": _processor(),
         "python": platform.python_version(),
-        **{name: version(name) or "" for name in names},
+        **{name: version or "" for name, version in versions(names).items()},
     }
 
 

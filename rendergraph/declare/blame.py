@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import linecache
 import re
 import sys
+import traceback
 from collections.abc import Iterator
 from inspect import get_annotations
 from pathlib import Path
@@ -104,6 +106,7 @@ def _in_shader(text: str, name: str) -> tuple[int, int] | None:
 
 
 _MOST_SAID = 500
+_OF_A_STRUCT = ("Unexpected keyword argument", "Missing required argument", "Extra positional arguments")
 """Characters of an exception's text that a message repeats."""
 
 
@@ -116,7 +119,15 @@ def told(error: BaseException) -> str:
             raise
         said = ""
     said = said if len(said) <= _MOST_SAID else said[:_MOST_SAID] + "…"
-    return f"{type(error).__name__}: {said}"
+    return f"{type(error).__name__}: {_called(error) if said.startswith(_OF_A_STRUCT) else ''}{said}"
+
+
+def _called(error: BaseException) -> str:
+    """`Input(): ` where a call ended with what does not name what was called itself."""
+    frames = traceback.extract_tb(error.__traceback__)
+    line = linecache.getline(frames[-1].filename, frames[-1].lineno or 0) if frames else ""
+    called = re.match(r"[\w.]+(?=\()", line[frames[-1].colno or 0 :]) if line else None
+    return f"{called[0]}(): " if called else ""
 
 
 def happened(error: BaseException, cls: type, file: Path | None = None) -> Mistake:

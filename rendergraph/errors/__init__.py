@@ -79,13 +79,13 @@ class Problem(Struct, frozen=True, eq=False):
     mistake: Mistake | None = None
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Problem) and self._read == other._read
+        return isinstance(other, Problem) and self._compared == other._compared
 
     def __hash__(self) -> int:
-        return hash(self._read)
+        return hash(self._compared)
 
     @property
-    def _read(self) -> tuple[object, ...]:
+    def _compared(self) -> tuple[object, ...]:
         """What a user reads of it: two of one text are one."""
         return self.code, self.text, self.place, self.line_text, self.severity
 

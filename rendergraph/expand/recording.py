@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
+from msgspec.structs import replace
+
 from rendergraph.declare import Facts, Function, InOut, Input, Part, Port, TextureInfo, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
@@ -45,11 +47,12 @@ class Recording:
             self.links[name] = there
             if there:
                 inputs[name] = tuple([graph.textures[end.now] for end in there if end.now in graph.textures])
-        self.facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
-        for name, port in node.type.read.items():
-            if port.takes_scene and name not in inputs:
-                inputs[name] = self.facts.of_scene
-                self.links |= {name: (ENVIRONMENT,)} if inputs[name] else {}
+        facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
+        around = [name for name, port in node.type.read.items() if port.takes_scene and name not in inputs]
+        if around:
+            self.links |= dict.fromkeys(around, (ENVIRONMENT,)) if facts.of_scene else {}
+            facts = replace(facts, inputs=inputs | dict.fromkeys(around, facts.of_scene))
+        self.facts = facts
         self.own = {name: Endpoint(node.id, name) for name in node.type.written}
         self.defines = define_parameters(node.node, node.choices)
         self.uniforms = param_uniforms(node.node)

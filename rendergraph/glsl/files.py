@@ -73,7 +73,7 @@ class Directive(Struct, frozen=True):
         )
 
 
-Parts: TypeAlias = "tuple[tuple[int, tuple[str, ...], Directive | None], ...]"
+Runs: TypeAlias = "tuple[tuple[int, tuple[str, ...], Directive | None], ...]"
 """Lines in runs without a `#`: the number of the first, the lines, and the line that ends them, None at the end."""
 
 
@@ -127,22 +127,22 @@ def about(file: Path) -> str:
     return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
-def parts(file: Path) -> tuple[str, Parts]:
+def runs(file: Path) -> tuple[str, Runs]:
     """A file's text, and its lines without comments and blanks at their ends.
 
     Raises:
         InputError: the file cannot be read.
     """
     look(file)
-    return _parts(file, stamp(file))
+    return _runs(file, stamp(file))
 
 
 @lru_cache(maxsize=256)
-def _parts(file: Path, stamp: Stamp) -> tuple[str, Parts]:
+def _runs(file: Path, stamp: Stamp) -> tuple[str, Runs]:
     raw = read_text(file)
     lines = tuple(line.rstrip() for line in strip_comments(raw).split("\n"))
     ends = [number for number, line in enumerate(lines) if "#" in line]
     begins = [0, *(number + 1 for number in ends)]
     directives = [Directive.of(number + 1, lines[number]) for number in ends]
-    runs = zip(begins, [*ends, len(lines)], [*directives, None], strict=True)
-    return raw, tuple((begin + 1, lines[begin:end], directive) for begin, end, directive in runs)
+    found = zip(begins, [*ends, len(lines)], [*directives, None], strict=True)
+    return raw, tuple((begin + 1, lines[begin:end], directive) for begin, end, directive in found)

@@ -12,7 +12,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.glsl.files import MAX_BYTES, Links, parts
+from rendergraph.glsl.files import MAX_BYTES, Links, runs
 from rendergraph.stamps import look
 
 MAX_DEPTH = 32
@@ -142,10 +142,10 @@ class Includes:
         origins: list[Origin],
         depth: list[int],
     ) -> None:
-        raw, found = parts(file)
+        raw, found = runs(file)
         stack = [*stack, self._follow(file)]
-        for first, plain, line in found:
-            self._take(plain, first, replace(base, file=file), raw, lines, origins)
+        for first, run, line in found:
+            self._take(run, first, replace(base, file=file), raw, lines, origins)
             if line is None:
                 return
             origin = replace(base, file=file, line=line.number)
@@ -179,21 +179,21 @@ class Includes:
             self._include(target, home, inner, stack, lines, origins, depth)
 
     def _take(
-        self, plain: Sequence[str], first: int, base: Origin, raw: str, lines: list[str], origins: list[Origin]
+        self, run: Sequence[str], first: int, base: Origin, raw: str, lines: list[str], origins: list[Origin]
     ) -> None:
         """Lines of a file as they stand there, the first of them by its number."""
-        sizes = [len(line) + 1 for line in plain]
+        sizes = [len(line) + 1 for line in run]
         if self.bytes + sum(sizes) > MAX_BYTES:
             beyond = sum(self.bytes + size <= MAX_BYTES for size in accumulate(sizes))
             text = f"the shader with its includes is larger than {MAX_BYTES:,} bytes"
             raise _error("RG403", text, replace(base, line=first + beyond), raw)
         self.bytes += sum(sizes)
         file, column, shared, prefix, by = base.file, base.column, base.shared, base.prefix, base.by
-        origins += [Origin(file, number, column, shared, prefix, by) for number in range(first, first + len(plain))]
-        lines += plain
+        origins += [Origin(file, number, column, shared, prefix, by) for number in range(first, first + len(run))]
+        lines += run
 
     def _follow(self, path: Path) -> str:
-        return self._links.follow(os.path.join(os.getcwd(), path))
+        return self._links.follow(str(path if path.is_absolute() else Path.cwd() / path))
 
     def _include(
         self,
@@ -242,7 +242,7 @@ class Includes:
             places += [(home, home) for home in self._inherited]
         for folder, home in places:
             target, inside = folder / name, self._follow(home)
-            if not self._follow(target).startswith(os.path.join(inside, "")):
+            if not os.path.join(self._follow(target), "").startswith(os.path.join(inside, "")):
                 text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
                 raise _error("RG406", text, origin, raw)
             look(target)
@@ -278,7 +278,7 @@ def needs(file: Path) -> tuple[str, ...]:
     Raises:
         InputError: the file cannot be read, or the line is written in another way (RG405).
     """
-    raw, found = parts(file)
+    raw, found = runs(file)
     words: list[str] = []
     for _, _, line in found:
         if line is not None and line.needs is not None:
@@ -292,7 +292,7 @@ def needs(file: Path) -> tuple[str, ...]:
 
 def needs_place(file: Path) -> tuple[Place, str]:
     """Where an include says what it needs, and that line."""
-    raw, found = parts(file)
+    raw, found = runs(file)
     number = next((line.number for _, _, line in found if line is not None and line.needs is not None), 1)
     return Place(shown_file(file), number, 1), raw.split("\n")[number - 1]
 

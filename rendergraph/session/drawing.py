@@ -12,7 +12,7 @@ from rendergraph.compile import Executable, GpuScene
 from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.execute import FrameTimes, Runner
 from rendergraph.images import PictureInfo, channel_names
-from rendergraph.installed import packages
+from rendergraph.installed import versions
 from rendergraph.scene import animate
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
@@ -156,13 +156,11 @@ class Drawing(Struct, eq=False, dict=True):
 
     @cached_property
     def _metadata(self) -> Mapping[str, str]:
-        installed = packages()
-        found = {name: installed.get(name.lower()) for name in ("moderngl", "numpy", "OpenImageIO")}
-        versions = {"rendergraph": __version__} | {name: one.version for name, one in found.items() if one is not None}
+        found = {"rendergraph": __version__} | versions(("moderngl", "numpy", "OpenImageIO"))
         device = self.gpu.device
         return {
             **described(self.expanded.linked),
-            "rendergraph:versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
+            "rendergraph:versions": ", ".join(f"{name} {version}" for name, version in found.items()),
             "rendergraph:device": f"{device.renderer}, OpenGL {device.as_json()['version']}",
         }
 

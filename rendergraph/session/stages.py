@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
 import rendergraph.allocate
 import rendergraph.expand
@@ -105,7 +105,7 @@ def link(resolved: Resolved) -> Linked:
         raise InputError([*spec.problems, *error.problems]) from None
     around = environment_facts(scene)
     graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene), around)
-    return Linked(**asdict(resolved), scene=scene, graph=graph)
+    return resolved.linked(scene, graph)
 
 
 def sketch(resolved: Resolved) -> Linked:
@@ -126,7 +126,7 @@ def sketch(resolved: Resolved) -> Linked:
                 raise error from None
             scene, unread = complete(Scene("missing")), lacking.problems
         graph, missing = rendergraph.link.sketch(spec, catalog, light_facts(scene), environment_facts(scene))
-        return Linked(**asdict(resolved), scene=scene, graph=graph, missing=(*missing, *unread))
+        return resolved.linked(scene, graph, (*missing, *unread))
 
 
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:

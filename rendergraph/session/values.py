@@ -67,6 +67,19 @@ class Resolved(Struct, frozen=True, eq=False, kw_only=True):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.selection.source}>"
 
+    def linked(self, scene: Scene, graph: Graph, missing: tuple[Problem, ...] = ()) -> Linked:
+        """The same with its scene and its graph."""
+        return Linked(
+            selection=self.selection,
+            catalog=self.catalog,
+            spec=self.spec,
+            frames=self.frames,
+            fps=self.fps,
+            scene=scene,
+            graph=graph,
+            missing=missing,
+        )
+
 
 class Linked(Resolved, frozen=True, eq=False, kw_only=True):
     """The checked graph with its scene.

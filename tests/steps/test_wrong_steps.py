@@ -66,7 +66,7 @@ CALLS = {
     'steps.fullscreen("wrong.frag", state=State(scissor=(0, 0, 0.5, 1)))': "RG423 State: scissor is (0, 0, 0.5, 1), not x, y, width and height in texels or None; divide with //",
     'steps.fullscreen("wrong.frag", state=State(stencil=Stencil(StencilFace(func="equals"))))': "RG423 StencilFace: func is 'equals'; did you mean 'equal'?",
     'steps.fullscreen("wrong.frag", state=State(blend=Blend("source_alpha")))': "RG423 Blend: src is 'source_alpha'; did you mean 'src_alpha'?",
-    'steps.fullscreen("wrong.frag", state=State(culling="none"))': "RG420 TypeError: Unexpected keyword argument 'culling'",
+    'steps.fullscreen("wrong.frag", state=State(culling="none"))': "RG420 TypeError: State(): Unexpected keyword argument 'culling'",
     # geometry
     'steps.geometry("wrong.frag", objects="transparnt")': "RG423 objects is 'transparnt'; did you mean 'transparent'? An object of this name is ['transparnt']",
     'steps.geometry("wrong.frag", objects=3)': "RG423 objects is 3, not all, opaque, transparent, casters or a list of objects' names",
