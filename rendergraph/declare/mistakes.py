@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from inspect import get_annotations
 from typing import Literal, get_args, get_origin
+from weakref import WeakSet
 
 from rendergraph.annotations import may_be, mistakes_in, parts_of, quoted
 from rendergraph.declare.blame import told
@@ -53,18 +54,27 @@ _OF_THE_FRAMEWORK = frozenset(
 _ROLES = "param(…), define(…) or structural(…)"
 
 
+_SOUND: WeakSet[type[Node]] = WeakSet()
+"""Classes that nothing is wrong with: every pipeline that is read asks, and an edited class is another one."""
+
+
 def declaration_mistakes(cls: type[Node]) -> list[Mistake]:
     """What is wrong with a node's declaration; each mistake's subject is a port, a parameter, or empty for the class.
 
     Checked: names are GLSL identifiers and distinct, also as macros; docs exist; types and defaults are what a shader
     can be given and lie inside their range; formats, kinds and words exist; rules name ports of this node.
     """
+    if cls in _SOUND:
+        return []
     try:
         cls.parameters()
     except Exception as error:  # whatever evaluating an annotation raises
         named = [name for name, hint in get_annotations(cls).items() if str(getattr(error, "name", None)) in str(hint)]
         return [Mistake(next(iter(named), ""), f"the types of its parameters cannot be worked out: {told(error)}")]
-    return [*_names(cls), *_docs(cls), *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
+    found = [*_names(cls), *_docs(cls), *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
+    if not found:
+        _SOUND.add(cls)
+    return found
 
 
 def _names(cls: type[Node]) -> Iterator[Mistake]:

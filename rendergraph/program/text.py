@@ -25,6 +25,7 @@ from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDe
 
 VERSION = "#version 450 core"
 _CALLED: Remembered[str] = Remembered()
+_TEXTS: Remembered[dict[str, StageText]] = Remembered(256)  # some 100 KiB each
 """Files with all that they include, as they are read to see what they call."""
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
 
@@ -141,9 +142,8 @@ class StepTexts(Struct, eq=False):
         """
         key = text_key(step, self.types, self.resources, self.views), tuple(defines.items())
         if key not in self._made:
-            self._made[key] = stage_texts(
-                step, self.types, self.resources, self.views, defines=defines, links=self._links
-            )
+            args = step, self.types, self.resources, self.views
+            self._made[key] = _TEXTS.get(key, lambda: stage_texts(*args, defines=defines, links=self._links))
         return {stage: replace(text, node=step.node) for stage, text in self._made[key].items()}
 
 

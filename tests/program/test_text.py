@@ -159,6 +159,14 @@ def test_texts_of_equal_steps_are_put_together_once_and_of_others_not(
         texts.of(given, defines)
         assert len(made) == before + 1
 
+    before = len(made)
+    another: dict[str, Any] = {"types": types(folder), "resources": resources, "views": VIEWS}
+    assert StepTexts(**another).of(base, {"A": "1"})["fragment"].text == first["fragment"].text
+    assert len(made) == before  # another pipeline's step, as long as the files are what they were
+    (folder / "kernel.glsl").write_text("const float WIDTH = 7.25;\nfloat kernel(float s) { return s * WIDTH; }\n")
+    assert "7.25" in StepTexts(**another).of(base, {"A": "1"})["fragment"].text
+    assert len(made) == before + 1
+
 
 def test_every_name_of_a_provider_is_prefixed(folder: Path) -> None:
     text = fragment(folder, step("sun-soft")).text
