@@ -29,6 +29,8 @@ from msgspec import Struct
 
 from rendergraph import images
 from rendergraph.cli.app import main as rendergraph
+from rendergraph.document import Source, from_plain, load
+from rendergraph.resolve.merge import merge_patch
 from rendergraph.resources import folder
 
 HERE = Path(__file__).resolve().parent
@@ -138,7 +140,7 @@ def prepare(picture: Picture, place: Path) -> None:
             if "of" in scene:
                 other = str(scene.pop("of"))
                 base = place / other if other in picture.files else SCENES / f"{other}.yaml"
-                scene = _merged(yaml.safe_load(base.read_text(encoding="utf-8")), scene)
+                scene = merge_patch(load(base).root, from_plain(scene, Source(file))).plain()
             content = yaml.safe_dump(scene, sort_keys=False)
         (place / file).write_text(content, encoding="utf-8")
 
@@ -192,19 +194,6 @@ def difference(old: Path, new: Path) -> float:
         return math.inf
     a, b = (images.read(file)[..., :3].astype(np.float64) for file in (old, new))
     return float(np.abs(a - b).mean()) if a.shape[:2] == b.shape[:2] else math.inf
-
-
-def _merged(base: Any, changes: Any) -> Any:
-    """A merge patch (RFC 7386) applied."""
-    if not isinstance(changes, dict):
-        return changes
-    base = dict(base) if isinstance(base, dict) else {}
-    for key, value in changes.items():
-        if value is None:
-            base.pop(key, None)
-        else:
-            base[key] = _merged(base.get(key), value)
-    return base
 
 
 def _shown(pixels: Any, panel: Panel, picture: Picture) -> Bytes:

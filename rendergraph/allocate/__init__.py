@@ -337,10 +337,9 @@ def _reasons(
     names = step_names(schedule.steps)
     outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
     kinds, what = sharing
-    alike: dict[object, list[str]] = defaultdict(list)
+    count: dict[object, int] = defaultdict(int)
     for id in schedule.resources:
-        if id not in schedule.whole_frame:
-            alike[kinds[id]].append(id)
+        count[kinds[id]] += id not in schedule.whole_frame
     reasons: dict[str, str] = {}
     for id, resource in schedule.resources.items():
         physical = physicals[placement[id][0]]
@@ -360,7 +359,7 @@ def _reasons(
         elif len(physical.members) == 1:
             reasons[id] = (
                 f"no other {word} {what if word == 'texture' else 'is of its size'}"
-                if len(alike[kinds[id]]) == 1
+                if count[kinds[id]] == 1
                 else f"whenever it is alive, all {word}s it could share are in use"
             )
         else:

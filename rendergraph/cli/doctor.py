@@ -60,9 +60,9 @@ def examine() -> dict[str, Any]:
 
 def _probe(*arguments: str) -> dict[str, Any]:
     """What `probe` says, or what became of it."""
-    words = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
     import subprocess  # this module is loaded for `--help`, too
 
+    words = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
     try:
         done = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False)
     except subprocess.TimeoutExpired:

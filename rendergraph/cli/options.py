@@ -86,7 +86,7 @@ def settings(text: str) -> tuple[str, ...]:
     Raises:
         ValueError: one of them is none, or a quote is not closed.
     """
-    import shlex
+    import shlex  # for what is set in one text alone
 
     return tuple(_setting(word) for word in shlex.split(text))
 

@@ -202,7 +202,7 @@ def terminal_width() -> int:
     """Columns of the terminal that stdout is, without bound elsewhere."""
     stream = data_stream()
     if stream is not None and stream.isatty():
-        import shutil
+        import shutil  # brings all archives along
 
         return shutil.get_terminal_size().columns
     return 1 << 20

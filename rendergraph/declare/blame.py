@@ -106,8 +106,9 @@ def _in_shader(text: str, name: str) -> tuple[int, int] | None:
 
 
 _MOST_SAID = 500
-_OF_A_STRUCT = ("Unexpected keyword argument", "Missing required argument", "Extra positional arguments")
 """Characters of an exception's text that a message repeats."""
+_OF_A_STRUCT = ("Unexpected keyword argument", "Missing required argument", "Extra positional arguments")
+"""How the exceptions of msgspec's constructors begin, which do not say whose they are."""
 
 
 def told(error: BaseException) -> str:

@@ -15,14 +15,12 @@ from rendergraph.textures import Semantic
 
 if TYPE_CHECKING:
     import numpy.typing as npt
-    from numpy.typing import ArrayLike
 
     Metric: TypeAlias = Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]
     ImageLoader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
     MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
 else:
     Metric = ImageLoader = MeshLoader = Callable
-    ArrayLike = Any  # for whoever asks for the signature of `MeshData`
 
 Include: TypeAlias = Annotated[str | Path, "the name of an include"]
 Word: TypeAlias = Annotated[
@@ -34,7 +32,7 @@ Ending: TypeAlias = Annotated[
 ]
 
 
-@dataclass(frozen=True, eq=False)  # and no struct, whose signature wants NumPy's types when help() asks for it
+@dataclass(frozen=True, eq=False)  # no struct: help() would work out its types, and so import NumPy's
 class MeshData:
     """Triangles of one material, as a mesh loader gives them: right-handed, +Y up, metres.
 
@@ -48,12 +46,12 @@ class MeshData:
         base_color, metallic, roughness: the material, where the scene file names none.
     """
 
-    positions: ArrayLike
-    indices: ArrayLike
-    normals: ArrayLike | None = None
-    uv0: ArrayLike | None = None
-    uv1: ArrayLike | None = None
-    colors: ArrayLike | None = None
+    positions: npt.ArrayLike
+    indices: npt.ArrayLike
+    normals: npt.ArrayLike | None = None
+    uv0: npt.ArrayLike | None = None
+    uv1: npt.ArrayLike | None = None
+    colors: npt.ArrayLike | None = None
     name: str = ""
     base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)
     metallic: float = 0.0

@@ -24,9 +24,11 @@ from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
 
 VERSION = "#version 450 core"
+_EXTENSION = re.compile(r"\s*#\s*extension\b")
 _CALLED: Remembered[str] = Remembered()
-_TEXTS: Remembered[dict[str, StageText]] = Remembered(256)  # some 100 KiB each
 """Files with all that they include, as they are read to see what they call."""
+_TEXTS: Remembered[dict[str, StageText]] = Remembered(256)
+"""The texts of steps, some 100 KiB each."""
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
 
 
@@ -57,9 +59,6 @@ class StageText(Struct, frozen=True):
     def text(self) -> str:
         """What the driver compiles."""
         return self.source.text
-
-
-_EXTENSION = re.compile(r"\s*#\s*extension\b")
 
 
 def prefix(node: str) -> str:
@@ -124,6 +123,8 @@ def stage_texts(
 class StepTexts(Struct, eq=False):
     """Program texts of many steps; those of steps that differ in nothing a text depends on are put together once.
 
+    They are kept from one pipeline to the next, as long as the files stay that they were made from.
+
     Attributes:
         types, resources, views: as `stage_texts` takes them.
     """
@@ -131,7 +132,6 @@ class StepTexts(Struct, eq=False):
     types: Mapping[str, NodeType]
     resources: Mapping[str, Resource]
     views: Mapping[str, ViewTable]
-    _made: dict[object, dict[str, StageText]] = field(default_factory=dict)
     _links: Links = field(default_factory=Links)
 
     def of(self, step: Step, defines: Mapping[str, str]) -> dict[str, StageText]:
@@ -141,10 +141,9 @@ class StepTexts(Struct, eq=False):
             InputError: a file is missing or cannot be put together (RG400 to RG409).
         """
         key = text_key(step, self.types, self.resources, self.views), tuple(defines.items())
-        if key not in self._made:
-            args = step, self.types, self.resources, self.views
-            self._made[key] = _TEXTS.get(key, lambda: stage_texts(*args, defines=defines, links=self._links))
-        return {stage: replace(text, node=step.node) for stage, text in self._made[key].items()}
+        args = step, self.types, self.resources, self.views
+        texts = _TEXTS.get(key, lambda: stage_texts(*args, defines=defines, links=self._links))
+        return {stage: replace(text, node=step.node) for stage, text in texts.items()}
 
 
 # --- one stage -------------------------------------------------------------------------------------------------------

@@ -38,9 +38,13 @@ LATE = (
     "yaml",
     "rendergraph.scene.scene_yaml",
     "rendergraph.scene.shapes",
-    *(f"rendergraph.nodes.{name}" for name in ("lighting.forward_lighting", "lighting.deferred_lighting")),
-    *(f"rendergraph.nodes.{name}" for name in ("shadows.shadow_map", "shadows.shadow_pcf", "display.tonemap")),
-    *(f"rendergraph.nodes.{name}" for name in ("geometry.gbuffer", "occlusion.ssao_hemisphere")),
+    "rendergraph.nodes.display.tonemap",
+    "rendergraph.nodes.geometry.gbuffer",
+    "rendergraph.nodes.lighting.deferred_lighting",
+    "rendergraph.nodes.lighting.forward_lighting",
+    "rendergraph.nodes.occlusion.ssao_hemisphere",
+    "rendergraph.nodes.shadows.shadow_map",
+    "rendergraph.nodes.shadows.shadow_pcf",
 )
 """What is imported on the way to a first frame of ours or theirs."""
 

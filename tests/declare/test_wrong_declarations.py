@@ -100,12 +100,14 @@ def test_a_wrong_declaration(author: Any, body: str) -> None:
     assert [line.partition(" RG490 ")[2] for line in said] == [f"node type 'wrong': {text}" for text in texts]
     if "'" in texts[0] and "shader" not in body:
         assert said[0].startswith(f"wrong.py:{author.line()}:"), said[0]
+    assert author.said(author.pipeline().check) == said  # to the next who asks, too
 
 
 CLASSES = {
     # what Python says when the module is imported
     "import nonsense_module  # here": "RG491 node type 'wrong' cannot be imported: ModuleNotFoundError",
     "raise SystemExit  # here": "RG491 node type 'wrong' cannot be imported: SystemExit",
+    'more = Output(Radiance, docs="D.")  # here': "RG491 node type 'wrong' cannot be imported: TypeError: Output\\(\\): Unexpected keyword argument 'docs'",
     'state = State(cull="both")  # here': "RG491 node type 'wrong' cannot be imported: Misuse: State: cull is 'both'; there is",
 }
 
