@@ -20,11 +20,14 @@ from typing import TypeAlias
 Stamp: TypeAlias = "tuple[object, ...] | None"
 """What tells one state of a file from the next; the names in a folder; None where there is nothing."""
 
+Stamps: TypeAlias = "Mapping[str, Stamp]"
+"""Absolute paths, in the order they were looked at."""
+
 _SOURCES = (".py", ".frag", ".vert", ".geom", ".comp", ".glsl", ".yaml", ".yml", ".toml", "")
-_LOOKED: ContextVar[dict[Path, Stamp] | None] = ContextVar("looked", default=None)
+_LOOKED: ContextVar[dict[str, Stamp] | None] = ContextVar("looked", default=None)
 
 
-def stamp(path: Path) -> Stamp:
+def stamp(path: Path | str) -> Stamp:
     """The state of a file or folder; of a folder only what may be source text: pictures written into it are none."""
     try:
         status = os.stat(path)
@@ -35,16 +38,16 @@ def stamp(path: Path) -> Stamp:
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
-def look(path: Path) -> None:
+def look(path: Path | str) -> None:
     """Note a file or folder, before it is opened; the first look counts."""
     looked = _LOOKED.get()
     if looked is not None:
-        path = Path(os.path.abspath(path))
-        if path not in looked:
-            looked[path] = stamp(path)
+        name = os.path.abspath(path)
+        if name not in looked:
+            looked[name] = stamp(name)
 
 
-def again(stamps: Mapping[Path, Stamp]) -> None:
+def again(stamps: Stamps) -> None:
     """Note what a kept result was made from."""
     looked = _LOOKED.get()
     if looked is not None:
@@ -53,10 +56,10 @@ def again(stamps: Mapping[Path, Stamp]) -> None:
 
 
 @contextmanager
-def looking() -> Iterator[dict[Path, Stamp]]:
+def looking() -> Iterator[dict[str, Stamp]]:
     """Collect what is looked at in the block, also where it fails; a collection around it is given the same."""
     outer = _LOOKED.get()
-    looked: dict[Path, Stamp] = {}
+    looked: dict[str, Stamp] = {}
     token = _LOOKED.set(looked)
     try:
         yield looked
@@ -67,9 +70,9 @@ def looking() -> Iterator[dict[Path, Stamp]]:
                 outer.setdefault(path, found)
 
 
-def changed(stamps: Mapping[Path, Stamp]) -> list[Path]:
+def changed(stamps: Stamps) -> list[Path]:
     """What is no longer as it was, in the order it was looked at."""
-    return [path for path, found in stamps.items() if stamp(path) != found]
+    return [Path(path) for path, found in stamps.items() if stamp(path) != found]
 
 
 def _is_source(name: str) -> bool:

@@ -91,14 +91,14 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
     Raises:
         ValueError: there are more files than `most`, of whatever kind.
     """
-    seen = 0
-    for where, subfolders, files in os.walk(folder):
-        look(Path(where))
+    seen, top = 0, os.fspath(folder)
+    for where, subfolders, files in os.walk(top):
+        look(where)
         seen += len(files) + len(subfolders)
         if seen > most:
             raise ValueError(f"it has more than {most:,} files; name the folder of the effects itself")
         subfolders[:] = sorted(name for name in subfolders if name.isidentifier() and not name.startswith("_"))
-        family = Path(where).relative_to(folder).as_posix().removeprefix(".")
+        family = where.removeprefix(top).strip(os.sep).replace(os.sep, "/")
         for file in sorted(files):
             stem, suffix = os.path.splitext(file)
             is_module = suffix == ".py" and not _NO_NODE.match(stem) and (family, stem) != ("", MODULE)
@@ -107,11 +107,12 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
 
 
 def _has_header(file: str) -> bool:
-    if not os.path.isfile(file):  # opening a pipe would wait for somebody to write
-        return False
     try:
-        with open(file, "rb") as opened:
-            text = opened.read(_HEAD_BYTES)
+        opened = os.open(file, os.O_RDONLY | os.O_NONBLOCK)  # a pipe would wait for somebody to write
+        try:
+            text = os.read(opened, _HEAD_BYTES)
+        finally:
+            os.close(opened)
     except OSError:
         return False
     return header.BEGIN.encode() in text and header.is_in(text.decode("utf-8", "replace"))

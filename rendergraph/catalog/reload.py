@@ -17,7 +17,7 @@ from rendergraph.stamps import Stamp, again, changed, look, looking
 PREFIX = "rendergraph_plugin_"
 """What the packages of folders are called, before a number that tells them apart."""
 
-_READ: dict[str, dict[Path, Stamp]] = {}
+_READ: dict[str, dict[str, Stamp]] = {}
 """Package to the files that its modules in `sys.modules` were made from."""
 
 

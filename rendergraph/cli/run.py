@@ -168,7 +168,7 @@ def _read(
     targets = [*named, *taps]
     if tap_all is not None:
         _make(tap_all)
-    _check(targets, expanded, files)
+    _check(targets, expanded, map(Path, files))
     return expanded, targets
 
 

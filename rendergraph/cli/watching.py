@@ -72,7 +72,7 @@ def _can_be_mended(error: RendergraphError, turn: Turn[Any]) -> bool:
     shipped = [folder(package) for package in _SHIPPED]
     own = [
         path
-        for path, found in turn.files.items()
+        for path, found in zip(map(Path, turn.files), turn.files.values(), strict=True)
         if found is not None and path.is_file() and not any(path.is_relative_to(place) for place in shipped)
     ]
     return isinstance(error, InputError) and bool(own)

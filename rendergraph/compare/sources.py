@@ -31,7 +31,7 @@ def sources_digest(expanded: Expanded) -> str:
     own package; of the scene every file that was read. The framework's own code is told by its version.
     """
     found = hashlib.sha256()
-    files = (file_digest(path) for path in sorted(expanded.linked.scene.files))
+    files = (file_digest(path) for path in sorted(map(Path, expanded.linked.scene.files)))
     for text in (*_shader_texts(expanded), *_code(expanded.linked.graph), *files):
         found.update(hashlib.sha256(text.encode()).digest())
     return found.hexdigest()

@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Callable, Hashable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -251,7 +250,7 @@ class GpuScene(Struct, eq=False, dict=True):
         """What the picture around the scene is decoded from: equal ones give the same texels, also of two scenes."""
         assert self.scene.environment is not None  # as above
         image = self.scene.environment.image
-        return image, None if isinstance(image, MadeImage) else self.scene.files.get(Path(os.path.abspath(image.path)))
+        return image, None if isinstance(image, MadeImage) else self.scene.files.get(os.path.abspath(image.path))
 
     def _upload(self, pixels: npt.NDArray[Any], *, srgb: bool) -> GpuTexture:
         height, width = pixels.shape[:2]

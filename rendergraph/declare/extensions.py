@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -15,7 +15,7 @@ from rendergraph.declare.blame import raised_at, told
 from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.glsl import about
-from rendergraph.stamps import Stamp, again, looking
+from rendergraph.stamps import Stamps, again, looking
 from rendergraph.textures import SEMANTICS, Semantic
 
 T = TypeVar("T")
@@ -87,7 +87,7 @@ class Extensions:
         return found
 
     @cached_property
-    def _found(self) -> tuple[tuple[Source, ...], Mapping[Path, Stamp]]:
+    def _found(self) -> tuple[tuple[Source, ...], Stamps]:
         with looking() as stamps:
             return tuple(self._find()), stamps
 

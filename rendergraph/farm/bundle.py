@@ -70,7 +70,7 @@ class Bundle:
         return {VARIABLE: os.pathsep.join(str(_moved(Path(part), root)) for part in parts)}
 
 
-def bundled(looked_at: Iterable[Path], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
+def bundled(looked_at: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
     """The bundle of work.
 
     Args:
@@ -84,7 +84,7 @@ def bundled(looked_at: Iterable[Path], plugins: Sequence[Path], modules: Iterabl
     shipped = [folder(name).resolve() for name in SHIPPED]
     found: set[Path] = set()
     folders: set[str] = set()
-    for path in looked_at:
+    for path in map(Path, looked_at):
         if any(path.resolve().is_relative_to(own) for own in shipped):
             continue
         if path.is_dir():

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from functools import cache
 from itertools import pairwise
 from math import prod
 from pathlib import Path
@@ -42,8 +43,8 @@ def check_expansion(source: SourceText, trusted: Iterable[Path] = ()) -> None:
         InputError: they may make more than `MOST_WORDS`, or stand more than `MOST_NESTED` deep (RG409).
     """
     folders = tuple(trusted)
-    files = {origin.file for origin in source.origins} - {None}
-    if all(any(file.is_relative_to(folder) for folder in folders) for file in files if file is not None):
+    files = {block.origin.file for block in source.blocks} - {None}
+    if all(_is_in(file, folders) for file in files if file is not None):
         return
     definitions, runs = _parts(source)
     macros = _Macros(definitions, [words for words, _ in runs])
@@ -57,6 +58,11 @@ def check_expansion(source: SourceText, trusted: Iterable[Path] = ()) -> None:
                 raise _error(source, at, f"macros may make more than {MOST_WORDS:,} words of this line")
             if around + growth.depth > MOST_NESTED:
                 raise _error(source, at, f"more than {MOST_NESTED} macros stand inside each other in this line")
+
+
+@cache
+def _is_in(file: Path, folders: tuple[Path, ...]) -> bool:
+    return any(file.is_relative_to(folder) for folder in folders)
 
 
 def _error(source: SourceText, at: int, text: str) -> InputError:

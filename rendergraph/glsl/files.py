@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 import os
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeAlias
+from typing import Literal
 
 from msgspec import Struct
 
@@ -17,11 +18,9 @@ from rendergraph.stamps import Stamp, look, stamp
 MAX_BYTES = 1_000_000
 """Bytes of one stage's text after includes."""
 
-_INCLUDE = re.compile(r"\s*#\s*include\b(.*)\Z", re.DOTALL)
-_OPENS = re.compile(r"\s*#\s*if(?:n?def)?\b")
-_CLOSES = re.compile(r"\s*#\s*endif\b")
-_FORBIDDEN = re.compile(r"\s*#\s*(version|line)\b")
-_NEEDS = re.compile(r"\s*#\s*pragma\s+needs\b\s*(.*)\Z")
+_DIRECTIVE = re.compile(r"\s*#\s*(\w+)(.*)\Z", re.DOTALL)
+_NESTS = {"if": 1, "ifdef": 1, "ifndef": 1, "endif": -1}
+_NEEDS = re.compile(r"\s+needs\b\s*(.*)\Z")
 _VERSION = re.compile(r"\s*#\s*version\s+(?:3[3-9]0|4[0-6]0)(?:\s+(?:core|compatibility))?\s*\Z")
 _COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?(?:\*/|(?P<open>\Z))", re.DOTALL)
 
@@ -33,48 +32,61 @@ def strip_comments(text: str) -> str:
     """
 
     def blanks(match: re.Match[str]) -> str:
-        return match.group() if match["open"] is not None else re.sub(r"[^\n]", " ", match.group())
+        found = match.group()
+        if match["open"] is not None:
+            return found
+        return "\n".join(" " * len(line) for line in found.split("\n")) if "\n" in found else " " * len(found)
 
     return _COMMENT.sub(blanks, text)
 
 
-class Directive(Struct, frozen=True):
-    """A line with a `#`, the parts of it that matter here.
+class Directive(Struct, frozen=True, gc=False):
+    """A line that is more than text for the driver.
 
     Attributes:
         number, text: the line.
-        forbidden: `version` or `line`, which are written by rendergraph.
-        is_version: it is a `#version` that a file may begin with.
-        needs: what stands in a `#pragma needs`, said to rendergraph and not to the driver; None elsewhere.
-        included: what it includes, as it is written; None where it includes nothing.
-        nests: 1 where it opens an `#if`, -1 where it closes one.
+        word: what it is; `needs` is `#pragma needs`, which says something to rendergraph and nothing to the driver.
+        rest: what stands behind that, as it is written.
     """
 
     number: int
     text: str
-    forbidden: str | None
-    is_version: bool
-    needs: str | None
-    included: str | None
-    nests: int
+    word: Literal["include", "needs", "version", "line"]
+    rest: str
+
+    @property
+    def is_version(self) -> bool:
+        """Whether it is a `#version` that a file may begin with."""
+        return _VERSION.match(self.text) is not None
 
     @classmethod
-    def of(cls, number: int, text: str) -> Directive:
-        """What a line says."""
-        forbidden, needs, include = _FORBIDDEN.match(text), _NEEDS.match(text), _INCLUDE.match(text)
-        return cls(
-            number,
-            text,
-            forbidden[1] if forbidden else None,
-            _VERSION.match(text) is not None,
-            needs[1] if needs else None,
-            include[1].strip() if include else None,
-            bool(_OPENS.match(text)) - bool(_CLOSES.match(text)),
-        )
+    def of(cls, number: int, text: str, word: str, rest: str) -> Directive | None:
+        """What a line with a `#`, a word and more says, None where that is the driver's affair."""
+        if word == "include":
+            return cls(number, text, "include", rest.strip())
+        if word == "version":
+            return cls(number, text, "version", rest)
+        if word == "line":
+            return cls(number, text, "line", rest)
+        needs = _NEEDS.match(rest) if word == "pragma" else None
+        return cls(number, text, "needs", needs[1]) if needs else None
 
 
-Runs: TypeAlias = "tuple[tuple[int, tuple[str, ...], Directive | None], ...]"
-"""Lines in runs without a `#`: the number of the first, the lines, and the line that ends them, None at the end."""
+class Run(Struct, frozen=True, gc=False):
+    """Lines for the driver, and the one behind them that is not.
+
+    Attributes:
+        first: the number of the first.
+        lines: they, and how many `bytes` they are.
+        nests: how many more `#if` they open than they close.
+        end: None at the end of the file.
+    """
+
+    first: int
+    lines: tuple[str, ...]
+    bytes: int
+    nests: int
+    end: Directive | None
 
 
 class Links:
@@ -82,6 +94,7 @@ class Links:
 
     def __init__(self) -> None:
         self._followed: dict[str, str] = {}
+        self._files: dict[tuple[Path, str, Path], Path | None] = {}
 
     def follow(self, path: str) -> str:
         """As `os.path.realpath` says it."""
@@ -95,6 +108,19 @@ class Links:
                 found = os.path.realpath(found) if os.path.islink(found) else found
             self._followed[path] = found
         return found
+
+    def of(self, path: Path) -> str:
+        """The same of a path that may begin in the current folder."""
+        return self.follow(str(path if path.is_absolute() else Path.cwd() / path))
+
+    def file(self, folder: Path, name: str, home: Path) -> Path | None:
+        """What a name in a folder stands for, whether it is there or not; None where that lies outside of `home`."""
+        key = folder, name, home
+        if key not in self._files:
+            target = folder / name
+            inside = os.path.join(self.of(home), "")
+            self._files[key] = target if os.path.join(self.of(target), "").startswith(inside) else None
+        return self._files[key]
 
 
 def read_text(file: Path) -> str:
@@ -127,7 +153,7 @@ def about(file: Path) -> str:
     return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
-def runs(file: Path) -> tuple[str, Runs]:
+def runs(file: Path) -> tuple[str, tuple[Run, ...]]:
     """A file's text, and its lines without comments and blanks at their ends.
 
     Raises:
@@ -138,11 +164,23 @@ def runs(file: Path) -> tuple[str, Runs]:
 
 
 @lru_cache(maxsize=256)
-def _runs(file: Path, stamp: Stamp) -> tuple[str, Runs]:
+def _runs(file: Path, stamp: Stamp) -> tuple[str, tuple[Run, ...]]:
     raw = read_text(file)
     lines = tuple(line.rstrip() for line in strip_comments(raw).split("\n"))
-    ends = [number for number, line in enumerate(lines) if "#" in line]
-    begins = [0, *(number + 1 for number in ends)]
-    directives = [Directive.of(number + 1, lines[number]) for number in ends]
-    found = zip(begins, [*ends, len(lines)], [*directives, None], strict=True)
-    return raw, tuple((begin + 1, lines[begin:end], directive) for begin, end, directive in found)
+    found: list[Run] = []
+    begin = nests = 0
+    for number, line in enumerate(lines):
+        directive = _DIRECTIVE.match(line) if "#" in line else None
+        if directive is not None:
+            nests += _NESTS.get(directive[1], 0)
+            end = Directive.of(number + 1, line, directive[1], directive[2])
+            if end is not None:
+                found.append(Run(begin + 1, lines[begin:number], size(lines[begin:number]), nests, end))
+                begin, nests = number + 1, 0
+    found.append(Run(begin + 1, lines[begin:], size(lines[begin:]), nests, None))
+    return raw, tuple(found)
+
+
+def size(lines: Sequence[str]) -> int:
+    """How large lines are, their ends included."""
+    return sum(map(len, lines)) + len(lines)

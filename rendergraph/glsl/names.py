@@ -45,6 +45,7 @@ _MEMBERS = re.compile(
     r"\bstruct\s+\w+\s*\{([^{}]*)\}|\b(?:uniform|buffer|in|out)\s+\w+\s*\{([^{}]*)\}\s*[A-Za-z_]\w*\s*(?:\[[^\]]*\])?\s*;"
 )
 _DEFINE = re.compile(r"^\s*#\s*define\s+([A-Za-z_]\w*)", re.MULTILINE)
+_OPENS = re.compile(r"\s*\(")
 _CLOSES = {"(": ")", "[": "]", "{": "}"}
 
 
@@ -85,9 +86,10 @@ def declared(text: str) -> set[str]:
 @lru_cache(maxsize=1024)
 def calls(text: str, function: str) -> bool:
     """Whether a text without comments calls a function it does not declare itself."""
-    ends = [at + len(function) for at in _places(text, function) if text[at - 1 : at] != "."]
-    if not any(text[end:].lstrip().startswith("(") for end in ends):
-        return False
+    places = [at for at in _places(text, function) if text[at - 1 : at] != "."]
+    places = [at for at in places if _OPENS.match(text, at + len(function))]
+    if not any(_may_be_type(_before(text, at)) for at in places):
+        return bool(places)
     return all(function_of(head(one).rest) != function for one, _ in statements(tokens(without_directives(text))))
 
 
@@ -104,6 +106,21 @@ def _places(text: str, name: str) -> Iterator[int]:
         if not any(letter == "_" or letter.isalnum() for letter in around):
             yield at
         at = text.find(name, at + 1)
+
+
+def _before(text: str, at: int) -> str:
+    """The word or the sign before a place."""
+    while at and text[at - 1].isspace():
+        at -= 1
+    begin = at
+    while begin and (text[begin - 1] == "_" or text[begin - 1].isalnum()):
+        begin -= 1
+    return text[begin:at] or text[at - 1 : at]
+
+
+def _may_be_type(before: str) -> bool:
+    """Whether what stands before a function's name may be the type of its declaration, as in `float[2] f()`."""
+    return before not in ("return", "else") and (before[-1:] in ("_", "]") or before[-1:].isalnum())
 
 
 def renamed(text: str, rename: Callable[[str], str]) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import accumulate
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from itertools import accumulate, chain, repeat
 from pathlib import Path
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.glsl.files import MAX_BYTES, Links, runs
+from rendergraph.glsl.files import MAX_BYTES, Links, Run, runs
 from rendergraph.stamps import look
 
 MAX_DEPTH = 32
@@ -47,30 +48,63 @@ class Origin(Struct, frozen=True):
         return Place(shown_file(self.file), self.line, max(1, column - self.column))
 
 
-class SourceText(Struct, frozen=True):
-    """Lines of GLSL, comments blanked out, with an origin each."""
+class Block(Struct, frozen=True, gc=False):
+    """Lines that stand one after the other in a file, or in none.
 
-    lines: tuple[str, ...] = ()
-    origins: tuple[Origin, ...] = ()
+    Attributes:
+        lines: they, comments blanked out.
+        origin: of the first.
+    """
+
+    lines: tuple[str, ...]
+    origin: Origin
 
     @property
+    def origins(self) -> Iterator[Origin]:
+        """Of each line."""
+        first = self.origin
+        if first.file is None:
+            return repeat(first, len(self.lines))
+        return (replace(first, line=first.line + number) for number in range(len(self.lines)))
+
+
+class SourceText(Struct, frozen=True, dict=True):
+    """GLSL of which every line knows where it comes from; only what goes wrong asks."""
+
+    blocks: tuple[Block, ...] = ()
+
+    @classmethod
+    def of(cls, rows: Iterable[tuple[str, Origin]]) -> SourceText:
+        """Lines with an origin each."""
+        return cls(tuple(Block((line,), origin) for line, origin in rows))
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """All of them."""
+        return tuple(chain.from_iterable(block.lines for block in self.blocks))
+
+    @property
+    def origins(self) -> tuple[Origin, ...]:
+        """As many as there are lines."""
+        return tuple(chain.from_iterable(block.origins for block in self.blocks))
+
+    @cached_property
     def text(self) -> str:
         """The lines as one string."""
-        return "".join(line + "\n" for line in self.lines)
+        return "".join(["\n".join([*block.lines, ""]) for block in self.blocks])
 
     @property
     def bytes(self) -> int:
         """Size of the text."""
-        return sum(len(line) + 1 for line in self.lines)
+        return len(self.text)
 
     def __add__(self, other: SourceText) -> SourceText:
-        return SourceText(self.lines + other.lines, self.origins + other.origins)
+        return SourceText(self.blocks + other.blocks)
 
 
 def generated(lines: Iterable[str], made: str = "") -> SourceText:
     """Lines that stand in no file; `made` is what they are there for."""
-    rows = tuple(lines)
-    return SourceText(rows, (Origin(made=made),) * len(rows))
+    return SourceText((Block(tuple(lines), Origin(made=made)),))
 
 
 _PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")
@@ -98,6 +132,12 @@ class Includes:
         """Those of another stage, which follow the same links."""
         return Includes(self.include_folder, self._links)
 
+    def copy(self) -> Includes:
+        """Those of the same stage, for a text that may not be kept."""
+        other = self.fresh()
+        other.bytes, other._certain, other._guards = self.bytes, set(self._certain), dict(self._guards)
+        return other
+
     def expand(
         self,
         source: Path,
@@ -122,78 +162,59 @@ class Includes:
         Raises:
             InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
         """
-        root = Path(self._follow(root or source.parent))
-        lines: list[str] = []
-        origins: list[Origin] = []
-        self._certain.add((self._follow(source), prefix))
+        root = Path(self._links.of(root or source.parent))
+        blocks: list[Block] = []
+        self._certain.add((self._links.of(source), prefix))
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._inherited = inherited
-        self._file(source, root, Origin(prefix=prefix), [], lines, origins, [0])
-        return SourceText(tuple(lines), tuple(origins))
+        self._file(source, root, Origin(prefix=prefix), [], blocks, [0])
+        return SourceText(tuple(blocks))
 
     def _file(
-        self,
-        file: Path,
-        root: Path,
-        base: Origin,
-        stack: list[str],
-        lines: list[str],
-        origins: list[Origin],
-        depth: list[int],
+        self, file: Path, root: Path, base: Origin, stack: list[str], blocks: list[Block], depth: list[int]
     ) -> None:
         raw, found = runs(file)
-        stack = [*stack, self._follow(file)]
-        for first, run, line in found:
-            self._take(run, first, replace(base, file=file), raw, lines, origins)
+        stack = [*stack, self._links.of(file)]
+        for run in found:
+            line = run.end
+            self._take(run, replace(base, file=file, line=run.first), raw, blocks)
+            depth[0] += run.nests
             if line is None:
                 return
             origin = replace(base, file=file, line=line.number)
-            if line.needs is not None or (line.is_version and self._versions and len(stack) == 1):
-                lines.append("")
-                origins.append(origin)
+            if line.word == "needs" or (line.is_version and self._versions and len(stack) == 1):
+                blocks.append(Block(("",), origin))
                 continue
-            if line.forbidden is not None:
-                text = f"'#{line.forbidden}' is written by rendergraph; take the line out"
+            if line.word != "include":
+                text = f"'#{line.word}' is written by rendergraph; take the line out"
                 raise _error("RG404", text, origin, raw)
-            if line.included is None:
-                depth[0] += line.nests
-                self._take((line.text,), line.number, origin, raw, lines, origins)
-                continue
-            written = line.included
-            parameter = _PARAMETER.match(written)
+            parameter = _PARAMETER.match(line.rest)
             if parameter is not None and parameter[1] not in self._plugged:
-                lines.append("")
-                origins.append(origin)
+                blocks.append(Block(("",), origin))
                 continue
             if parameter is not None:
                 target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
             else:
-                target, shared, home = self._find(written, file, root, origin, raw, base.shared)
-            if self._follow(target) in stack:
+                target, shared, home = self._find(line.rest, file, root, origin, raw, base.shared)
+            if self._links.of(target) in stack:
                 chain = " includes ".join(os.path.basename(path) for path in [*stack, str(target)])
                 raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
             if len(stack) > MAX_DEPTH:
                 raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)
-            self._include(target, home, inner, stack, lines, origins, depth)
+            self._include(target, home, inner, stack, blocks, depth)
 
-    def _take(
-        self, run: Sequence[str], first: int, base: Origin, raw: str, lines: list[str], origins: list[Origin]
-    ) -> None:
-        """Lines of a file as they stand there, the first of them by its number."""
-        sizes = [len(line) + 1 for line in run]
-        if self.bytes + sum(sizes) > MAX_BYTES:
-            beyond = sum(self.bytes + size <= MAX_BYTES for size in accumulate(sizes))
+    def _take(self, run: Run, first: Origin, raw: str, blocks: list[Block]) -> None:
+        """Lines of a file as they stand there."""
+        if self.bytes + run.bytes > MAX_BYTES:
+            sizes = accumulate(len(line) + 1 for line in run.lines)
+            beyond = sum(self.bytes + size <= MAX_BYTES for size in sizes)
             text = f"the shader with its includes is larger than {MAX_BYTES:,} bytes"
-            raise _error("RG403", text, replace(base, line=first + beyond), raw)
-        self.bytes += sum(sizes)
-        file, column, shared, prefix, by = base.file, base.column, base.shared, base.prefix, base.by
-        origins += [Origin(file, number, column, shared, prefix, by) for number in range(first, first + len(run))]
-        lines += run
-
-    def _follow(self, path: Path) -> str:
-        return self._links.follow(str(path if path.is_absolute() else Path.cwd() / path))
+            raise _error("RG403", text, replace(first, line=first.line + beyond), raw)
+        self.bytes += run.bytes
+        if run.lines:
+            blocks.append(Block(run.lines, first))
 
     def _include(
         self,
@@ -201,11 +222,10 @@ class Includes:
         root: Path,
         base: Origin,
         stack: list[str],
-        lines: list[str],
-        origins: list[Origin],
+        blocks: list[Block],
         depth: list[int],
     ) -> None:
-        key = (self._follow(file), base.prefix)
+        key = (self._links.of(file), base.prefix)
         if key in self._certain:
             return
         certain = depth[0] <= 0
@@ -215,16 +235,13 @@ class Includes:
         if guard is None and not certain:
             guard = self._guards[key] = f"INCLUDED_{len(self._guards)}"
         if guard is None:
-            self._file(file, root, base, stack, lines, origins, depth)
+            self._file(file, root, base, stack, blocks, depth)
             return
-        for text in (f"#ifndef {guard}", f"#define {guard}"):
-            lines.append(text)
-            origins.append(Origin(shared=True))
+        blocks.append(Block((f"#ifndef {guard}", f"#define {guard}"), Origin(shared=True)))
         depth[0] += 1
-        self._file(file, root, base, stack, lines, origins, depth)
+        self._file(file, root, base, stack, blocks, depth)
         depth[0] -= 1
-        lines.append("#endif")
-        origins.append(Origin(shared=True))
+        blocks.append(Block(("#endif",), Origin(shared=True)))
 
     def _find(
         self, written: str, file: Path, root: Path, origin: Origin, raw: str, in_shared: bool
@@ -241,9 +258,9 @@ class Includes:
         if beside and not in_shared:
             places += [(home, home) for home in self._inherited]
         for folder, home in places:
-            target, inside = folder / name, self._follow(home)
-            if not os.path.join(self._follow(target), "").startswith(os.path.join(inside, "")):
-                text = f"'{name}' lies outside '{shown_file(inside)}', where this shader's includes are"
+            target = self._links.file(folder, name, home)
+            if target is None:
+                text = f"'{name}' lies outside '{shown_file(self._links.of(home))}', where this shader's includes are"
                 raise _error("RG406", text, origin, raw)
             look(target)
             if target.is_file():
@@ -280,9 +297,9 @@ def needs(file: Path) -> tuple[str, ...]:
     """
     raw, found = runs(file)
     words: list[str] = []
-    for _, _, line in found:
-        if line is not None and line.needs is not None:
-            listed = re.fullmatch(r"\(\s*(\w+(?:\s*,\s*\w+)*)\s*\)", line.needs)
+    for line in (run.end for run in found):
+        if line is not None and line.word == "needs":
+            listed = re.fullmatch(r"\(\s*(\w+(?:\s*,\s*\w+)*)\s*\)", line.rest)
             if listed is None:
                 text = f"'{line.text.strip()[:60]}' is not '#pragma needs(word)' or '#pragma needs(word, word)'"
                 raise _error("RG405", text, Origin(file, line.number), raw)
@@ -293,7 +310,7 @@ def needs(file: Path) -> tuple[str, ...]:
 def needs_place(file: Path) -> tuple[Place, str]:
     """Where an include says what it needs, and that line."""
     raw, found = runs(file)
-    number = next((line.number for _, _, line in found if line is not None and line.needs is not None), 1)
+    number = next((run.end.number for run in found if run.end is not None and run.end.word == "needs"), 1)
     return Place(shown_file(file), number, 1), raw.split("\n")[number - 1]
 
 

@@ -69,7 +69,7 @@ def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resourc
             origins[number] = replace(origins[number], column=len(before) - len(match["layout"] or ""))
     if problems:
         raise InputError(problems)
-    return SourceText(tuple(lines), tuple(origins))
+    return SourceText.of(zip(lines, origins, strict=True))
 
 
 def _images(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, tuple[Read | Write, TextureDesc]]]:

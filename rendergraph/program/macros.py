@@ -59,5 +59,6 @@ def looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
 
 def written(macros: Mapping[str, str]) -> SourceText:
     """Macros as program text."""
-    lines = tuple(f"#define {key} {value}".rstrip() for key, value in macros.items())
-    return SourceText(lines, tuple(Origin(made=f"the macro {key}") for key in macros))
+    return SourceText.of(
+        (f"#define {key} {value}".rstrip(), Origin(made=f"the macro {key}")) for key, value in macros.items()
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
-from pathlib import Path
 from typing import Generic, TypeVar
 
 from msgspec.structs import replace
@@ -11,7 +10,7 @@ from msgspec.structs import replace
 from rendergraph import stamps
 from rendergraph.catalog import NodeType
 from rendergraph.expand import ViewTable
-from rendergraph.stamps import Stamp
+from rendergraph.stamps import Stamps
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
@@ -24,7 +23,7 @@ class Remembered(Generic[T]):
 
     def __init__(self, most: int = _MOST) -> None:
         self._most = most
-        self._known: dict[Hashable, tuple[T, Mapping[Path, Stamp]]] = {}
+        self._known: dict[Hashable, tuple[T, Stamps]] = {}
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """The answer; what raises is asked again next time."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 
 from msgspec import Struct, field
@@ -15,7 +16,7 @@ from rendergraph.errors import InputError, Problem, node_named
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
-from rendergraph.glsl.source import Includes, Origin, SourceText, generated
+from rendergraph.glsl.source import Block, Includes, Origin, SourceText, generated
 from rendergraph.program.images import with_formats
 from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
 from rendergraph.program.remembered import Remembered, text_key
@@ -25,8 +26,6 @@ from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDe
 
 VERSION = "#version 450 core"
 _EXTENSION = re.compile(r"\s*#\s*extension\b")
-_CALLED: Remembered[str] = Remembered()
-"""Files with all that they include, as they are read to see what they call."""
 _TEXTS: Remembered[dict[str, StageText]] = Remembered(256)
 """The texts of steps, some 100 KiB each."""
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
@@ -162,26 +161,26 @@ def _stage(
 ) -> StageText:
     include_folder = includes.include_folder
     view = includes.expand(include_folder / "view.glsl")
-    view = SourceText(view.lines, tuple(replace(origin, shared=True) for origin in view.origins))
+    view = SourceText(tuple(Block(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
     node = types[step.node]
     file, root = node.shader_file(name, include_folder)
-    # What the file calls decides which functions stand before it, so it is read once with includes of its own.
+    # What the file calls decides which functions stand before it, so it is read as if there were none.
     versions = node.is_shader and not name.startswith("<")
 
     def expanded(by: Includes) -> SourceText:
         plugged = dict(step.includes)
         return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
 
-    key = file, include_folder, root, step.includes, versions, node.inherited
-    called = _CALLED.get(key, lambda: expanded(includes.fresh()).text) if wanted else ""
+    source = expanded(includes.copy())
     functions = SourceText()
     for signature in wanted.values():
-        if calls(called, signature.name):
+        if calls(source.text, signature.name):
             functions += _functions(stage, signature, step, types, resources, views, includes)
-        if mentions(called, f"{signature.name.upper()}_LIGHT_COUNT"):
+        if mentions(source.text, f"{signature.name.upper()}_LIGHT_COUNT"):
             table = _light_table(signature, step, node, resources)
             functions += generated(table, f"the lights of {signature.name}()")
-    source = expanded(includes)
+    if functions.blocks:  # which may include what it includes
+        source = expanded(includes)
     if stage == "compute":
         source = with_formats(source, step, resources)
     extensions, source = _hoisted(source)
@@ -198,8 +197,8 @@ def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
     found = [line.strip() for line, yes in zip(source.lines, is_extension, strict=True) if yes]
     if not found:
         return [], source
-    lines = tuple("" if yes else line for line, yes in zip(source.lines, is_extension, strict=True))
-    return found, SourceText(lines, source.origins)
+    lines = ("" if yes else line for line, yes in zip(source.lines, is_extension, strict=True))
+    return found, SourceText.of(zip(lines, source.origins, strict=True))
 
 
 def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str) -> SourceText:
@@ -332,7 +331,7 @@ def provider_text(
     file, root = node.shader_file(binding.shader)
     plugged = dict(binding.includes)
     source = includes.expand(file, root=root, prefix=before, plugged=plugged, inherited=node.inherited)
-    own = SourceText(*_rows((line, origin) for line, origin in _pairs(source) if not origin.shared))
+    own = SourceText(tuple(block for block in source.blocks if not block.origin.shared))
     names = declared(own.text)
     if binding.signature not in names:
         signature = _declared_signatures(node)[binding.signature]
@@ -354,21 +353,12 @@ def provider_text(
     def rename(word: str) -> str:
         return before + word if word in names else word
 
-    lines = renamed(own.text, rename).split("\n")
-    own_lines = iter(lines)
-    rows = [
-        (line if origin.shared else next(own_lines), origin if origin.shared else replace(origin, column=0))
-        for line, origin in _pairs(source)
-    ]
-    final = SourceText(*_rows(rows))
+    lines = iter(renamed(own.text, rename).split("\n"))
+    final = SourceText(
+        tuple(
+            block if block.origin.shared else Block(tuple(islice(lines, len(block.lines))), block.origin)
+            for block in source.blocks
+        )
+    )
     head = written({before + key: renamed(value, rename) for key, value in macros.items()})
     return head + _read_declarations(binding.reads, resources, before, final.text) + final
-
-
-def _pairs(source: SourceText) -> Iterator[tuple[str, Origin]]:
-    return zip(source.lines, source.origins, strict=True)
-
-
-def _rows(pairs: Iterable[tuple[str, Origin]]) -> tuple[tuple[str, ...], tuple[Origin, ...]]:
-    rows = tuple(pairs)
-    return tuple(line for line, _ in rows), tuple(origin for _, origin in rows)

@@ -18,7 +18,7 @@ from msgspec import Struct, field
 from rendergraph.declare import Added
 from rendergraph.declare.extension import ImageLoader
 from rendergraph.scene.edges import Edges, find_edges, is_solid
-from rendergraph.stamps import Stamp
+from rendergraph.stamps import Stamps
 
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
@@ -338,7 +338,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
     warnings: tuple[Any, ...] = ()
     recipe: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict)
     placements: Mapping[str, Placement] = field(default_factory=dict)
-    files: Mapping[Path, Stamp] = field(default_factory=dict)
+    files: Stamps = field(default_factory=dict)
 
     @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
-from pathlib import Path
+from collections.abc import Callable, Hashable
 from typing import Any
 
 from msgspec import Struct, field
@@ -14,7 +13,7 @@ from rendergraph.declare import Node
 from rendergraph.expand import Expansion
 from rendergraph.gl.programs import Program
 from rendergraph.session.values import Expanded
-from rendergraph.stamps import Stamp, again, changed
+from rendergraph.stamps import Stamps, again, changed
 
 MOST = 4
 """Compiled pipelines that are kept."""
@@ -25,7 +24,7 @@ MOST_BYTES = 1 << 30
 
 class _Entry(Struct, eq=False):
     executable: Executable
-    files: Mapping[Path, Stamp]
+    files: Stamps
 
     @property
     def bytes(self) -> int:
@@ -66,7 +65,7 @@ class ExecutableCache(Struct, eq=False):
         ):
             self._entries.pop(next(iter(self._entries))).executable.release()
 
-    def add(self, key: Hashable, executable: Executable, files: Mapping[Path, Stamp]) -> None:
+    def add(self, key: Hashable, executable: Executable, files: Stamps) -> None:
         """Keep one that has just been compiled from these files."""
         self._entries[key] = _Entry(executable, files)
 

@@ -15,7 +15,7 @@ from typing import Generic, TypeVar
 
 from rendergraph.errors import RendergraphError
 from rendergraph.session.gpu import Gpu
-from rendergraph.stamps import Stamp, changed, looking, stamp
+from rendergraph.stamps import Stamps, changed, looking, stamp
 
 T = TypeVar("T")
 
@@ -45,7 +45,7 @@ class Turn(Generic[T]):
     changed: tuple[Path, ...]
     ms: float
     made: Mapping[str, int]
-    files: Mapping[Path, Stamp]
+    files: Stamps
 
 
 def turns(draw: Callable[[Gpu], T], gpu: Gpu) -> Iterator[Turn[T]]:
@@ -72,7 +72,7 @@ def turns(draw: Callable[[Gpu], T], gpu: Gpu) -> Iterator[Turn[T]]:
         seen = tuple(wait(files))
 
 
-def wait(files: Mapping[Path, Stamp]) -> list[Path]:
+def wait(files: Stamps) -> list[Path]:
     """Block until some file is no longer as it was and has come to rest; which ones.
 
     A file that has vanished is given a moment to come back: many editors write by renaming.

@@ -33,7 +33,7 @@ from rendergraph.session.gpu import Gpu
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned
 from rendergraph.session.wanted import every_port
-from rendergraph.stamps import Stamp
+from rendergraph.stamps import Stamps
 from rendergraph.viewer.describe import described
 from rendergraph.viewer.questions import Against, Answer, Ask, Changed, Pixel, Question, Thumbnails, Variant
 
@@ -67,7 +67,7 @@ class Painter:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._files: Mapping[Path, Stamp] = {}
+        self._files: Stamps = {}
         self._linked: dict[Selection, Linked] = {}
         self._expanded: dict[tuple[Selection, str], Expanded] = {}
         self._planned: Planned | None = None

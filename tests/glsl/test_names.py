@@ -69,6 +69,11 @@ def test_calls() -> None:
     assert not calls("void main() { my_shadow(0); a.shadow(); }", "shadow")
     assert calls("float my_shadow; void main() { a.shadow(); shadow\n    (0); }", "shadow")
     assert not calls("uniform float shadow; void main() { float x = shadow; }", "shadow")
+    assert calls(
+        "float f() { return shadow(0); } float g() { if (a) b(); else shadow(0); return a[0]+shadow(1); }", "shadow"
+    )
+    assert not calls("float[2] shadow(int i); void main() { float x[2] = shadow(0); }", "shadow")
+    assert not calls("void main() { x = shadow(0); } vec4_type_\n\tshadow (int i) { return a; }", "shadow")
 
 
 def test_mentions_whole_words() -> None:

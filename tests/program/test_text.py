@@ -285,7 +285,7 @@ def test_messages_inside_a_function_lose_the_prefix(folder: Path) -> None:
 
 
 def test_messages_about_generated_lines_say_so() -> None:
-    text = StageText("fragment", SourceText(("#define X 1 2", "int a;"), (Origin(), Origin(Path("a.frag"), 1))))
+    text = StageText("fragment", SourceText.of([("#define X 1 2", Origin()), ("int a;", Origin(Path("a.frag"), 1))]))
     (found,) = compile_problems("0:1(1): error: odd", text)
     assert "in generated text: #define X 1 2" in found.text
     assert found.place is not None
