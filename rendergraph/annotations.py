@@ -12,6 +12,7 @@ import types
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache, partial, reduce
+from inspect import get_annotations
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -266,10 +267,21 @@ def mistakes_of(thing: DataclassInstance | Struct, who: str, subject: str = "") 
 @cache
 def _given(kind: Any) -> tuple[tuple[str, Any, Any, Callable[[Any], bool]], ...]:
     """Names, defaults, annotations and their tests of the fields that its constructor takes."""
-    hints = hints_of(kind)
-    of_struct = issubclass(kind, Struct)
-    taken = msgspec.structs.fields(kind) if of_struct else [entry for entry in fields(kind) if entry.init]
-    return tuple((each.name, each.default, hints[each.name], test_of(hints[each.name])) for each in taken)
+    hints: dict[str, Any] = {}
+    for base in reversed(kind.__mro__):
+        hints |= _annotations_of(base)
+    if issubclass(kind, Struct):
+        names, defaults = kind.__struct_fields__, kind.__struct_defaults__
+        taken = [*zip(names, (*(len(names) - len(defaults)) * [msgspec.NODEFAULT], *defaults), strict=True)]
+    else:
+        taken = [(entry.name, entry.default) for entry in fields(kind) if entry.init]
+    return tuple((name, default, hints[name], test_of(hints[name])) for name, default in taken)
+
+
+@cache
+def _annotations_of(kind: type) -> dict[str, Any]:
+    """Of a class alone, which `typing` works out again for each class that inherits them."""
+    return get_annotations(kind, eval_str=True)
 
 
 def right(thing: T, who: str = "") -> T:

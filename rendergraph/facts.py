@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
-import msgspec
-from msgspec import Struct
+from msgspec import Struct, field
 
 from rendergraph.errors import SceneError, suggestion
 from rendergraph.textures import EnvironmentMap, Semantic, TextureDesc
@@ -83,9 +81,10 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) ->
     return tuple(sorted(found))
 
 
-@dataclass(frozen=True)
-class ObjectFacts:
+class ObjectFacts(Struct, frozen=True, eq=False):
     """What is known of an object before the schedule: where it stands is not.
+
+    Two are equal if all is but their meshes, so that what was worked out for one holds for the other.
 
     Attributes:
         name: unique in the scene.
@@ -110,10 +109,21 @@ class ObjectFacts:
     grain: bool = False
     emissive: bool = False
     reflective: bool = False
-    mesh: str = field(default="", compare=False)
-    _gap: Callable[[], str] = field(default=str, compare=False, repr=False)
-    _plane: Callable[[], object] = field(default=lambda: None, compare=False, repr=False)
-    _convex: Callable[[], bool] = field(default=bool, compare=False, repr=False)
+    mesh: str = ""
+    _gap: Callable[[], str] = str
+    _plane: Callable[[], object] = lambda: None
+    _convex: Callable[[], bool] = bool
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ObjectFacts) and self._compared == other._compared
+
+    def __hash__(self) -> int:
+        return hash(self._compared)
+
+    @property
+    def _compared(self) -> tuple[object, ...]:
+        flags = (self.casts_shadow, self.blended, self.double_sided, self.hidden)
+        return self.name, self.triangles, self.vertices, flags, self.grain, self.emissive, self.reflective
 
     @property
     def closed(self) -> bool:
@@ -181,7 +191,7 @@ class Facts(Struct, frozen=True):
 
     viewport: tuple[int, int]
     lights: tuple[LightFacts, ...] = ()
-    inputs: Mapping[str, tuple[TextureInfo, ...]] = msgspec.field(default_factory=dict)
+    inputs: Mapping[str, tuple[TextureInfo, ...]] = field(default_factory=dict)
     objects: tuple[ObjectFacts, ...] = ()
     environment: TextureDesc | None = None
 

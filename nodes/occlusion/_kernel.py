@@ -23,9 +23,10 @@ def spread_points(count: int) -> npt.NDArray[np.float64]:
     around = number * math.pi * (3 - math.sqrt(5))
     points = np.stack([np.sqrt(1 - up**2) * np.cos(around), np.sqrt(1 - up**2) * np.sin(around), up], axis=1)
     for _ in range(ROUNDS):
-        apart = points[:, None] - points[None]
-        distance = np.linalg.norm(apart, axis=-1) + np.eye(count)
-        points = points + 6 / count**1.5 * (apart / distance[..., None] ** 3).sum(axis=1)
-        points /= np.linalg.norm(points, axis=1, keepdims=True)
+        squared = 2 - 2 * points @ points.T  # of distances; on a sphere they are what the cosines leave
+        np.fill_diagonal(squared, np.inf)
+        pushed = squared**-1.5
+        points = points + 6 / count**1.5 * (points * pushed.sum(axis=1, keepdims=True) - pushed @ points)
+        points /= np.sqrt((points * points).sum(axis=1, keepdims=True))
     points.setflags(write=False)
     return points

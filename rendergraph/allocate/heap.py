@@ -7,7 +7,6 @@ weight, which is NP-hard; largest first is within 1 % of the optimum on most sma
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 
 from msgspec import Struct
@@ -39,15 +38,24 @@ def share_blocks(items: Sequence[Item], *, seed: int = 0) -> list[list[int]]:
     numbers = range(len(items))
     alive = [(1 << item.last + 1) - (1 << item.first) for item in items]  # a bit for each position
     best, least = _placed(items, alive, sorted(numbers, key=lambda n: (-items[n].bytes, items[n].first, n)))
-    bound, chooser = least_bytes(items), random.Random(seed)
+    bound = least_bytes(items)
+    if least == bound:
+        return _in_time(best, items)
+    import random  # only where the first order is not the best
+
+    chooser = random.Random(seed)
     for _ in range(min(RESTARTS, WORK // max(1, len(items)) ** 2)):
-        if least == bound:
-            break
         weights = [item.bytes * chooser.uniform(0.5, 1.5) for item in items]
         other, taken = _placed(items, alive, sorted(numbers, key=lambda n: (-weights[n], n)))
         if taken < least:
             best, least = other, taken
-    return [sorted(block, key=lambda n: items[n].first) for block in best]
+        if least == bound:
+            break
+    return _in_time(best, items)
+
+
+def _in_time(blocks: Sequence[Sequence[int]], items: Sequence[Item]) -> list[list[int]]:
+    return [sorted(block, key=lambda n: items[n].first) for block in blocks]
 
 
 def least_bytes(items: Sequence[Item]) -> int:

@@ -6,7 +6,6 @@ import ast
 import linecache
 import re
 import sys
-import traceback
 from collections.abc import Iterator
 from inspect import get_annotations
 from pathlib import Path
@@ -125,6 +124,8 @@ def told(error: BaseException) -> str:
 
 def _called(error: BaseException) -> str:
     """`Input(): ` where a call ended with what does not name what was called itself."""
+    import traceback  # only where there is a mistake
+
     frames = traceback.extract_tb(error.__traceback__)
     line = linecache.getline(frames[-1].filename, frames[-1].lineno or 0) if frames else ""
     called = re.match(r"[\w.]+(?=\()", line[frames[-1].colno or 0 :]) if line else None

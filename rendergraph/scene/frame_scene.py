@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
@@ -15,7 +14,6 @@ from rendergraph.scene.pack import changed_objects
 Corners: TypeAlias = npt.NDArray[np.float64]
 
 
-@dataclass(eq=False)
 class FrameScene:
     """The scene of a frame, the same for as long as no object moves; see `steps.FrameScene`.
 
@@ -25,12 +23,8 @@ class FrameScene:
         placed: of the frame in which the objects came to where they are.
     """
 
-    scene: Scene
-    before: InitVar[FrameScene | None] = None
-    placed: Scene = field(init=False)
-
-    def __post_init__(self, before: FrameScene | None) -> None:
-        self.placed = self.scene
+    def __init__(self, scene: Scene, before: FrameScene | None = None) -> None:
+        self.scene = self.placed = scene
         if before is None or "_corners" not in vars(before) or before.placed.meshes is not self.scene.meshes:
             return
         moved = changed_objects(before.placed, self.scene)
