@@ -135,6 +135,7 @@ def main(args: Sequence[str] | None = None) -> int:
         The exit code of design.md §7.
     """
     if args is None:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's threads wait for matrices that nothing here has
         gc.set_threshold(10_000)  # what is made at the start stays: looking for cycles after each 700 took 20 ms of it
         watch()
         atexit.register(_leave)

@@ -152,7 +152,7 @@ def open_device(index: int | None = None) -> Device:
     Raises:
         DeviceError: no driver, no such device, OpenGL older than 4.5, or a process forked from one that has drawn.
     """
-    import glcontext  # type: ignore[import-untyped]  # ships no types
+    from glcontext import egl  # type: ignore[import-untyped]  # ships no types
 
     if first_process() != os.getpid():
         text = (
@@ -167,10 +167,12 @@ def open_device(index: int | None = None) -> Device:
     chosen = index if index is not None else int(named)
     try:
         with previous_context():
-            backend = glcontext.get_backend_by_name("egl")
-            # By their names, which every Linux has: to look for them takes two processes more.
-            names = {"libgl": "libGL.so.1", "libegl": "libEGL.so.1"}
-            context = backend(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
+            # By their names, which every Linux has: glcontext's own search starts two processes.
+            names = {
+                "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL", "libGL.so.1"),
+                "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL", "libEGL.so.1"),
+            }
+            context = egl.create_context(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
             ctx = moderngl.create_context(context=context)
             return wrap(ctx, context.load, owned=True)
     except DeviceError:

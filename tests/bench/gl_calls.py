@@ -78,14 +78,14 @@ class _Context:
 @contextmanager
 def counting() -> Iterator[Calls]:
     """Count the calls of all contexts opened inside."""
-    import glcontext  # type: ignore[import-untyped]
+    from glcontext import egl  # type: ignore[import-untyped]
 
-    calls, original = Calls(), glcontext.get_backend_by_name
-    glcontext.get_backend_by_name = lambda name: lambda **settings: _Context(original(name)(**settings), calls)
+    calls, original = Calls(), egl.create_context
+    egl.create_context = lambda **settings: _Context(original(**settings), calls)
     try:
         yield calls
     finally:
-        glcontext.get_backend_by_name = original
+        egl.create_context = original
 
 
 def made(counts: Counter[str]) -> int:

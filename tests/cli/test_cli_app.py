@@ -32,6 +32,19 @@ HEAVY = {
 }
 
 
+@pytest.mark.parametrize(("given", "found"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_a_command_starts_no_threads_for_matrices(given: dict[str, str], found: str) -> None:
+    code = (
+        "import os, sys; from rendergraph.cli import main; sys.argv[1:] = ['--version']; assert 'numpy' not in sys.modules\n"
+        "main(); import numpy\nprint(os.environ['OPENBLAS_NUM_THREADS'], len(os.listdir('/proc/self/task')))"
+    )
+    kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=kept | given)
+    threads, started = done.stdout.splitlines()[-1].split()
+    assert threads == found
+    assert int(started) <= int(found)
+
+
 def test_help_imports_nothing_heavy_and_is_quick() -> None:
     code = f"import sys; from rendergraph.cli import main; main(['--help']); print({HEAVY!r} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
