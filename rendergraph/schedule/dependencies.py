@@ -5,7 +5,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from graphlib import CycleError, TopologicalSorter
 from itertools import islice, pairwise, permutations
 from typing import TypeAlias
 
@@ -188,6 +187,8 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
                 mine.setdefault(reader, (write.resource, "overwrites"))
         mine.pop(step.key, None)
     if len(upstream_first(waits)) < len(waits):
+        from graphlib import CycleError, TopologicalSorter  # to name a cycle where there is one
+
         try:
             TopologicalSorter(waits).prepare()  # names one cycle
         except CycleError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Iterator, Sequence
 from heapq import heapify, heappop, heappush
 
@@ -125,6 +124,8 @@ def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
 
 def random_order(model: Model, seed: int) -> list[int]:
     """A legal order drawn by the seed: of the ready steps any with equal chance."""
+    import random  # few orders are drawn by lot
+
     chooser = random.Random(seed)
     missing = [len(steps) for steps in model.before]
     ready = [step for step, number in enumerate(missing) if not number]
