@@ -13,6 +13,7 @@ from typing import Literal
 from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
+from rendergraph.glsl.names import blank
 from rendergraph.stamps import Stamp, look, stamp
 
 MAX_BYTES = 1_000_000
@@ -32,10 +33,7 @@ def strip_comments(text: str) -> str:
     """
 
     def blanks(match: re.Match[str]) -> str:
-        found = match.group()
-        if match["open"] is not None:
-            return found
-        return "\n".join(" " * len(line) for line in found.split("\n")) if "\n" in found else " " * len(found)
+        return match.group() if match["open"] is not None else blank(match.group())
 
     return _COMMENT.sub(blanks, text)
 

@@ -72,7 +72,12 @@ def tokens(text: str) -> list[str]:
 
 def without_directives(text: str) -> str:
     """The text with preprocessor lines (and what continues them) blanked out, every character where it was."""
-    return _DIRECTIVE.sub(lambda match: re.sub(r"[^\n]", " ", match.group()), text)
+    return _DIRECTIVE.sub(lambda match: blank(match.group()), text)
+
+
+def blank(text: str) -> str:
+    """As many blanks, in as many lines."""
+    return "\n".join(" " * len(line) for line in text.split("\n"))
 
 
 def declared(text: str) -> set[str]:

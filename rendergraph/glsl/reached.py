@@ -18,10 +18,10 @@ def reached(text: str) -> set[str]:
 
     Branches of `#ifdef` are followed as the text's own macros say; of other conditions every branch counts.
     """
-    uses: dict[str, set[str]] = {}
+    uses: dict[str, list[Sequence[str]]] = {}
     words = tokens("\n".join(_taken(text, uses)))
     if "##" in text:  # names that are put together are not known
-        return _names(words).union(*uses.values())
+        return _names(words).union(*(_names(part) for parts in uses.values() for part in parts))
     macros, waiting = set(uses), ["main"]
     for statement, body in statements(words):
         waiting += macros.intersection(statement)  # one that stands between functions may make one
@@ -29,20 +29,21 @@ def reached(text: str) -> set[str]:
         if body is not None and statement[-1:] == [")"]:
             for name, after in pairwise(statement):
                 if after == "(":  # behind such a macro the function's own name is not the first
-                    uses.setdefault(name, set()).update(_names([*statement, *body]))
+                    uses.setdefault(name, []).extend([statement, body])
         elif body is None and begin.rest:
             for one, _, value in declarators(begin.rest[1:]):
-                uses.setdefault(str(one), set()).update(_names(value))
+                uses.setdefault(one, []).append(value)
     found: set[str] = set()
     while waiting:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += uses.get(name, ())
+            for part in uses.get(name, ()):
+                waiting += _names(part)
     return found
 
 
-def _taken(text: str, uses: dict[str, set[str]]) -> Iterator[str]:
+def _taken(text: str, uses: dict[str, list[Sequence[str]]]) -> Iterator[str]:
     """The lines that are compiled, directives left out; what macros use goes to `uses`."""
     macros: set[str] = set()
     branches: list[tuple[bool, bool | None, bool]] = []  # around is taken; so is this one, None: perhaps; one was
@@ -64,7 +65,7 @@ def _taken(text: str, uses: dict[str, set[str]]) -> Iterator[str]:
             branches.pop()
         elif taken and word == "define" and (found := _DEFINE.match(rest)):
             macros.add(found[1])
-            uses.setdefault(found[1], set()).update(_names(tokens(found[3])))
+            uses.setdefault(found[1], []).append(tokens(found[3]))
         elif taken and word == "undef":
             macros.discard(rest)
 

@@ -35,6 +35,7 @@ _MOVING = {
 }
 _SAMPLER = re.compile(r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);")
 _NAME = re.compile(r"[A-Za-z_]\w*")
+_BLOCK = re.compile(r"\b(?:uniform|buffer)\b[^;{}()=]*?([A-Za-z_]\w*)\s*\{([^{}]*)\}\s*([A-Za-z_]\w*)?")
 _SAMPLERS = {"texture2d": "sampler2D", "texture2d_array": "sampler2DArray", "texture_cube": "samplerCube"}
 
 
@@ -221,11 +222,9 @@ def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
 
 def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
     """Each uniform or storage block with the names a text uses it by: its members', or its own (`block {…} own`)."""
-    for statement, body in statements(tokens(without_directives(text))):
-        begin = head(statement)
-        if begin.storage in ("uniform", "buffer") and body is not None and begin.rest:
-            members = {name for one, _ in statements(body) for name, _, _ in declarators(head(one).rest[1:])}
-            yield begin.rest[0], members | set(statement[statement.index("}") + 1 :][:1])
+    for block, body, own in _BLOCK.findall(without_directives(text)):
+        members = {name for one, _ in statements(tokens(body)) for name, _, _ in declarators(head(one).rest[1:])}
+        yield block, members | ({own} if own else set())
 
 
 @lru_cache(maxsize=256)
