@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from msgspec import Struct, field
@@ -11,9 +13,13 @@ from rendergraph.errors import InputError
 from rendergraph.gl import programs
 from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
-from rendergraph.glsl.expansion import check_expansion
 from rendergraph.program import StageText
 from rendergraph.resources import folder
+
+
+@cache
+def _is_in(file: Path, folder: Path) -> bool:
+    return file.is_relative_to(folder)
 
 
 class ProgramCache(Struct, eq=False):
@@ -36,7 +42,10 @@ class ProgramCache(Struct, eq=False):
             return self._programs[key]
         shipped = folder("rendergraph.shaders")
         for text in texts.values():
-            check_expansion(text.source, (shipped,))
+            if not all(_is_in(file, shipped) for file in text.source.files):
+                from rendergraph.glsl.expansion import check_expansion  # our own need no looking into
+
+                check_expansion(text.source)
         try:
             program = programs.link(self.device, sources, outputs)
         except programs.ProgramError as error:

@@ -9,11 +9,9 @@ counts, and of several definitions of a name the worst. What people write stays 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
-from functools import cache
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from itertools import pairwise
 from math import prod
-from pathlib import Path
 
 from msgspec import Struct
 
@@ -32,20 +30,15 @@ _DIRECTIVE = re.compile(r"\s*#\s*([a-z]*)\s*(.*)", re.DOTALL)
 _DEFINE = re.compile(r"([A-Za-z_]\w*)(\(([^()]*)\))?(.*)", re.DOTALL)
 
 
-def check_expansion(source: SourceText, trusted: Iterable[Path] = ()) -> None:
+def check_expansion(source: SourceText) -> None:
     """Refuse a stage whose macros may expand too far.
 
     Args:
         source: the text of a stage.
-        trusted: folders of shaders that need no looking into; a stage of nothing else is passed over.
 
     Raises:
         InputError: they may make more than `MOST_WORDS`, or stand more than `MOST_NESTED` deep (RG409).
     """
-    folders = tuple(trusted)
-    files = {block.origin.file for block in source.blocks} - {None}
-    if all(_is_in(file, folders) for file in files if file is not None):
-        return
     definitions, runs = _parts(source)
     macros = _Macros(definitions, [words for words, _ in runs])
     total = 0
@@ -58,11 +51,6 @@ def check_expansion(source: SourceText, trusted: Iterable[Path] = ()) -> None:
                 raise _error(source, at, f"macros may make more than {MOST_WORDS:,} words of this line")
             if around + growth.depth > MOST_NESTED:
                 raise _error(source, at, f"more than {MOST_NESTED} macros stand inside each other in this line")
-
-
-@cache
-def _is_in(file: Path, folders: tuple[Path, ...]) -> bool:
-    return any(file.is_relative_to(folder) for folder in folders)
 
 
 def _error(source: SourceText, at: int, text: str) -> InputError:

@@ -84,6 +84,11 @@ class SourceText(Struct, frozen=True, dict=True):
         return tuple(chain.from_iterable(block.lines for block in self.blocks))
 
     @property
+    def files(self) -> set[Path]:
+        """Where its lines come from."""
+        return {block.origin.file for block in self.blocks if block.origin.file is not None}
+
+    @property
     def origins(self) -> tuple[Origin, ...]:
         """As many as there are lines."""
         return tuple(chain.from_iterable(block.origins for block in self.blocks))

@@ -17,7 +17,6 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Block, Includes, Origin, SourceText, generated
-from rendergraph.program.images import with_formats
 from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
 from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.resources import folder
@@ -182,6 +181,8 @@ def _stage(
     if functions.blocks:  # which may include what it includes
         source = expanded(includes)
     if stage == "compute":
+        from rendergraph.program.images import with_formats  # many pipelines compute nothing
+
         source = with_formats(source, step, resources)
     extensions, source = _hoisted(source)
     body = functions.text + source.text
