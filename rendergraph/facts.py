@@ -84,7 +84,7 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) ->
 class ObjectFacts(Struct, frozen=True, eq=False):
     """What is known of an object before the schedule: where it stands is not.
 
-    Two are equal if all is but their meshes, so that what was worked out for one holds for the other.
+    Meshes are not compared: what was worked out for one object holds for another that is equal in all else.
 
     Attributes:
         name: unique in the scene.
