@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rendergraph.api import Internal, Port, Steps, define
+from rendergraph.api import Internal, Port, Steps, define, param
 
 from ._refined import RefinedOcclusion
 from ._screen_space import ScreenSpaceOcclusion, reduced_size
@@ -82,8 +82,18 @@ class ArmOcclusion(ScreenSpaceOcclusion):
 class RefinedArms(RefinedOcclusion, ArmOcclusion):
     """Base of those of them that work at two sizes: whose neighbours' mean is all the filter there is."""
 
+    bent = Internal(format="r32f", size=reduced_size)
+    bent_four = Internal(format="rgba16_snorm", size=reduced_size)
     shared_later = Internal(format="r16f", size="depth")
     shared_later_four = Internal(format="rgba16f", size="depth")
+
+    contrast: float = param(
+        default=0.06,
+        min=0,
+        max=1,
+        doc="What the slope of reduced pixels may change by and still be interpolated, over two of them to each side; "
+        "with `refine`.",
+    )
 
     def look(
         self,
@@ -101,18 +111,14 @@ class RefinedArms(RefinedOcclusion, ArmOcclusion):
             return
         macros = {**(defines or {}), **({"FOUR": 1} if four else {})}
         found, small = (self.unfiltered_four, self.neighbours_four) if four else (self.unfiltered, self.neighbours)
-        later = self.shared_later_four if four else self.shared_later
+        bent, later = (self.bent_four, self.shared_later_four) if four else (self.bent, self.shared_later)
         screen: dict[str, Any] = {"screen": self.screen(steps)}
         self.gather_surfaces(steps)
-        few: dict[str, Any] = {
-            "surfaces": self.whole,
-            "reduced": steps.desc(found).size,
-            "defines": {**macros, "SPARSE": 1},
-        }
-        steps.fullscreen(fragment, out=found, **screen, **few, **reads)
-        few = {"surfaces": self.surfaces, "defines": {**macros, **self.sizes(steps)}}
-        steps.fullscreen("neighbours_mean.frag", out={"mean": small}, unfiltered=found, **screen, **few)
-        self.interpolate(steps, small, {**out, "found": later}, macros)
+        few = {**screen, **self.sparse(steps, macros)}
+        steps.fullscreen(fragment, out=found, **few, **reads)
+        steps.fullscreen("even_mean.frag", out={"mean": small}, unfiltered=found, **few)
+        steps.fullscreen("bend.frag", out={"bent": bent}, source=small, **self.sparse(steps, macros))
+        self.interpolate(steps, "between.frag", bent, {**out, "found": later}, macros)
         steps.fullscreen(fragment, defines=macros, **self.over_marked({"unfiltered": later}), **screen, **reads)
         final = {**macros, "FINAL": 1}
         steps.fullscreen("neighbours_mean.frag", unfiltered=later, defines=final, **self.over_marked(out), **screen)

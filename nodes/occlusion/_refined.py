@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rendergraph.api import Depth, Internal, Port, State, Steps, param, structural
+from rendergraph.api import Depth, Internal, Port, State, Steps, structural
 
 from ._screen_space import ScreenSpaceOcclusion
 
@@ -15,18 +15,22 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
 
     Dual-resolution occlusion (Bavoil and Sainz, "Multi-Layer Dual-Resolution Screen-Space Ambient Occlusion", 2009).
     Reduced pixels look at the surfaces of the whole picture. A pixel of the picture takes the mean of the four around
-    it that lie on its own surface; where none does, or they differ, it is marked, and the technique's passes are drawn
-    once more over what is marked. The marks are a depth: its test leaves out blocks of pixels before a shader begins.
+    it that lie on its own surface; where none does, or they say too little, it is marked, and the technique's passes
+    are drawn once more over what is marked. The marks are a depth: its test leaves out blocks of pixels before a shader
+    begins.
     """
 
     whole = Internal(format="rgba32f", size="depth", view="depth")
     marks = Internal(Depth, format="depth16", size="depth")
 
-    refine: bool = structural(
-        default=True, doc="At a reduced size, compute all pixels where reduced ones differ or are on another surface."
+    scale: float = structural(
+        default=0.5,
+        min=0.125,
+        max=1,
+        doc="Share of the picture's width and height it is computed at, where `refine` does not ask for all.",
     )
-    contrast: float = param(
-        default=0.05, min=0, max=1, doc="What reduced pixels may differ by and still be interpolated; with `refine`."
+    refine: bool = structural(
+        default=True, doc="At a reduced size, compute all pixels that reduced ones say too little about."
     )
 
     def refines(self, steps: Steps) -> bool:
@@ -34,33 +38,47 @@ class RefinedOcclusion(ScreenSpaceOcclusion):
         return self.refine and bool(self.sizes(steps))
 
     def gather_surfaces(self, steps: Steps) -> None:
-        """Bring normals and distances into `surfaces`, and with two sizes the picture's into `whole`."""
-        super().gather_surfaces(steps)
+        """Bring normals and distances into `surfaces`, and with two sizes the picture's into `whole` instead."""
         if self.refines(steps):
             steps.fullscreen("surfaces.frag", out={"surfaces": self.whole}, **self.gathered(steps))
+        else:
+            super().gather_surfaces(steps)
 
-    def over_marked(self, out: Mapping[str, Port]) -> dict[str, Any]:
-        """Arguments of a step over the pixels that `interpolate` has marked."""
-        state = State(depth_test=True, depth_write=False)
-        return {"out": {**out, "marks": self.marks}, "surfaces": self.whole, "state": state}
+    def sparse(self, steps: Steps, defines: Mapping[str, int] | None = None) -> dict[str, Any]:
+        """Arguments of a step over reduced pixels that look at the surfaces of the whole picture."""
+        return {
+            "surfaces": self.whole,
+            "reduced": steps.desc(self.surfaces).size,
+            "defines": {**(defines or {}), "SPARSE": 1},
+        }
 
     def interpolate(
-        self, steps: Steps, source: Port, out: Mapping[str, Port], defines: Mapping[str, int] | None = None
+        self,
+        steps: Steps,
+        fragment: str,
+        source: Port,
+        out: Mapping[str, Port],
+        defines: Mapping[str, int] | None = None,
     ) -> None:
         """Bring what is reduced to full size, and mark the pixels that it says too little about.
 
         Args:
             steps: what records it.
+            fragment: the shader.
             source: a reduced texture, without noise.
             out: what is made of it, by the names in `finish.glsl`, and as `found` where the steps put what they filter.
-            defines: what of it there is to make, and `BLURRED` where `blur` may be 0 and leave the noise in.
+            defines: what of it there is to make.
         """
         steps.fullscreen(
-            "refine.frag",
+            fragment,
             out={**out, "marks": self.marks},
             state=State(depth_test=False),
             source=source,
             surfaces=self.whole,
-            reduced_surfaces=self.surfaces,
             defines={**(defines or {}), "FINAL": 1},
         )
+
+    def over_marked(self, out: Mapping[str, Port]) -> dict[str, Any]:
+        """Arguments of a step over the pixels that `interpolate` has marked."""
+        state = State(depth_test=True, depth_write=False)
+        return {"out": {**out, "marks": self.marks}, "surfaces": self.whole, "state": state}

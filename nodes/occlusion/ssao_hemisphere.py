@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rendergraph.api import Internal, Port, Steps, define, param, structural
+from rendergraph.api import Internal, Port, Steps, define, param
 
 from ._kernel import spread_points
 from ._refined import RefinedOcclusion
@@ -30,12 +30,6 @@ class SSAOHemisphere(RefinedOcclusion):
     across = Internal(format="r16", size=reduced_size)
     blurred = Internal(format="r16", size=reduced_size)
 
-    scale: float = structural(
-        default=0.5,
-        min=0.125,
-        max=1,
-        doc="Share of the picture's width and height it is computed at, where `refine` does not ask for all.",
-    )
     samples: int = define(default=32, min=8, max=128, doc="Points looked at, four a direction; rounded down to fours.")
     animated: bool = define(default=False, doc="Other directions in each frame, for `accumulate` to put together.")
     blur: int = param(
@@ -45,6 +39,9 @@ class SSAOHemisphere(RefinedOcclusion):
         max=16,
         doc="How far the blur reaches to each side; with `refine` three quarters as many of the reduced size. 0 leaves "
         "each pixel what it found, and refines all.",
+    )
+    contrast: float = param(
+        default=0.05, min=0, max=1, doc="What reduced pixels may differ by and still be interpolated; with `refine`."
     )
     nearest: float = param(
         default=0.0, unit="m", min=0, doc="Surfaces nearer to the eye stay open: their hemispheres cover the screen."
@@ -63,12 +60,11 @@ class SSAOHemisphere(RefinedOcclusion):
             if sizes:
                 self.upsample(steps, target, {"occlusion": self.occlusion}, {})
             return
-        size, more = steps.desc(self.unfiltered).size, self.samples * 7 // 4
-        self._look(steps, more, out=found, surfaces=self.whole, reduced=size, defines={"SPARSE": 1, "SAMPLES": more})
-        few = {"SPARSE": 1, **sizes}
-        self._blur(steps, (self.unfiltered, self.across, self.blurred), surfaces=self.surfaces, defines=few)
+        more = self.samples * 7 // 4
+        self._look(steps, more, out=found, **self.sparse(steps, {"SAMPLES": more}))
+        self._blur(steps, (self.unfiltered, self.across, self.blurred), **self.sparse(steps))
         out = {"occlusion": self.occlusion, "found": self.between}
-        self.interpolate(steps, self.blurred, out, defines={"BLURRED": 1})
+        self.interpolate(steps, "refine.frag", self.blurred, out)
         self._look(steps, self.samples, **self.over_marked({"unfiltered": self.occlusion}))
         self._blur(steps, (self.occlusion, self.between, self.occlusion), marked=True)
 

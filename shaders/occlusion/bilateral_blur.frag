@@ -12,12 +12,14 @@ out float blurred;
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = ivec2(gl_FragCoord.xy);
-    ivec2 last = textureSize(surfaces, 0) - 1;
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    ivec2 size = textureSize(surfaces, 0);
+    ivec2 last = target_size(size) - 1;
+    ivec2 texel = texel_here(size);
     vec4 here = texelFetch(surfaces, texel, 0);
-    vec3 position = view_position(v, place_for(texel, last + 1, screen), here.w);
+    vec3 position = view_position(v, place_for(texel, size, screen), here.w);
     float tolerance = 0.1 * radius + depth_error(v, here.w);
-    ivec2 odd = texel & axis;
+    ivec2 odd = pixel & axis;
 #ifdef SPARSE
     int wide = blur * 3 >> 2;  // each has looked at more points, and is about more of the picture
 #else
@@ -26,11 +28,12 @@ void main() {
     int reach = wide >> 1 << 1;
     float aside = 0.5 - float(odd.x + odd.y);  // from the texel to the middle of its four
     float total = 1e-3;  // of its own, should no other lie on its surface
-    float sum = total * texelFetch(source, texel, 0).r;
+    float sum = total * texelFetch(source, pixel, 0).r;
     for (int i = -reach; i <= reach; i += 2) {
-        ivec2 there = clamp(texel + i * axis, ivec2(0), last);
-        vec4 seen = texelFetch(surfaces, there, 0);
-        vec3 offset = view_position(v, place_for(there, last + 1, screen), seen.w) - position;
+        ivec2 there = clamp(pixel + i * axis, ivec2(0), last);
+        ivec2 at = surface_of(there, size);
+        vec4 seen = texelFetch(surfaces, at, 0);
+        vec3 offset = view_position(v, place_for(at, size, screen), seen.w) - position;
         float within = clamp(0.5 * (float(wide) + 1.0 - abs(float(i) + aside)), 0.0, 1.0);
         float weight = within * same_surface(offset, here.xyz, seen.xyz, tolerance);
         sum += weight * texelFetch(source, there, 0).r;

@@ -19,16 +19,30 @@ ivec2 texel_for(ivec2 texel, ivec2 small, ivec2 screen) {
 }
 
 #ifdef SPARSE
-uniform ivec2 reduced;  // size of the target, whose pixels look at all of a larger picture's surfaces
+uniform ivec2 reduced;  // size of the target, where its pixels are about some of a larger picture's surfaces
 #endif
 
-// The texel of `surfaces` that this pixel is about.
-ivec2 texel_here(ivec2 size) {
+// How many pixels the target has, where `surfaces` have `size`.
+ivec2 target_size(ivec2 size) {
 #ifdef SPARSE
-    return stands_for(ivec2(gl_FragCoord.xy), reduced, size);
+    return reduced;
 #else
-    return ivec2(gl_FragCoord.xy);
+    return size;
 #endif
+}
+
+// The texel of `surfaces` that a pixel of the target is about.
+ivec2 surface_of(ivec2 pixel, ivec2 size) {
+#ifdef SPARSE
+    return stands_for(pixel, reduced, size);
+#else
+    return pixel;
+#endif
+}
+
+// The same of this pixel.
+ivec2 texel_here(ivec2 size) {
+    return surface_of(ivec2(gl_FragCoord.xy), size);
 }
 
 // The middle of that texel, 0 to 1.
@@ -68,6 +82,11 @@ float depth_error(View v, float distance) {
 // Whether a point at `offset` from a surface stands out from its tangent plane, by more than depth can be wrong.
 bool rises(View v, vec3 offset, vec3 normal, float distance) {
     return dot(offset, normal) > 0.02 * length(offset) + 2.0 * depth_error(v, distance);
+}
+
+// Whether a neighbour at `offset` lies in the same plane and faces the same way, to within 30°.
+bool in_plane(vec3 offset, vec3 normal, vec3 neighbour, float tolerance) {
+    return abs(dot(offset, normal)) < tolerance && dot(normal, neighbour) > 0.87;
 }
 
 // 1 where a neighbour at `offset` lies in the same plane and faces the same way, 0 where it is another surface: at

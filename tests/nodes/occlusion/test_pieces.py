@@ -114,7 +114,10 @@ nodes:
     type: shown_occlusion
     inputs: {{depth: g.depth, normal: g.normal}}
     params: {{radius: {RADIUS}, blur: {BLUR}, scale: {scale}, refine: false, samples: {SAMPLES}}}
-  disc: {{type: ssaodisc, inputs: {{depth: g.depth, normal: g.normal}}, params: {{radius: {RADIUS}, samples: {SAMPLES}, form: disc}}}}
+  disc:
+    type: ssaodisc
+    inputs: {{depth: g.depth, normal: g.normal}}
+    params: {{radius: {RADIUS}, samples: {SAMPLES}, form: disc, scale: 1}}
 outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, unfiltered: ao.unfiltered, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
 """)
         pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
