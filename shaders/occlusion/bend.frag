@@ -1,6 +1,6 @@
-// What reduced pixels have found, or -1 where it bends too much to be put between them. What bends is told by the second
-// difference along both axes, which a slope has none of; where a plane ends, as if it were mirrored there. It is taken
-// over two texels, as nearer ones share what they have found; narrower planes are not told and count as bent.
+// What reduced pixels have found, or -1 where it bends too much to be put between them. What bends is told by the
+// second difference along both axes, which a slope has none of; where a plane ends, as if it were mirrored there. It is
+// taken over two texels, as nearer ones share what they have found; narrower planes are not told and count as bent.
 #include "surfaces.glsl"
 #include "value.glsl"
 uniform sampler2D source;
