@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, Protocol
 
 from msgspec import Struct, field
+from msgspec.structs import astuple
 
 from rendergraph.errors import SceneError, suggestion
 from rendergraph.textures import EnvironmentMap, Semantic, TextureDesc
@@ -120,10 +121,13 @@ class ObjectFacts(Struct, frozen=True, eq=False):
     def __hash__(self) -> int:
         return hash(self._compared)
 
+    def __repr__(self) -> str:
+        known = (f"{name}={getattr(self, name)!r}" for name in self.__struct_fields__ if name[0] != "_")
+        return f"ObjectFacts({', '.join(known)})"
+
     @property
     def _compared(self) -> tuple[object, ...]:
-        flags = (self.casts_shadow, self.blended, self.double_sided, self.hidden)
-        return self.name, self.triangles, self.vertices, flags, self.grain, self.emissive, self.reflective
+        return astuple(self)[:-4]  # all but the mesh and what is asked of it
 
     @property
     def closed(self) -> bool:

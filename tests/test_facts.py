@@ -71,7 +71,9 @@ def test_record_is_told_of_the_scenes_objects(bench: Any) -> None:
     assert len({floor, ObjectFacts("floor", 2, 4, True, False, True)}) == 1, (
         "its mesh, which is asked later, is not compared"
     )
-    assert floor != ObjectFacts("floor", 2, 4, True, False, True, grain=True)
+    assert floor != ObjectFacts("floor", 2, 4, True, False, True, reflective=True)
+    assert floor != ObjectFacts("flour", 2, 4, True, False, True)
+    assert repr(floor).endswith("reflective=False, mesh='plane')")
     assert (ball.name, ball.blended, ball.double_sided, ball.casts_shadow) == ("ball", True, False, True)
     assert (box.name, box.triangles, box.casts_shadow) == ("box", 12, False)
     assert [one.closed for one in objects] == [False, True, True, True]

@@ -107,8 +107,10 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
 
 
 def _has_header(file: str) -> bool:
+    if not os.path.isfile(file):  # opening a pipe would wait for somebody to write
+        return False
     try:
-        opened = os.open(file, os.O_RDONLY | os.O_NONBLOCK)  # a pipe would wait for somebody to write
+        opened = os.open(file, os.O_RDONLY)
         try:
             text = os.read(opened, _HEAD_BYTES)
         finally:

@@ -70,12 +70,9 @@ def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
 def _can_be_mended(error: RendergraphError, turn: Turn[Any]) -> bool:
     """Whether the user has a file in this at all: a misspelt name on the command line is better said at once."""
     shipped = [folder(package) for package in _SHIPPED]
-    own = [
-        path
-        for path, found in zip(map(Path, turn.files), turn.files.values(), strict=True)
-        if found is not None and path.is_file() and not any(path.is_relative_to(place) for place in shipped)
-    ]
-    return isinstance(error, InputError) and bool(own)
+    there = [Path(name) for name, found in turn.files.items() if found is not None]
+    own = (path for path in there if path.is_file() and not any(path.is_relative_to(place) for place in shipped))
+    return isinstance(error, InputError) and any(own)
 
 
 def _say_error(error: RendergraphError, changed: tuple[Path, ...], told: tuple[str, ...]) -> tuple[str, ...]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence, Set
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 from msgspec import Struct, field
@@ -15,11 +14,6 @@ from rendergraph.gl.device import Device
 from rendergraph.gl.programs import Program
 from rendergraph.program import StageText
 from rendergraph.resources import folder
-
-
-@cache
-def _is_in(file: Path, folder: Path) -> bool:
-    return file.is_relative_to(folder)
 
 
 class ProgramCache(Struct, eq=False):
@@ -40,9 +34,9 @@ class ProgramCache(Struct, eq=False):
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:
             return self._programs[key]
-        shipped = folder("rendergraph.shaders")
+        shipped = os.path.join(folder("rendergraph.shaders"), "")
         for text in texts.values():
-            if not all(_is_in(file, shipped) for file in text.source.files):
+            if not all(str(file).startswith(shipped) for file in text.source.files):
                 from rendergraph.glsl.expansion import check_expansion  # our own need no looking into
 
                 check_expansion(text.source)

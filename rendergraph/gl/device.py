@@ -152,8 +152,6 @@ def open_device(index: int | None = None) -> Device:
     Raises:
         DeviceError: no driver, no such device, OpenGL older than 4.5, or a process forked from one that has drawn.
     """
-    from glcontext import egl  # type: ignore[import-untyped]  # ships no types
-
     if first_process() != os.getpid():
         text = (
             "OpenGL has been used in the process that this one was forked from, and drivers do not survive that; "
@@ -167,10 +165,12 @@ def open_device(index: int | None = None) -> Device:
     chosen = index if index is not None else int(named)
     try:
         with previous_context():
+            from glcontext import egl  # type: ignore[import-untyped]  # ships no types
+
             # By their names, which every Linux has: glcontext's own search starts two processes.
             names = {
-                "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL", "libGL.so.1"),
-                "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL", "libEGL.so.1"),
+                "libgl": os.environ.get("GLCONTEXT_LINUX_LIBGL") or "libGL.so.1",
+                "libegl": os.environ.get("GLCONTEXT_LINUX_LIBEGL") or "libEGL.so.1",
             }
             context = egl.create_context(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
             ctx = moderngl.create_context(context=context)

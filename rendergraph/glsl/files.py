@@ -8,7 +8,6 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
 
 from msgspec import Struct
 
@@ -43,13 +42,13 @@ class Directive(Struct, frozen=True, gc=False):
 
     Attributes:
         number, text: the line.
-        word: what it is; `needs` is `#pragma needs`, which says something to rendergraph and nothing to the driver.
-        rest: what stands behind that, as it is written.
+        word: `include`, `version`, `line`, or `needs` for a `#pragma needs`, which says nothing to the driver.
+        rest: what stands behind that.
     """
 
     number: int
     text: str
-    word: Literal["include", "needs", "version", "line"]
+    word: str
     rest: str
 
     @property
@@ -60,12 +59,8 @@ class Directive(Struct, frozen=True, gc=False):
     @classmethod
     def of(cls, number: int, text: str, word: str, rest: str) -> Directive | None:
         """What a line with a `#`, a word and more says, None where that is the driver's affair."""
-        if word == "include":
-            return cls(number, text, "include", rest.strip())
-        if word == "version":
-            return cls(number, text, "version", rest)
-        if word == "line":
-            return cls(number, text, "line", rest)
+        if word in ("include", "version", "line"):
+            return cls(number, text, word, rest.strip())
         needs = _NEEDS.match(rest) if word == "pragma" else None
         return cls(number, text, "needs", needs[1]) if needs else None
 
@@ -173,12 +168,12 @@ def _runs(file: Path, stamp: Stamp) -> tuple[str, tuple[Run, ...]]:
             nests += _NESTS.get(directive[1], 0)
             end = Directive.of(number + 1, line, directive[1], directive[2])
             if end is not None:
-                found.append(Run(begin + 1, lines[begin:number], size(lines[begin:number]), nests, end))
+                found.append(Run(begin + 1, lines[begin:number], _size(lines[begin:number]), nests, end))
                 begin, nests = number + 1, 0
-    found.append(Run(begin + 1, lines[begin:], size(lines[begin:]), nests, None))
+    found.append(Run(begin + 1, lines[begin:], _size(lines[begin:]), nests, None))
     return raw, tuple(found)
 
 
-def size(lines: Sequence[str]) -> int:
+def _size(lines: Sequence[str]) -> int:
     """How large lines are, their ends included."""
     return sum(map(len, lines)) + len(lines)

@@ -88,7 +88,7 @@ class SourceText(Struct, frozen=True, dict=True):
         """Where its lines come from."""
         return {block.origin.file for block in self.blocks if block.origin.file is not None}
 
-    @property
+    @cached_property
     def origins(self) -> tuple[Origin, ...]:
         """As many as there are lines."""
         return tuple(chain.from_iterable(block.origins for block in self.blocks))
@@ -97,11 +97,6 @@ class SourceText(Struct, frozen=True, dict=True):
     def text(self) -> str:
         """The lines as one string."""
         return "".join(["\n".join([*block.lines, ""]) for block in self.blocks])
-
-    @property
-    def bytes(self) -> int:
-        """Size of the text."""
-        return len(self.text)
 
     def __add__(self, other: SourceText) -> SourceText:
         return SourceText(self.blocks + other.blocks)
@@ -203,8 +198,8 @@ class Includes:
             else:
                 target, shared, home = self._find(line.rest, file, root, origin, raw, base.shared)
             if self._links.of(target) in stack:
-                chain = " includes ".join(os.path.basename(path) for path in [*stack, str(target)])
-                raise _error("RG402", f"'{target.name}' includes itself: {chain}", origin, raw)
+                ring = " includes ".join(os.path.basename(path) for path in [*stack, str(target)])
+                raise _error("RG402", f"'{target.name}' includes itself: {ring}", origin, raw)
             if len(stack) > MAX_DEPTH:
                 raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)

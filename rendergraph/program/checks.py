@@ -35,7 +35,7 @@ _MOVING = {
 }
 _SAMPLER = re.compile(r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);")
 _NAME = re.compile(r"[A-Za-z_]\w*")
-_BLOCK = re.compile(r"\b(?:uniform|buffer)\b[^;{}()=]*?([A-Za-z_]\w*)\s*\{([^{}]*)\}\s*([A-Za-z_]\w*)?")
+_BRACES = re.compile(r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)")
 _SAMPLERS = {"texture2d": "sampler2D", "texture2d_array": "sampler2DArray", "texture_cube": "samplerCube"}
 
 
@@ -222,9 +222,12 @@ def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
 
 def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
     """Each uniform or storage block with the names a text uses it by: its members', or its own (`block {…} own`)."""
-    for block, body, own in _BLOCK.findall(without_directives(text)):
-        members = {name for one, _ in statements(tokens(body)) for name, _, _ in declarators(head(one).rest[1:])}
-        yield block, members | ({own} if own else set())
+    for before, body, own in _BRACES.findall(without_directives(text)):
+        words = tokens(before)
+        storage = next((at for at, word in enumerate(words) if word in ("uniform", "buffer")), None)
+        if storage is not None and (name := head(words[storage:]).rest[:1]):
+            members = {made for one, _ in statements(tokens(body)) for made, _, _ in declarators(head(one).rest[1:])}
+            yield name[0], members | ({own} if own else set())
 
 
 @lru_cache(maxsize=256)

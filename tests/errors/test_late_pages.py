@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -259,6 +260,18 @@ def test_devices_memory_and_threads(gl: rg.Session, monkeypatch: pytest.MonkeyPa
     with pytest.raises(RendergraphError, match="RG611 RENDERGRAPH_DEVICE is 'gpu0', not the number of a device"):
         rg.Session()
     monkeypatch.delenv("RENDERGRAPH_DEVICE")
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "glcontext.egl", None)
+        without.delattr("glcontext.egl", raising=False)
+        with pytest.raises(RendergraphError, match=r"RG611 no usable OpenGL 4\.5 device"):
+            rg.Session()
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setenv("GLCONTEXT_LINUX_LIBEGL", "libnowhere.so")
+        with pytest.raises(RendergraphError, match=r"RG611 no usable OpenGL 4\.5 device: libnowhere\.so not loaded"):
+            rg.Session()
+        elsewhere.setenv("GLCONTEXT_LINUX_LIBEGL", "")
+        with rg.Session():
+            pass
     monkeypatch.setenv("RENDERGRAPH_MEMORY_LIMIT", "1")
     with pytest.raises(RendergraphError, match="RG616") as caught:
         gl.render(rg.load("forward", size=(32, 32), scene="cornell_box"))

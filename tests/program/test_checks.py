@@ -9,6 +9,7 @@ import pytest
 from rendergraph.api import ADD, Depth, InOut, Input, Internal, Node, Output, Radiance, State, Steps, structural
 from rendergraph.api import Any as AnyTexel
 from rendergraph.errors import InputError
+from rendergraph.program import looked_at
 
 
 class Maker(Node):
@@ -154,3 +155,23 @@ def test_an_inout_that_is_read_has_one_sample(bench: Any) -> None:
     glow.set("m.samples", 1).check()
     with pytest.raises(InputError, match=r"RG214 node 'g' \(glow\): \S+: 'radiance' is read as one sample a texel"):
         glow.check()
+
+
+@pytest.mark.parametrize(
+    ("block", "use"),
+    [
+        ("uniform B { float a; };", "a"),
+        ("layout(std140, binding = 1) uniform B { vec4 c; float a[2]; };", "a[1]"),
+        ("layout(std140) uniform B { float a; } own;", "own.a"),
+        ("layout(std430) readonly buffer B { float a[]; } many[2];", "many[0].a[3]"),
+        ("buffer readonly layout(std430) B { float a; };", "a"),
+        ("uniform layout(std140) B {\n#ifdef C\n    float c;\n#endif\n    layout(row_major) mat4 a;\n};", "a[0][0]"),
+        ("float f() { return 1.0; } uniform B { float a; };", "a"),
+        ("float f() { if (true) { return 1.0; } return 2.0; }\nuniform B { float a; };", "a"),
+        ("struct S { float a; };\nuniform B { S s; };", "s.a"),
+    ],
+)
+def test_blocks_are_looked_at_by_their_members(block: str, use: str) -> None:
+    other = "uniform Other { float nobody; };"
+    assert looked_at(f"{other}\n{block}\nvoid main() {{ float x = {use}; }}") == {"B"}
+    assert looked_at(f"{other}\n{block}\nvoid main() {{ float x = 1.0; }}") == set()
