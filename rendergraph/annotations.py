@@ -270,7 +270,7 @@ def _given(kind: Any) -> tuple[tuple[str, Any, Any, Callable[[Any], bool]], ...]
     hints: dict[str, Any] = {}
     for base in reversed(kind.__mro__):
         hints |= _annotations_of(base)
-    if issubclass(kind, Struct):
+    if issubclass(kind, Struct):  # `msgspec.structs.fields` would work all types out once more
         names, defaults = kind.__struct_fields__, kind.__struct_defaults__
         taken = [*zip(names, (*(len(names) - len(defaults)) * [msgspec.NODEFAULT], *defaults), strict=True)]
     else:

@@ -39,23 +39,18 @@ def share_blocks(items: Sequence[Item], *, seed: int = 0) -> list[list[int]]:
     alive = [(1 << item.last + 1) - (1 << item.first) for item in items]  # a bit for each position
     best, least = _placed(items, alive, sorted(numbers, key=lambda n: (-items[n].bytes, items[n].first, n)))
     bound = least_bytes(items)
-    if least == bound:
-        return _in_time(best, items)
-    import random  # only where the first order is not the best
+    if least > bound:
+        import random  # most orders are the best at once
 
-    chooser = random.Random(seed)
-    for _ in range(min(RESTARTS, WORK // max(1, len(items)) ** 2)):
-        weights = [item.bytes * chooser.uniform(0.5, 1.5) for item in items]
-        other, taken = _placed(items, alive, sorted(numbers, key=lambda n: (-weights[n], n)))
-        if taken < least:
-            best, least = other, taken
-        if least == bound:
-            break
-    return _in_time(best, items)
-
-
-def _in_time(blocks: Sequence[Sequence[int]], items: Sequence[Item]) -> list[list[int]]:
-    return [sorted(block, key=lambda n: items[n].first) for block in blocks]
+        chooser = random.Random(seed)
+        for _ in range(min(RESTARTS, WORK // max(1, len(items)) ** 2)):
+            weights = [item.bytes * chooser.uniform(0.5, 1.5) for item in items]
+            other, taken = _placed(items, alive, sorted(numbers, key=lambda n: (-weights[n], n)))
+            if taken < least:
+                best, least = other, taken
+            if least == bound:
+                break
+    return [sorted(block, key=lambda n: items[n].first) for block in best]
 
 
 def least_bytes(items: Sequence[Item]) -> int:

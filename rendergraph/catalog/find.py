@@ -110,11 +110,8 @@ def _has_header(file: str) -> bool:
     if not os.path.isfile(file):  # opening a pipe would wait for somebody to write
         return False
     try:
-        opened = os.open(file, os.O_RDONLY)
-        try:
-            text = os.read(opened, _HEAD_BYTES)
-        finally:
-            os.close(opened)
+        with open(file, "rb") as opened:
+            text = opened.read(_HEAD_BYTES)
     except OSError:
         return False
     return header.BEGIN.encode() in text and header.is_in(text.decode("utf-8", "replace"))

@@ -18,7 +18,7 @@ from rendergraph.nodes.occlusion.ssao_hemisphere import SSAOHemisphere
 
 import rendergraph as rg
 from rendergraph.api import Any as AnyTexel
-from rendergraph.api import Output, ViewMatrices
+from rendergraph.api import Node, Output, ViewMatrices
 from rendergraph.catalog import Catalog
 from rendergraph.resources import folder
 from rendergraph.scene.cameras import view_matrices
@@ -99,17 +99,10 @@ RADIUS, BLUR, SAMPLES = 0.4, 4, 12
 @pytest.fixture
 def show(tmp_path: Path, session: rg.Session) -> Show:
     """`show(size, scale)`: every texture of the Cornell box's occlusion, and the camera's projection."""
-    for family in ("geometry", "occlusion"):
-        shutil.copytree(folder("rendergraph.shaders") / family, tmp_path / "shaders", dirs_exist_ok=True)
-    catalog = Catalog.of(GBuffer, ShownOcclusion, SSAODisc, shaders=tmp_path / "shaders")
 
     def run(size: tuple[int, int], scale: float) -> tuple[rg.Frame, ViewMatrices]:
         blurred = ", blurred: ao.blurred" if scale < 1 else ""
-        (tmp_path / "test.yaml").write_text(f"""rendergraph: 1
-size: [{size[0]}, {size[1]}]
-scene: cornell_box
-nodes:
-  g: {{type: gbuffer, params: {{precision: full}}}}
+        text = f"""
   ao:
     type: shown_occlusion
     inputs: {{depth: g.depth, normal: g.normal}}
@@ -119,13 +112,23 @@ nodes:
     inputs: {{depth: g.depth, normal: g.normal}}
     params: {{radius: {RADIUS}, samples: {SAMPLES}, form: disc, scale: 1}}
 outputs: {{occlusion: ao.occlusion, surfaces: ao.surfaces, unfiltered: ao.unfiltered, depth: g.depth, normal: g.normal, noise: ao.noise, disc: disc.occlusion{blurred}}}
-""")
-        pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
-        frame = session.render(pipeline)
-        camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), size)
-        return frame, camera
+"""
+        return drawn(session, tmp_path, size, text, ShownOcclusion, SSAODisc)
 
     return run
+
+
+def drawn(
+    session: rg.Session, home: Path, size: tuple[int, int], text: str, *types: type[Node]
+) -> tuple[rg.Frame, ViewMatrices]:
+    """What nodes of these types make of the Cornell box's G-buffer `g`, and the camera."""
+    for family in ("geometry", "occlusion"):
+        shutil.copytree(folder("rendergraph.shaders") / family, home / "shaders", dirs_exist_ok=True)
+    head = f"rendergraph: 1\nsize: [{size[0]}, {size[1]}]\nscene: cornell_box\nnodes:\n"
+    (home / "test.yaml").write_text(f"{head}  g: {{type: gbuffer, params: {{precision: full}}}}{text}")
+    pipeline = replace(rg.load(home / "test.yaml"), catalog=Catalog.of(GBuffer, *types, shaders=home / "shaders"))
+    camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), size)
+    return session.render(pipeline), camera
 
 
 def places(small: tuple[int, int], screen: tuple[int, int]) -> tuple[Floats, Floats]:

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rendergraph.nodes.geometry.gbuffer import GBuffer
 from rendergraph.nodes.occlusion._screen_space import reduced_size
 from rendergraph.nodes.occlusion.gtao import GTAO
 
 import rendergraph as rg
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Output
-from rendergraph.catalog import Catalog
-from rendergraph.resources import folder
-from rendergraph.scene.cameras import view_matrices
 
-from .test_pieces import RADIUS, Floats, flipped, places, positions, same_surface
+from .test_pieces import RADIUS, Floats, drawn, flipped, places, positions, same_surface
 
 CONTRAST = 0.2
 
@@ -41,23 +35,14 @@ def moved(texels: Floats, up: int, right: int) -> Floats:
 
 @pytest.mark.parametrize("size", [(64, 48), (81, 61)])
 def test_two_sizes_in_numpy(session: rg.Session, tmp_path: Path, size: tuple[int, int]) -> None:
-    (tmp_path / "test.yaml").write_text(f"""rendergraph: 1
-size: [{size[0]}, {size[1]}]
-scene: cornell_box
-nodes:
-  g: {{type: gbuffer, params: {{precision: full}}}}
+    text = f"""
   ao:
     type: shown_horizons
     inputs: {{depth: g.depth, normal: g.normal}}
     params: {{radius: {RADIUS}, contrast: {CONTRAST}}}
 outputs: {{occlusion: ao.occlusion, whole: ao.whole, unfiltered: ao.unfiltered, neighbours: ao.neighbours, bent: ao.bent}}
-""")
-    for family in ("geometry", "occlusion"):
-        shutil.copytree(folder("rendergraph.shaders") / family, tmp_path / "shaders", dirs_exist_ok=True)
-    catalog = Catalog.of(GBuffer, ShownHorizons, shaders=tmp_path / "shaders")
-    pipeline = replace(rg.load(tmp_path / "test.yaml"), catalog=catalog)
-    frame = session.render(pipeline)
-    camera = view_matrices(next(iter(pipeline.link().scene.cameras.values())), size)
+"""
+    frame, camera = drawn(session, tmp_path, size, text, ShownHorizons)
     found, unfiltered, mean, bent = (
         flipped(frame, name)[..., 0] for name in ("occlusion", "unfiltered", "neighbours", "bent")
     )
