@@ -66,11 +66,16 @@ def test_what_is_not_beside_the_file_is_taken_from_the_extended_nodes_folders(sh
         expand(base / "out.frag", include, inherited=(shaders,))  # neither from beside the file nor from the other
 
 
-def test_an_include_that_may_not_be_compiled_does_not_hide_a_later_one(shaders: Path) -> None:
-    write(shaders, a__frag='#if X\n#include "b.glsl"\n#endif\n#include "b.glsl"\n', b__glsl="int b;\n")
+@pytest.mark.parametrize("opens", ["if X", "ifdef X", "ifndef X"])
+def test_an_include_that_may_not_be_compiled_does_not_hide_a_later_one(shaders: Path, opens: str) -> None:
+    write(shaders, a__frag=f'#{opens}\n#include "b.glsl"\n#endif\n#include "b.glsl"\n', b__glsl="int b;\n")
     text = expand(shaders / "a.frag", shaders.parent / "include").text
     assert text.count("int b;") == 2
     assert text.count("#ifndef INCLUDED_0") == 2
+    write(shaders, a__frag=f'#{opens}\n#endif\n#include "b.glsl"\n#include "b.glsl"\n')
+    text = expand(shaders / "a.frag", shaders.parent / "include").text
+    assert text.count("int b;") == 1
+    assert "INCLUDED" not in text
 
 
 def test_comments_keep_their_room_and_hide_includes(shaders: Path) -> None:
