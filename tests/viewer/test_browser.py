@@ -91,6 +91,26 @@ def test_a_slider_changes_the_picture_and_undo_takes_all_of_its_way_back(page: H
     assert page.page.is_disabled("#undo")
 
 
+def test_what_a_hand_reaches_for_stays_where_nothing_of_it_changes(page: Hand) -> None:
+    """Pictures come whenever they are ready; an input made anew for each would be gone while it is clicked."""
+    page.choose("display")
+    field = page.page.locator("[id='p-display.exposure']")
+    field.evaluate("(element) => { element.mine = true; }")
+    page.after(lambda: page.page.focus("#stage") or page.page.keyboard.press("ArrowLeft"))
+    page.page.wait_for_selector("#camera option:checked:has-text('moved by hand')", state="attached")
+    assert field.evaluate("(element) => element.mine") is True
+
+
+def test_a_slider_is_moved_by_keys_step_after_step(page: Hand) -> None:
+    page.choose("display")
+    slider = page.page.locator("[aria-label='display.exposure, slider']")
+    slider.focus()
+    step = float(slider.get_attribute("step") or 0)
+    for count in (1, 2):
+        page.after(lambda: page.page.keyboard.press("ArrowRight"))
+        assert float(page.page.input_value("[id='p-display.exposure']")) == pytest.approx(count * step)
+
+
 def mean(hand: Hand) -> float:
     """The mean of the red channel, as the page says it."""
     found = re.search(r"R: .*mean ([\d.]+)", hand.text("#texture"))

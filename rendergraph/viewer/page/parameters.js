@@ -3,6 +3,7 @@ import { h } from "./dom.js";
 import { send } from "./socket.js";
 
 let held = null;  // the setting a slider is moving, so that its way is one step of undo
+let drawn = {};   // what the inputs were made of
 
 const set = (path, value) => {
   send({ do: "set", path, value, again: held === path });
@@ -19,6 +20,12 @@ const asColor = (hex) => [1, 3, 5].map((at) => {
   return Number((x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4).toFixed(4));
 });
 
+// One, two or five of a power of ten: steps that meet the round numbers a default is.
+function even(step) {
+  const power = 10 ** Math.floor(Math.log10(step));
+  return (([5, 2].find((many) => many * power <= step) ?? 1) * power).toPrecision(1);
+}
+
 function numberField(path, id, about) {
   const step = about.kind === "integer" ? 1 : "any";
   const limits = { min: about.min, max: about.max, step };
@@ -33,9 +40,9 @@ function numberField(path, id, about) {
     const low = about.min ?? Math.min(0, about.value, about.default ?? 0);
     const wide = Math.max(Math.abs(about.default ?? about.value), Math.abs(about.value), about.kind === "integer" ? 8 : 0.5) * 4;
     const high = about.max !== null && about.max - low <= 128 ? about.max : Math.min(about.max ?? Infinity, low + wide);
-    const grain = about.kind === "integer" ? 1 : Number(((high - low) / 200).toPrecision(1));
+    const grain = about.kind === "integer" ? 1 : even((high - low) / 200);
     const range = h("input", {
-      type: "range", min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
+      type: "range", id: `${id}-slider`, min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
     });
     range.addEventListener("pointerdown", () => { held = ""; send({ do: "hold", on: true }); });
     range.addEventListener("input", () => { number.value = range.value; set(path, Number(range.value)); });
@@ -139,9 +146,12 @@ function linkRow(graph, node, name, about, edits) {
 
 // The pipeline's own parameters, where no node is chosen; else everything that the node can be told.
 export function showParameters(place, pipeline, node, edits) {
-  if (!pipeline) return;
-  // What somebody is holding or writing in is not taken from under the hand.
-  if (place.contains(document.activeElement) && (held !== null || document.activeElement.matches("input[type=text], input[type=number]"))) return;
+  const made = { pipeline, node, edits: JSON.stringify(edits) };
+  if (Object.keys(made).every((key) => made[key] === drawn[key])) return;
+  // What somebody is holding or writing in is not taken from under the hand, nor is the window of a colour closed.
+  const busy = held !== null || document.activeElement.matches("input[type=text], input[type=number], input[type=color]");
+  if (busy && place.contains(document.activeElement)) return;
+  drawn = made;
   const focused = document.activeElement?.id;
   const parts = [];
   const about = pipeline.nodes[node];
