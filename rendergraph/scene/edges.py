@@ -33,22 +33,25 @@ class Edges(Struct, frozen=True, eq=False):
 def is_solid(positions: Floats, triangles: npt.NDArray[np.integer]) -> bool:
     """Whether a mesh is closed and encloses a volume, so that from outside its front faces hide its back faces.
 
-    It is closed where each edge is run as often one way as the other. That is asked of sums of hashes, in one pass and
-    without sorting: edges that do not cancel each other give 0 once in 2⁶⁴ times.
+    It is closed where each edge is run as often one way as the other. With a number for each place, the sum of
+    u v (u - v) over the edges from u to v is 0 then, and as good as never else: of random numbers of 64 bits, a single
+    missing triangle gives 0 once in 2⁴¹. Over the edges of one triangle it is (a - b) (b - c) (a - c).
 
     Args:
         positions: float32 (n, 3); vertices with equal ones count as one.
         triangles: (m, 3), each below n.
     """
-    bits = (positions + np.float32(0)).view(np.uint32).astype(np.uint64)  # -0 is 0
-    x, y, z = bits.T
-    corners = _mixed(_mixed(_mixed(x + np.uint64(1)) + y) + z)[triangles]
-    following = np.roll(corners, -1, axis=1)
-    three = np.uint64(3)
-    if (_mixed(corners * three + following) - _mixed(following * three + corners)).sum(dtype=np.uint64) != 0:
+    first, second, third = triangles.T
+    x, y, z = (positions + np.float32(0)).view(np.uint32).astype(np.uint64).T  # -0 is 0
+    place = _mixed(_mixed(_mixed(x + np.uint64(1)) + y) + z)
+    a, b, c = place[first], place[second], place[third]
+    if ((a - b) * (b - c) * (a - c)).sum(dtype=np.uint64) != 0:
         return False
-    a, b, c = np.moveaxis(positions.astype(np.float64)[triangles], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) > 0
+    x, y, z = positions.astype(np.float64).T
+    around_x = y[second] * z[third] - z[second] * y[third]  # of the cross product of two corners
+    around_y = z[second] * x[third] - x[second] * z[third]
+    around_z = x[second] * y[third] - y[second] * x[third]
+    return float((x[first] * around_x + y[first] * around_y + z[first] * around_z).sum()) > 0  # six times the volume
 
 
 def _mixed(values: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
