@@ -58,7 +58,8 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
         """Minimum and maximum corner, float32 (3,) each."""
-        return self.positions.min(axis=0), self.positions.max(axis=0)
+        columns = np.ascontiguousarray(self.positions.T)  # along rows of three NumPy takes thirty times as long
+        return columns.min(axis=1), columns.max(axis=1)
 
     @cached_property
     def plane(self) -> tuple[float, float, float, float] | None:
