@@ -150,6 +150,11 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
         text = "this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
         walk.say(sweep, "RG101", text, key=True)
         raise InputError(walk.problems)
+    scene = value.get("scene")
+    if scene is not None and type(scene.data) is int and value.get("nodes") is value.get("extends") is None:
+        text = "this is no pipeline but a scene; draw it with: rendergraph run forward --scene FILE"
+        walk.say(scene, "RG013", text, key=True)
+        raise InputError(walk.problems)
     root = walk.root(value, _PATCH if patch else PIPELINE, _HOLDS)
     if root is None or (walk.problems and not keep_going):
         raise InputError(walk.problems)

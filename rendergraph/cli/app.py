@@ -52,7 +52,7 @@ _MEANT = {
     "lint": "check",
     "validate": "check",
     "show": "graph",
-    "list": "nodes",
+    "list": "pipelines",
     "benchmark": "bench",
     "profile": "bench",
     "help": "explain",
@@ -101,10 +101,17 @@ class _Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
-            meant = _MEANT.get(args[0].lower())
+            meant = _MEANT.get(args[0].lower()) or (f"run {args[0]}" if _is_drawn(args[0]) else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
             ctx.fail(f"there is no verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
+
+
+def _is_drawn(word: str) -> bool:
+    """Whether a word names what `run` takes."""
+    from rendergraph.resources import shipped_pipelines  # where a verb is misspelt alone
+
+    return word in shipped_pipelines() or word.endswith((".yaml", ".yml"))
 
 
 _EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code:<4} {meaning}" for code, meaning in EXIT_CODES.items())

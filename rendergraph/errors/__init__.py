@@ -204,13 +204,16 @@ def is_framework(module: str) -> bool:
 def nearest(word: str, words: Iterable[str]) -> str | None:
     """The word a user most likely meant, or None.
 
-    `difflib` alone misses shared beginnings (`kernal` for `kernel_size`), so words that are
-    near to one of the tokens count too.
+    `difflib` alone misses beginnings (`--env` for `--environment`, `kernal` for `kernel_size`), so the one word that
+    begins so comes first, and words that are near to one of the tokens count too.
     """
     from difflib import get_close_matches  # where something is misspelt alone
 
     known = sorted(words)
     lowered = {candidate.lower(): candidate for candidate in reversed(known)}
+    begun = [candidate for low, candidate in lowered.items() if low.startswith(word.lower())]
+    if len(begun) == 1 and len(word) > 2:
+        return begun[0]
     close = get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     if close:
         return lowered[close[0]]

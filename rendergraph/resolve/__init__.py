@@ -9,7 +9,7 @@ from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, Value, YamlLimits, from_plain
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.keys import Walk, plain
 from rendergraph.read import CODES, SIZE, checked, entries, read, word
 from rendergraph.resolve.files import Files
@@ -113,9 +113,18 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
             hint = suggestion(source, shipped)
             if (here := next(Path().glob(f"{source}.y*ml"), None)) is not None:
                 hint = f"; the file is named '{here}'"
+            elif source in shipped_scenes():
+                hint = f"; it is a scene, draw it with: rendergraph run forward --scene {source}"
             raise InputError(Problem("RG015", f"there is no shipped pipeline '{source}'{hint}"))
         return read(shipped[source], None, limits, keep_going=True)
-    return read(Path(source), None, limits, keep_going=True)
+    path = Path(source)
+    if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
+        from rendergraph.scene.meshes import MESHES  # what has another ending is rare
+
+        if path.suffix.lower() in MESHES:
+            text = f"this is no pipeline but a scene; draw it with: rendergraph run forward --scene {shown_file(path)}"
+            raise InputError(Problem("RG013", text, Place(str(path))))
+    return read(path, None, limits, keep_going=True)
 
 
 def _patch(patch: Path | Mapping[str, Any], files: Files, limits: YamlLimits) -> Value:

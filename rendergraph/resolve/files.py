@@ -89,7 +89,9 @@ class Files:
             if text in shipped:
                 return shipped[text], Roots((shipped[text].parent.resolve(),))
             hint = suggestion(text, shipped, most=20)  # there are more scenes than words of most kinds
-            if next(self.beside(value).parent.glob(f"{text}.*"), None):
+            if what == "scene" and text in shipped_pipelines():
+                hint = "; it is a pipeline"
+            elif next(self.beside(value).parent.glob(f"{text}.*"), None):
                 hint = "; a file beside this one is named with its extension"
             self.say(value.problem("RG015", f"there is no shipped {what} '{text}'{hint}"))
             return None

@@ -96,6 +96,9 @@ def test_version(cli: Any) -> None:
     ("words", "message"),
     [
         (["render", "forward"], "RG500 there is no verb 'render'; did you mean 'run'?; see 'rendergraph --help'"),
+        (["list"], "RG500 there is no verb 'list'; did you mean 'pipelines'?; see 'rendergraph --help'"),
+        (["forward"], "RG500 there is no verb 'forward'; did you mean 'run forward'?; see 'rendergraph --help'"),
+        (["my.yaml"], "RG500 there is no verb 'my.yaml'; did you mean 'run my.yaml'?; see 'rendergraph --help'"),
         (["rum"], "RG500 there is no verb 'rum'; did you mean 'run'?; see 'rendergraph --help'"),
         (
             ["run", "x", "--siez", "1x1"],

@@ -150,6 +150,8 @@ def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path
     ("words", "message"),
     [
         (["run", "forwrd"], "RG015 there is no shipped pipeline 'forwrd'; did you mean 'forward'?"),
+        (["run", "glass"], "'glass'; it is a scene, draw it with: rendergraph run forward --scene glass"),
+        (["run", "forward", "--scene", "bloom"], "RG015 there is no shipped scene 'bloom'; it is a pipeline"),
         (
             ["run", "forward", "--tap", "su.shadow_map=a.exr"],
             "--tap su.shadow_map: there is no node 'su'; did you",
@@ -177,6 +179,25 @@ def test_what_is_missing_or_wrong_exits_3(cli: Any, tmp_path: Path, words: list[
     assert told.code == 3
     assert any(problem["text"] in told.err for problem in told.json["error"]["problems"])
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "drawn"),
+    [
+        ("knot.glb", "glTF", "knot.glb"),
+        ("box.OBJ", "v 0 0 0", "box.OBJ"),
+        ("ball.yaml", "scene: 1\nobjects: {}", "FILE"),
+    ],
+)
+def test_a_scene_is_no_pipeline_and_how_it_is_drawn_is_said(
+    cli: Any, tmp_path: Path, name: str, text: str, drawn: str
+) -> None:
+    (tmp_path / name).write_text(text)
+    result = cli("run", name)
+    said = f"RG013 this is no pipeline but a scene; draw it with: rendergraph run forward --scene {drawn}"
+    assert (result.code, result.out) == (3, "")
+    assert said in result.err
+    assert len(result.err.splitlines()) in (1, 3)
 
 
 def test_several_mistakes_are_told_at_once(cli: Any) -> None:

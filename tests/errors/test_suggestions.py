@@ -18,6 +18,7 @@ MANY = ["ssao-disc", "ssao-gtao", "ssao_hemisphere", "bloom", "kernel_size", *(f
         ("ssao-dics", MANY, "; did you mean 'ssao-disc'?"),
         ("kernal", MANY, "; did you mean 'kernel_size'?"),
         ("kernel", MANY, "; did you mean 'kernel_size'?"),
+        ("--env", ["--environment", "--scene", "--size"], "; did you mean '--environment'?"),
         ("xyz", MANY, ""),
         ("xyz", ["b", "a"], "; there is a, b"),
         ("a", [f"a_{n}" for n in range(5)], "; did you mean one of a_0, a_1, a_2, a_3, a_4?"),
