@@ -96,12 +96,10 @@ class List(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         pictures: files by their names.
         drawings: SVG files that nothing makes: the file itself is what is edited.
-        not_yet: those of which nobody has found out how they were drawn.
     """
 
     pictures: dict[str, Picture]
     drawings: tuple[str, ...] = ()
-    not_yet: tuple[str, ...] = ()
 
 
 def read() -> List:
