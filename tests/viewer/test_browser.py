@@ -111,6 +111,15 @@ def test_a_slider_is_moved_by_keys_step_after_step(page: Hand) -> None:
         assert float(page.page.input_value("[id='p-display.exposure']")) == pytest.approx(count * step)
 
 
+def test_a_row_is_marked_while_the_hand_is_in_the_next(page: Hand) -> None:
+    page.choose("display")
+    page.page.fill("[id='p-display.exposure']", "1")
+    page.after(lambda: page.page.focus("[id='p-display.white']"))
+    page.page.wait_for_selector(".parameter.set [aria-label='Take back display.exposure']")
+    page.page.keyboard.type("1")
+    assert page.page.evaluate("document.activeElement.id") == "p-display.white"
+
+
 def mean(hand: Hand) -> float:
     """The mean of the red channel, as the page says it."""
     found = re.search(r"R: .*mean ([\d.]+)", hand.text("#texture"))

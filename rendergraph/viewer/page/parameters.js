@@ -3,7 +3,7 @@ import { h } from "./dom.js";
 import { send } from "./socket.js";
 
 let held = null;  // the setting a slider is moving, so that its way is one step of undo
-let drawn = {};   // what the inputs were made of
+let drawn = { made: [], kept: null };  // what the inputs were made of, and the row that was not made anew
 
 const set = (path, value) => {
   send({ do: "set", path, value, again: held === path });
@@ -103,7 +103,7 @@ function row(path, label, about, changed, fields) {
     ? h("button", { class: "back", title: "Take the change back", "aria-label": `Take back ${path}`, onclick: () => send({ do: "drop", path }) }, "↺")
     : h("span");
   const tip = [about.doc, about.takes && `Takes ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
-  return h("div", { class: changed ? "parameter set" : "parameter", title: tip },
+  return h("div", { class: changed ? "parameter set" : "parameter", title: tip, "data-path": path },
     h("span", {}, h("label", { for: id }, label)),
     h("span", { class: "field" }, ...fields, about.unit ? h("span", { class: "quiet" }, about.unit) : null), back);
 }
@@ -146,12 +146,12 @@ function linkRow(graph, node, name, about, edits) {
 
 // The pipeline's own parameters, where no node is chosen; else everything that the node can be told.
 export function showParameters(place, pipeline, node, edits) {
-  const made = { pipeline, node, edits: JSON.stringify(edits) };
-  if (Object.keys(made).every((key) => made[key] === drawn[key])) return;
   // What somebody is holding or writing in is not taken from under the hand, nor is the window of a colour closed.
   const busy = held !== null || document.activeElement.matches("input[type=text], input[type=number], input[type=color]");
-  if (busy && place.contains(document.activeElement)) return;
-  drawn = made;
+  const kept = busy && place.contains(document.activeElement) ? document.activeElement.closest(".parameter") : null;
+  const made = [pipeline, node, JSON.stringify(edits)];
+  if (made.every((part, i) => part === drawn.made[i]) && (drawn.kept === null || drawn.kept === kept)) return;
+  drawn = { made, kept };
   const focused = document.activeElement?.id;
   const parts = [];
   const about = pipeline.nodes[node];
@@ -182,6 +182,12 @@ export function showParameters(place, pipeline, node, edits) {
     const button = h("button", { onclick: () => set(`${name}.enabled`, true) }, "enable");
     parts.push(h("p", {}, `${name} is disabled `, button));
   }
-  place.replaceChildren(...parts);
+  const at = kept ? parts.findIndex((part) => part.dataset.path === kept.dataset.path) : -1;
+  if (at < 0) place.replaceChildren(...parts);
+  else {  // a row that is moved loses the focus, so the others go around it
+    for (const other of [...place.children]) if (other !== kept) other.remove();
+    kept.before(...parts.slice(0, at));
+    kept.after(...parts.slice(at + 1));
+  }
   if (focused && focused.startsWith("p-")) document.getElementById(focused)?.focus();
 }
