@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare import Facts, InOut, Input, LightFacts, TextureInfo
-from rendergraph.document import Value
-from rendergraph.errors import InputError, Problem, node_named, suggestion
+from rendergraph.declare import Facts, LightFacts, TextureInfo
+from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
+from rendergraph.link.connect import Connector
 from rendergraph.link.disabled import lost, mark_unlit, past, take_out
 from rendergraph.link.graph import Endpoint, Graph, GraphNode, upstream_first
 from rendergraph.link.infer import Infer, made_ports
@@ -20,7 +20,7 @@ from rendergraph.link.names import Draft, Link, References, Wrong, line_of
 from rendergraph.link.order import cycles, needs, sources, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.resolve import NodeSpec, PipelineSpec
-from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, Signature, TextureDesc
+from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, TextureDesc
 
 
 def link(
@@ -128,13 +128,14 @@ class _Linker:
         types = self._types()
         references = References(self.spec, types)
         nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
+        connector = Connector(self.spec, self.catalog, references, self._say)
         for draft in nodes.values():
-            self._connect(draft, references)
+            connector.connect(draft)
         if self.environment is None:
             mark_unlit(nodes)
         written, nodes = nodes, take_out(nodes, references)
         for draft in nodes.values():
-            self._complete(draft, written)
+            connector.complete(draft, written)
         outputs = self._outputs(references, written)
         order = upstream_first(sources(nodes))
         knots = cycles(nodes) if len(order) < len(nodes) else []
@@ -212,117 +213,6 @@ class _Linker:
         ports, inputs = node_type.cls.ports(), node_type.cls.inputs()
         return Draft(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
 
-    # Links ------------------------------------------------------------------------------------------------------------
-
-    def _connect(self, draft: Draft, references: References) -> None:
-        cls = draft.type.cls
-        inputs, groups = draft.inputs, cls.groups()
-        for name, value in draft.spec.inputs.items():
-            if name in inputs:
-                self._input(draft, references, name, inputs[name], value)
-            elif name in groups:
-                self._group(draft, references, name, groups[name], value)
-            else:
-                known = [*inputs, *groups]
-                hint = suggestion(name, known) if known else "; it takes none"
-                if name in cls.parameters():
-                    hint = f"; '{name}' is a param, move it to `params`"
-                text = f"node type '{draft.type.name}' has no input '{name}'{hint}"
-                self._say(value.problem("RG111", text, key=True))
-
-    def _complete(self, draft: Draft, written: Mapping[str, Draft]) -> None:
-        """Say which required inputs lack a link."""
-        by_link: dict[int, list[str]] = {}
-        for name, port in draft.inputs.items():
-            if draft.links[name] or port.optional or name in draft.failed or self._dropped(draft, name):
-                continue
-            if isinstance(port, Input) and port.takes_scene and name not in draft.lost:
-                continue
-            if name in draft.lost:
-                by_link.setdefault(id(draft.lost[name].value), []).append(name)
-            else:
-                text = f"input '{name}' of {node_named(draft.spec.id, draft.type.name)} is not connected"
-                self._say(draft.spec.value.problem("RG114", text + self._source_for(draft, port), key=True))
-        for inputs in by_link.values():
-            end = draft.lost[inputs[0]].source
-            needed = f"needs '{end}'" if len(inputs) == 1 else f"need '{end.node}'"
-            listed = ", ".join(f"'{draft.spec.id}.{name}'" for name in inputs)
-            self._say(lost(f"{listed} {needed}", draft.lost[inputs[0]], written))
-
-    def _dropped(self, draft: Draft, name: str) -> bool:
-        """Whether a link was left out for a mistake that has been said."""
-        path = ("nodes", draft.spec.id.removeprefix(draft.spec.scope), "inputs")
-        return path in self.spec.dropped or (*path, name) in self.spec.dropped
-
-    def _input(self, draft: Draft, references: References, name: str, port: Input | InOut, value: Value) -> None:
-        if isinstance(value.data, list):
-            if not (isinstance(port, Input) and port.many):
-                text = f"'{draft.spec.id}.{name}' takes one link, not a list; write one as in node.port"
-                self._say(value.problem("RG115", text))
-                draft.failed.add(name)
-                return
-            for part in value.data:
-                self._follow(draft, references, name, part, name)
-        elif value.data is not None:
-            self._follow(draft, references, name, value, name)
-
-    def _follow(self, draft: Draft, references: References, name: str, value: Value, wanted: str) -> None:
-        try:
-            found = references.follow(draft.spec.scope, value, wanted)
-        except Wrong as wrong:
-            draft.failed.add(name)
-            if wrong.problem is not None:
-                self._say(wrong.problem)
-        else:
-            if found is not None:
-                draft.links[name].append(found)
-
-    def _group(self, draft: Draft, references: References, group: str, members: Sequence[str], value: Value) -> None:
-        """Connect every member that is not connected on its own to the port of its name."""
-        missing = [name for name in members if name not in draft.spec.inputs]
-        if value.data is None:
-            return
-        node, _, previous = str(value.data).partition("@")
-        scope = draft.spec.scope
-        if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
-            text = f"'{draft.spec.id}.{group}' is a group, it takes a node's id and no port"
-            self._say(value.problem("RG113", text))
-        elif not references.is_known(scope, node):
-            self._say(references.no_node(scope, node, value))
-        else:
-            offered = references.outputs_of(scope, node)
-            lacking = []
-            for name in missing:
-                if name in offered:
-                    self._follow(draft, references, name, value, name)
-                elif offered:
-                    optional = draft.inputs[name].optional
-                    lacking += [] if optional else [name]
-            if lacking:
-                listed = ", ".join(f"'{name}'" for name in lacking)
-                text = f"'{draft.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
-                self._say(value.problem("RG112", f"{text}; link {listed} beside the group"))
-            if offered and not lacking:
-                return
-        draft.failed.update(missing)
-
-    def _source_for(self, draft: Draft, port: Input | InOut) -> str:
-        """A port that the file already has and that would fit."""
-        wanted = port.semantic
-        for other in self.spec.nodes.values():
-            if other.scope != draft.spec.scope or other.id == draft.spec.id or other.type not in self.catalog:
-                continue
-            try:
-                outputs = self.catalog.get(other.type).cls.outputs()
-            except InputError:
-                continue
-            for name, candidate in outputs.items():
-                meant = getattr(candidate, "signature", None) or getattr(candidate, "semantic", None)
-                if wanted is not None and meant is not None and meant.name == wanted.name:
-                    return f"; '{other.id.removeprefix(other.scope)}.{name}' would fit"
-        what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
-        return f"; it takes {what}"
-
     def _outputs(self, references: References, written: Mapping[str, Draft]) -> dict[str, Link]:
         found: dict[str, Link] = {}
         for name, value in self.spec.outputs.items():
@@ -340,8 +230,6 @@ class _Linker:
             else:
                 self._say(lost(f"output '{name}' shows '{led.source}'", led, written))
         return found
-
-    # Textures ---------------------------------------------------------------------------------------------------------
 
     def _textures(self, order: list[str], nodes: Mapping[str, Draft], infer: Infer) -> dict[Endpoint, TextureInfo]:
         """What every port turns out to be; in this order a rule hardly ever asks further up."""
