@@ -171,6 +171,8 @@ class Server:
             pass  # it is gone
         finally:
             self._pages.discard(page)
+            if self.desk.said({"do": "hold", "on": False}):  # it may have gone with something in its hand
+                self._want()
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, Exception):
                 await sending

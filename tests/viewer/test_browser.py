@@ -120,6 +120,41 @@ def test_a_row_is_marked_while_the_hand_is_in_the_next(page: Hand) -> None:
     assert page.page.evaluate("document.activeElement.id") == "p-display.white"
 
 
+def test_what_was_chosen_stands_until_its_picture_comes_and_undo_is_seen_where_it_was_written(page: Hand) -> None:
+    page.choose("display")
+    # Everything that the list shows from the choice to its picture.
+    page.page.evaluate(
+        """() => { const seen = window.seen = new Set();
+        new MutationObserver(() => seen.add(document.getElementById('p-display.curve').value))
+          .observe(document.getElementById('parameters'), {childList: true}); }"""
+    )
+    page.after(lambda: page.page.select_option("[id='p-display.curve']", "aces"))
+    assert page.page.evaluate("[...window.seen]") == ["aces"]
+    field = page.page.locator("[id='p-display.exposure']")
+    page.after(lambda: field.fill("2") or page.page.keyboard.press("Enter"))
+    page.page.wait_for_selector("[aria-label='Take back display.exposure']")
+    page.after(lambda: page.page.keyboard.press("Control+z"))
+    page.page.wait_for_selector("[aria-label='Take back display.exposure']", state="detached")
+    page.page.wait_for_function("document.getElementById('p-display.exposure').value === '0'")
+    page.after(lambda: page.page.keyboard.type("3") or page.page.keyboard.press("Enter"))  # the field is still at hand
+    assert field.input_value() == "3"
+
+
+def test_the_way_of_a_colour_is_one_step_and_its_numbers_follow(page: Hand) -> None:
+    page.choose("light")
+    wheel = page.page.locator("[id='p-light.ambient']")
+    parts = [page.page.locator(f"[id='p-light.ambient-{name}']") for name in "RGB"]
+    wheel.focus()
+    for color in ("#ff0000", "#00ff00", "#0000ff"):  # as a colour's window tells of a hand in it
+        wheel.evaluate(f"(e) => {{ e.value = '{color}'; e.dispatchEvent(new Event('input', {{bubbles: true}})); }}")
+    assert [part.input_value() for part in parts] == ["0", "0", "1"]
+    page.after(lambda: wheel.evaluate("(e) => e.dispatchEvent(new Event('change', {bubbles: true}))"))
+    assert wheel.input_value() == "#0000ff"
+    page.after(lambda: page.page.click("#undo"))
+    assert page.page.is_disabled("#undo")
+    assert [part.input_value() for part in parts] == ["0.03", "0.03", "0.03"]
+
+
 def mean(hand: Hand) -> float:
     """The mean of the red channel, as the page says it."""
     found = re.search(r"R: .*mean ([\d.]+)", hand.text("#texture"))
@@ -147,10 +182,19 @@ def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
     page.page.fill("#file", "soft.yaml")
     page.page.click("dialog button[value=save]")
     page.page.wait_for_selector("#link:has-text('saved soft.yaml')")
+    page.page.click("#save")
+    page.page.click("dialog button[value=save]")
+    page.page.wait_for_selector("#problems:has-text('RG531')")
+    page.page.click("#save")
+    page.page.fill("#file", "other.yaml")
+    page.page.keyboard.press("Escape")
     saved = gl.render(rg.load(tmp_path / "soft.yaml"), outputs=("image",))["image"]
     direct = gl.render(rg.load("forward", size=SIZE, sets=["shadows.type=shadow_vsm"]), outputs=("image",))["image"]
     assert (saved == direct).all()
     assert mean(page) == pytest.approx(direct[..., 0].mean(), rel=1e-3)
+    page.after(lambda: page.page.click("#undo"))
+    assert page.page.is_hidden("#problems"), "what was refused is past"
+    assert not (tmp_path / "other.yaml").exists()
 
 
 def test_an_input_that_takes_many_takes_another_and_lets_go_of_one(
@@ -230,6 +274,9 @@ def test_two_tabs_are_one_view(page: Hand) -> None:
     page.choose("display")
     page.after(lambda: other.page.fill("[id='p-display.exposure']", "1") or other.page.keyboard.press("Enter"))
     assert page.page.input_value("[id='p-display.exposure']") == "1"
+    other.page.locator("#stops").fill("2")
+    page.page.wait_for_selector("#stops-value:has-text('2 EV')")
+    assert page.page.input_value("#stops") == "2"
     other.page.close()
     page.after(lambda: page.page.click("#undo"))
     assert other.wrong == []

@@ -149,6 +149,18 @@ def test_a_drag_is_drawn_without_loss_at_its_end(served: Any) -> None:
         assert tab.hear("state", moved=False)
 
 
+def test_a_page_that_goes_in_the_middle_of_a_drag_lets_go(served: Any) -> None:
+    with served.tab() as stays:
+        stays.hear("picture", still=True)
+        with served.tab() as goes:
+            goes.say(do="hold", on=True)
+            goes.say(do="camera", orbit=[0.1, 0])
+            stays.hear("picture", still=False)
+        assert stays.hear("picture", still=True)
+        stays.say(do="camera", name="main")
+        assert stays.hear("state", moved=False)
+
+
 def test_what_is_played_goes_on_and_stops(served: Any) -> None:
     with served.tab() as tab:
         tab.say(do="frame", number=7)

@@ -1,7 +1,7 @@
 // The page: one state that comes from the server, drawn; whatever a hand does goes there as a message.
 import { $, choices, h, short } from "./dom.js";
 import { preview, showGraph, showPreviews } from "./graph.js";
-import { showParameters } from "./parameters.js";
+import { showParameters, startParameters } from "./parameters.js";
 import { address, showAgainst, showPicture, showPixel, showTexture, startPicture } from "./picture.js";
 import { showMemory, showTimes } from "./plan.js";
 import { connect, on, send, tell } from "./socket.js";
@@ -51,6 +51,7 @@ function draw() {
   $("save").disabled = $("copy").disabled = !state.flags.length;
   $("play").setAttribute("aria-pressed", state.playing);
   $("play").textContent = state.playing ? "Pause" : "Play";
+  if (document.activeElement !== $("stops")) $("stops").value = state.stops ?? 0;
   $("stops-value").textContent = `${state.stops ?? 0} EV`;
   showTimes($("times"), picture, history);
   showChanges();
@@ -92,7 +93,7 @@ function showChanges() {
 const quoted = (word) => (/^[\w./=@+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 const flags = () => state.flags.map((flag) => `-s ${quoted(flag)}`).join(" ");
 
-on("state", (facts) => { state = facts; showFrame(facts.frame); draw(); });
+on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); });  // a refusal is past
 on("pipeline", (facts) => { pipeline = facts; draw(); });
 on("picture", (facts, files) => {
   picture = facts;
@@ -140,7 +141,7 @@ function start() {
   $("frame").onchange = () => { if ($("frame").checkValidity()) send({ do: "frame", number: Number($("frame").value) }); };
   $("scrub").oninput = () => send({ do: "frame", number: Number($("scrub").value) });
   $("copy").onclick = () => navigator.clipboard.writeText(flags()).then(() => { $("link").textContent = "copied"; });
-  $("save").onclick = () => $("saving").showModal();
+  $("save").onclick = () => { $("saving").returnValue = ""; $("saving").showModal(); };
   $("saving").onclose = () => { if ($("saving").returnValue === "save") send({ do: "save", name: $("file").value }); };
   TABS.forEach((tab, i) => {
     $(`tab-${tab}`).onclick = () => chooseTab(tab);
@@ -158,6 +159,7 @@ function start() {
     send({ do: event.shiftKey ? "redo" : "undo" });
   });
   startPicture();
+  startParameters($("parameters"));
   chooseTab("graph");
   const kept = $("kept");  // a page that was exported holds what it shows
   if (!kept) return connect();

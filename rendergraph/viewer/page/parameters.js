@@ -2,13 +2,27 @@
 import { h } from "./dom.js";
 import { send } from "./socket.js";
 
-let held = null;  // the setting a slider is moving, so that its way is one step of undo
+let held = null;     // the setting that a slider or a colour's window is moving, so that its way is one step of undo
+let writing = null;  // the field that somebody is writing in
 let drawn = { made: [], kept: null };  // what the inputs were made of, and the row that was not made anew
 
 const set = (path, value) => {
   send({ do: "set", path, value, again: held === path });
   if (held !== null) held = path;
 };
+
+const hold = () => { held ??= ""; send({ do: "hold", on: true }); };
+const release = () => { if (held !== null) { held = null; send({ do: "hold", on: false }); } };
+
+// What a setting is since it was changed, which the pipeline says after the next picture, or never where it is wrong.
+function since(edits, path, value) {
+  if (!(path in edits)) return value;
+  try {
+    return JSON.parse(edits[path]);
+  } catch {
+    return edits[path];  // a word
+  }
+}
 
 const asHex = (color) => "#" + color.map((x) => {
   const curve = x <= 0.0031308 ? x * 12.92 : 1.055 * x ** (1 / 2.4) - 0.055;
@@ -44,12 +58,9 @@ function numberField(path, id, about) {
     const range = h("input", {
       type: "range", id: `${id}-slider`, min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
     });
-    range.addEventListener("pointerdown", () => { held = ""; send({ do: "hold", on: true }); });
+    range.addEventListener("pointerdown", hold);
     range.addEventListener("input", () => { number.value = range.value; set(path, Number(range.value)); });
-    const released = () => { if (held !== null) { held = null; send({ do: "hold", on: false }); } };
-    range.addEventListener("pointerup", released);
-    range.addEventListener("pointercancel", released);
-    range.addEventListener("change", released);
+    for (const end of ["pointerup", "pointercancel", "change"]) range.addEventListener(end, release);
     fields.unshift(range);
   }
   return fields;
@@ -58,10 +69,21 @@ function numberField(path, id, about) {
 function colorField(path, id, about) {
   const color = Array.isArray(about.value) ? about.value : [about.value, about.value, about.value];
   const wheel = h("input", { type: "color", id, value: asHex(color) });
-  wheel.addEventListener("input", () => set(path, asColor(wheel.value)));
+  wheel.addEventListener("input", () => {
+    if (held === null) hold();
+    const chosen = asColor(wheel.value);
+    parts.forEach((part, i) => { part.value = chosen[i]; });
+    set(path, chosen);
+  });
+  for (const end of ["change", "blur"]) wheel.addEventListener(end, release);
   const parts = color.map((part, i) => {
-    const field = h("input", { type: "number", step: "any", min: about.min, max: about.max, value: part, "aria-label": `${path}, ${"RGB"[i]}` });
-    field.addEventListener("change", () => set(path, parts.map((one) => Number(one.value))));
+    const name = "RGB"[i];
+    const limits = { min: about.min, max: about.max, step: "any" };
+    const field = h("input", { type: "number", id: `${id}-${name}`, ...limits, value: part, "aria-label": `${path}, ${name}` });
+    field.addEventListener("change", () => {
+      if (field.value !== "" && field.checkValidity()) set(path, parts.map((one) => Number(one.value)));
+      else field.reportValidity();
+    });
     return field;
   });
   return [wheel, ...parts];
@@ -108,6 +130,11 @@ function row(path, label, about, changed, fields) {
     h("span", { class: "field" }, ...fields, about.unit ? h("span", { class: "quiet" }, about.unit) : null), back);
 }
 
+function setting(path, label, about, edits) {
+  const now = { ...about, value: since(edits, path, about.value) };
+  return row(path, label, about, path in edits, field(path, `p-${path}`, now));
+}
+
 // Outputs that an input takes, of nodes that do not wait for its own: first those that mean just that.
 function fitting(graph, node, about) {
   const readers = new Map();
@@ -130,14 +157,15 @@ function fitting(graph, node, about) {
 
 function linkRow(graph, node, name, about, edits) {
   const path = `${node}.${name}`;
-  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...about.links, ...fitting(graph, node, about)])];
+  const links = [since(edits, path, about.links)].flat().filter(Boolean);
+  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...fitting(graph, node, about)])];
   // An input that takes many has a list for each, and one more to add to them.
-  const now = about.many ? [...about.links, ""] : [about.links[0] ?? ""];
+  const now = about.many ? [...links, ""] : [links[0] ?? ""];
   const lists = now.map((link, at) => {
     const list = h("select", { id: at ? `p-${path}-${at}` : `p-${path}`, "aria-label": at ? `${path}, ${at + 1}` : null, onchange: () => {
       const next = now.with(at, list.value).filter(Boolean);
       set(path, about.many && next.length ? next : next[0] ?? null);
-    } }, ...words.map((word) => h("option", { value: word }, word || (about.links.length && at === about.links.length ? "add another" : "nothing"))));
+    } }, ...words.map((word) => h("option", { value: word }, word || (links.length && at === links.length ? "add another" : "nothing"))));
     list.value = link;
     return list;
   });
@@ -147,8 +175,8 @@ function linkRow(graph, node, name, about, edits) {
 // The pipeline's own parameters, where no node is chosen; else everything that the node can be told.
 export function showParameters(place, pipeline, node, edits) {
   // What somebody is holding or writing in is not taken from under the hand, nor is the window of a colour closed.
-  const busy = held !== null || document.activeElement.matches("input[type=text], input[type=number], input[type=color]");
-  const kept = busy && place.contains(document.activeElement) ? document.activeElement.closest(".parameter") : null;
+  const hand = held !== null ? document.activeElement : writing;
+  const kept = hand && place.contains(hand) ? hand.closest(".parameter") : null;
   const made = [pipeline, node, JSON.stringify(edits)];
   if (made.every((part, i) => part === drawn.made[i]) && (drawn.kept === null || drawn.kept === kept)) return;
   drawn = { made, kept };
@@ -158,22 +186,19 @@ export function showParameters(place, pipeline, node, edits) {
   if (!about) {
     const own = Object.entries(pipeline.parameters);
     parts.push(h("p", { class: "doc" }, own.length ? "Parameters of the pipeline." : "Choose a node, here or in the graph."));
-    for (const [name, found] of own) parts.push(row(name, name, found, name in edits, field(name, `p-${name}`, found)));
+    for (const [name, found] of own) parts.push(setting(name, name, found, edits));
   } else {
     const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
       ...[...new Set([about.type, ...about.types])].map((word) => h("option", { value: word }, word)));
-    types.value = about.type;
+    types.value = since(edits, `${node}.type`, about.type);
     const enabled = h("input", { type: "checkbox", id: `p-${node}.enabled`, onchange: () => set(`${node}.enabled`, enabled.checked) });
-    enabled.checked = true;
+    enabled.checked = since(edits, `${node}.enabled`, true);
     parts.push(h("p", { class: "doc" }, about.doc));
     parts.push(row(`${node}.type`, "type", {}, `${node}.type` in edits, [types]));
     parts.push(row(`${node}.enabled`, "enabled", {}, `${node}.enabled` in edits, [enabled]));
     const parameters = Object.entries(about.parameters);
     if (parameters.length) parts.push(h("h2", {}, "Parameters"));
-    for (const [name, found] of parameters) {
-      const path = `${node}.${name}`;
-      parts.push(row(path, name, found, path in edits, field(path, `p-${path}`, found)));
-    }
+    for (const [name, found] of parameters) parts.push(setting(`${node}.${name}`, name, found, edits));
     const inputs = Object.entries(about.inputs);
     if (inputs.length) parts.push(h("h2", {}, "Inputs"));
     for (const [name, found] of inputs) parts.push(linkRow(pipeline.graph, node, name, found, edits));
@@ -188,6 +213,16 @@ export function showParameters(place, pipeline, node, edits) {
     for (const other of [...place.children]) if (other !== kept) other.remove();
     kept.before(...parts.slice(0, at));
     kept.after(...parts.slice(at + 1));
+    return;
   }
-  if (focused && focused.startsWith("p-")) document.getElementById(focused)?.focus();
+  if (!focused?.startsWith("p-")) return;
+  const again = document.getElementById(focused);
+  again?.focus();
+  if (again?.matches("input[type=number], input[type=text]")) again.select();  // as a field is that Tab leads to
+}
+
+// A field is written in from the first letter until it is taken over or left.
+export function startParameters(place) {
+  place.addEventListener("input", ({ target }) => { if (target.matches("input[type=number], input[type=text]")) writing = target; });
+  for (const end of ["change", "focusout"]) place.addEventListener(end, () => { writing = null; });
 }
