@@ -240,20 +240,23 @@ class Painter:
     def _against(self, question: Against) -> Answer:
         if self._shown is None or self._planned is None:
             return Answer()
-        shown, size = self._shown, self._planned.linked.graph.size
+        shown, linked = self._shown, self._planned.linked
         info, mine = shown.frame.info(shown.name), shown.frame[shown.name]
-        expanded = self._expand(replace(question.selection, size=size), shown.ask)
+        # As `compare` draws it: on the same scene, by the same camera and at the same size.
+        scene, camera = linked.spec.scene or question.selection.scene, shown.ask.selection.camera
+        other = replace(question.selection, size=linked.graph.size, scene=scene, camera=camera)
+        expanded = self._expand(other, shown.ask)
         _, frame = self._drawn(expanded, shown.ask)
         name = list(expanded.wanted)[-1]
         theirs = frame[name]
-        other = images.viewable_as(_exposed(theirs, frame.info(name), shown.ask.stops), frame.info(name))
+        b = images.viewable_as(_exposed(theirs, frame.info(name), shown.ask.stops), frame.info(name))
         facts: dict[str, Any] = {
             "name": expanded.linked.graph.name,
             "frame_ms": frame.frame_ms["median"],
             "passes": [dict(entry) for entry in frame.passes],
         }
-        files = {"other": self._encoded(other, ".png")}
-        a, b = images.viewable_as(_exposed(mine, info, shown.ask.stops), info), other
+        files = {"other": self._encoded(b, ".png")}
+        a = images.viewable_as(_exposed(mine, info, shown.ask.stops), info)
         if a.shape == b.shape and a.shape[-1] == 3:
             figures, flip = measure(a, b)
             facts["figures"] = figures.as_json()

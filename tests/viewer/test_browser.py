@@ -267,6 +267,11 @@ def test_the_keyboard_alone_is_enough(page: Hand) -> None:
     page.after(lambda: page.page.keyboard.press("Control+z"))
 
 
+def test_a_window_that_becomes_small_holds_the_page(page: Hand) -> None:
+    page.page.set_viewport_size({"width": 420, "height": 700})
+    page.page.wait_for_function("document.documentElement.scrollWidth <= 420")
+
+
 def test_two_tabs_are_one_view(page: Hand) -> None:
     other = Hand(page.page.context.new_page())
     other.open(page.page.url)

@@ -134,6 +134,15 @@ def test_against_itself_nothing_differs_and_against_another_something(painter: P
     assert other.files.keys() == {"other", "difference", "flip"}
 
 
+def test_what_it_is_compared_with_is_drawn_on_its_scene_by_its_camera(painter: Painter, tmp_path: Path) -> None:
+    (tmp_path / "ball.yaml").write_text(
+        "scene: 1\nobjects: {ball: {shape: sphere, radius: 0.5}}\n"
+        "cameras: {main: {eye: [0, 0, 3], target: [0, 0, 0]}, side: {eye: [9, 0, 0], target: [0, 0, 0]}}\n"
+    )
+    painter.answer(Ask(replace(FORWARD, scene=str(tmp_path / "ball.yaml"), camera="side")))
+    assert painter.answer(Against(FORWARD)).facts["figures"]["rmse"] == 0
+
+
 def test_a_variant_reads_back_to_what_was_on_the_page(painter: Painter, tmp_path: Path) -> None:
     changed = replace(FORWARD, sets=("display.exposure=1.5", "shadows.type=shadow_vsm", "light.smith=fast"))
     painter.answer(Ask(changed))
