@@ -61,7 +61,12 @@ class Lighting(Node):
     terms: Literal["all", "ambient", "diffuse", "specular", "emissive"] = define(
         default="all", doc="One term alone, to look at; the four sum to the whole."
     )
-    ambient: Color = param(default=0.03, min=0, glsl="vec3", doc="Radiance from all sides, a number or RGB.")
+    ambient: Color = param(
+        default=0.03,
+        min=0,
+        glsl="vec3",
+        doc="Radiance from all sides, a number or RGB; an environment takes its place.",
+    )
     environment_part: Literal["all", "diffuse", "specular", "table"] = define(
         default="all",
         doc="One part of the environment's light alone, to look at: `table` has its two factors of f0 and f90.",

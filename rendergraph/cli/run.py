@@ -88,12 +88,12 @@ def command(
     Examples:
       rendergraph run forward
       rendergraph run forward --scene spheres --size 640x360 -o spheres.exr --json
-      rendergraph run forward -s light.ambient=0 -o image=dark.jpg --tap sun.shadow_map=depth.exr
+      rendergraph run forward -s display.exposure=-2 -o image=dark.jpg --tap sun.shadow_map=depth.exr
       rendergraph run forward --tap-all inside
       rendergraph run forward --frames 1-3 --size 320x180 -o turn.####.png
       rendergraph run forward --frames 1-12 --size 64x36 --executor processes:2 -o turn.####.png
       rendergraph run my.yaml --watch
-      rendergraph run spheres.exr -s light.ambient=0 -o darker.png
+      rendergraph run spheres.exr -s display.exposure=-1 -o darker.png
     """
     from rendergraph.session import RenderOptions
     from rendergraph.session.gpu import Gpu

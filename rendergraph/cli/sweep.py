@@ -136,7 +136,7 @@ def command(
 
     \b
     Examples:
-      rendergraph sweep forward -x shadows.taps=1,2,4 -x light.ambient=0,[0.1,0.1,0.2] --size 320x180 -o out
+      rendergraph sweep forward -x shadows.taps=1,2,4 -x light.shading=phong,pbr --size 320x180 -o out
       rendergraph sweep ssao-hemisphere -x ao.samples=8,16 --metric ao.occlusion --size 96x54 --csv -o ao
       rendergraph sweep ssao-hemisphere -x ao.samples=8:64:8 -x ao.radius=log:0.1:10:5 --list
       rendergraph sweep ssao-hemisphere -x ao.samples=8:64 -x ao.radius=log:0.1:10 --samples 4 --size 64x36 -o lhs

@@ -383,7 +383,10 @@ def test_scenes_are_completed_and_checked(editor: Editor, desk: Path) -> None:
     ("at", "shown"),
     [
         ("|taps", "Tests along a side: 4 means 4×4, 1 is the plain hard shadow.\n\nDefault 3, 1 to 16. "),
-        ("|ambient", "Radiance from all sides, a number or RGB.\n\nDefault 0.03, at least 0. "),
+        (
+            "|ambient",
+            "Radiance from all sides, a number or RGB; an environment takes its place.\n\nDefault 0.03, at least 0. ",
+        ),
         ("|shadow_pcf", "Shadows from a map by percentage-closer filtering.\n\nThe mean of N×N depth tests"),
         ("{|shadow_map: sun", "Depth as the lights see it. (shadow\\_map, texture2d\\_array)"),
         ("|size", "Width and height in pixels."),

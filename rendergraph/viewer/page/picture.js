@@ -5,6 +5,7 @@ import { send } from "./socket.js";
 const urls = new Map();
 let size = [1, 1];
 let compared = null;
+let place = null;  // whose values are asked for
 
 // A file as an address; the one before it under the same name is given back.
 export function address(name, blob) {
@@ -22,6 +23,7 @@ export function showPicture(facts, files) {
   picture.dataset.count = Number(picture.dataset.count ?? 0) + 1;
   picture.dataset.still = facts.still;
   if (facts.still) size = facts.size;
+  if (facts.still && place) send({ do: "pixel", ...place });  // they are others now
   fit();
   if (compared) showAgainst(compared.facts, compared.files);
 }
@@ -86,7 +88,8 @@ export function startPicture() {
       const y = (event.clientY - box.top) / box.height;
       if (x >= 0 && x < 1 && y >= 0 && y < 1 && event.timeStamp - asked > 60) {
         asked = event.timeStamp;
-        send({ do: "pixel", x, y });
+        place = { x, y };
+        send({ do: "pixel", ...place });
       }
       return;
     }
