@@ -96,6 +96,8 @@ class Space:
         """
         if isinstance(axes, Space):
             return axes
+        if isinstance(axes, str):
+            axes = [axes]
         found = [_from_python(path, values) for path, values in axes.items()] if isinstance(axes, Mapping) else axes
         return cls(tuple(map(_axis, found)), tuple(map(tuple, zipped)), samples, sampling, seed)
 
@@ -154,7 +156,7 @@ class Space:
             raise InputError(problems)
 
 
-Axes: TypeAlias = "Space | Sequence[Axis | str] | Mapping[str, Sequence[Any] | str]"
+Axes: TypeAlias = "Space | str | Sequence[Axis | str] | Mapping[str, Any]"
 
 
 def parse_axis(text: str) -> Axis:
@@ -240,9 +242,11 @@ def _axis(given: Axis | str) -> Axis:
         raise InputError(Problem("RG524", str(error))) from None
 
 
-def _from_python(path: str, values: Sequence[Any] | str) -> Axis | str:
+def _from_python(path: str, values: Iterable[Any] | str) -> Axis | str:
     if isinstance(values, str):
         return f"{path}={values}"
+    if not isinstance(values, Iterable):
+        values = [values]  # a single one
     return Axis(path, tuple(value if isinstance(value, str) else json.dumps(value) for value in values))
 
 

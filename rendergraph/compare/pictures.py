@@ -21,16 +21,18 @@ from rendergraph.compare.reference import (
 from rendergraph.compare.timing import Times, times_of
 from rendergraph.compare.values import Comparison, Difference, Reference, Result, light_error, not_finite_pixels
 from rendergraph.diff import diff
+from rendergraph.errors import Problem, UsageError
 from rendergraph.farm.bundle import bundled
 from rendergraph.farm.choose import Where, chosen
 from rendergraph.link import Graph
 from rendergraph.session import stages
+from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.session.progress import Progress, shown
 from rendergraph.stamps import looking
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
-    from rendergraph.session import Frame, Pipeline
+    from rendergraph.session import Frame
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Planned
 
@@ -52,7 +54,7 @@ class _Drawn:
 
 
 def compare(
-    pipelines: Sequence[Pipeline],
+    pipelines: Sequence[Pipeline | str | Path],
     reference: Path | Pipeline | None = None,
     *,
     metric: str | None = None,
@@ -69,7 +71,7 @@ def compare(
     """Draw pipelines on one scene, with one camera and at one size, and compare what comes out.
 
     Args:
-        pipelines: what is compared; all are drawn with the scene and at the size of the first.
+        pipelines: what is compared, shipped names and files too; all are drawn with the first one's scene and size.
         reference: a picture file or another pipeline; the first of `pipelines` by default.
         metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
         names: what the pipelines are called; as their files by default.
@@ -82,15 +84,19 @@ def compare(
         devices, timeout: as for `sweep`.
 
     Raises:
+        UsageError: there is nothing to compare.
         InputError: a mistake in a file, or the pictures cannot be compared.
         RenderError: it failed while drawing.
         DeviceError: there is no usable GL device.
     """
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
+    if not pipelines:
+        raise UsageError(Problem("RG500", "there is no pipeline to compare"))
+    loaded_ones = [loaded(each) for each in pipelines]
     own = [] if reference is None or isinstance(reference, Path) else [reference]
     with looking() as files:
-        staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*pipelines, *own]])
+        staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*loaded_ones, *own]])
         planned = [stages.plan(pipeline.expand()) for pipeline in staged]
     first_one = planned[0].linked
     names = unique_names(names or [each.linked.graph.name for each in planned[: len(pipelines)]])
@@ -98,10 +104,10 @@ def compare(
     output, encoding = compared_output(staged, picture[1] if picture else None, measured=metric is not None)
     if executor not in (None, "serial"):
         measured = Reference(str(reference), "file", picture[0], encoding, output) if picture else None
-        travels, modules = all(each.catalog is None for each in [*pipelines, *own]), _modules(planned)
+        travels, modules = all(each.catalog is None for each in [*loaded_ones, *own]), _modules(planned)
         who = chosen(executor, None, device, tasks=len(pipelines), devices=devices, timeout=timeout, travels=travels)
         with who as farm, shown(progress, "pipelines") as tell:
-            farm.bring(lambda: bundled(files, pipelines[0].selection.plugins, modules))
+            farm.bring(lambda: bundled(files, loaded_ones[0].selection.plugins, modules))
             step = _Steps(len(pipelines), tell)
             against, results, noticed, drew = compared(
                 farm, planned, names, bool(own), measured, output, encoding, frame, frames, step

@@ -19,11 +19,11 @@ from rendergraph.compare.values import Comparison, Reference
 from rendergraph.compare.work import Events, Pictures, Work
 from rendergraph.farm.bundle import bundled
 from rendergraph.farm.choose import Where, chosen
+from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.session.progress import Progress, shown
 from rendergraph.stamps import looking
 
 if TYPE_CHECKING:
-    from rendergraph.session import Pipeline
     from rendergraph.session.gpu import Gpu
 
 
@@ -85,7 +85,7 @@ class Sweep:
 
 
 def sweep(
-    base: Pipeline,
+    base: Pipeline | str | Path,
     axes: Axes,
     out: Path | str,
     reference: Path | Pipeline | None = None,
@@ -113,7 +113,7 @@ def sweep(
     loses little. A run that cannot be drawn gets a line with the reason, and the others go on.
 
     Args:
-        base: what the axes change.
+        base: what the axes change; a shipped name or a file, too.
         axes: paths with values or ranges: `{"ao.samples": [8, 16], "ao.radius": "log:0.1:1:5"}`; a `Space` of them for
             samples, or axes that go together.
         out: the folder; `results.jsonl` in it grows by a line a run that has been measured.
@@ -143,7 +143,7 @@ def sweep(
         RenderError: it failed while writing, or while drawing what runs are measured against.
         DeviceError: there is no usable GL device.
     """
-    out = Path(out)
+    base, out = loaded(base), Path(out)
     with looking() as files:
         planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
     runs = planned.runs

@@ -62,6 +62,11 @@ def load(
     )
 
 
+def loaded(pipeline: Pipeline | str | Path) -> Pipeline:
+    """A pipeline, or the one of a name or a file."""
+    return pipeline if isinstance(pipeline, Pipeline) else load(pipeline)
+
+
 def _once(stage: Callable[[Pipeline], T]) -> Callable[[Pipeline], T]:
     """A stage that is gone through once for each pipeline, and kept with it."""
 

@@ -10,7 +10,7 @@ from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
 from rendergraph.session.frame import Frame
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.pipeline import Pipeline, load
+from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.session.progress import Progress
 from rendergraph.session.selection import RenderKeywords
 
@@ -33,7 +33,7 @@ class Session(Gpu):
         **options: Unpack[RenderKeywords],
     ) -> Frame:
         """Draw a pipeline, or the one of a name or a file, and return the last frame; see `Pipeline.render`."""
-        return _loaded(pipeline).render(size, session=self, progress=progress, **options)
+        return loaded(pipeline).render(size, session=self, progress=progress, **options)
 
     def frames(
         self,
@@ -42,7 +42,7 @@ class Session(Gpu):
         **options: Unpack[RenderKeywords],
     ) -> Iterator[Frame]:
         """Draw a pipeline, or the one of a name or a file, frame by frame; see `Pipeline.frames`."""
-        return _loaded(pipeline).frames(size, session=self, **options)
+        return loaded(pipeline).frames(size, session=self, **options)
 
     def compile(self, pipeline: Pipeline | str | Path, **options: Unpack[RenderKeywords]) -> Drawing:
         """Compile a pipeline without drawing it; one that is kept is taken again where only uniforms differ.
@@ -50,8 +50,4 @@ class Session(Gpu):
         To be called, and what it returns used, inside `with session.current()`. Its `runner` draws the bare frame: what
         `render` does before and after (warming up, reading back) is the caller's.
         """
-        return stages.compile(_loaded(pipeline).expand(**options), self)
-
-
-def _loaded(pipeline: Pipeline | str | Path) -> Pipeline:
-    return pipeline if isinstance(pipeline, Pipeline) else load(pipeline)
+        return stages.compile(loaded(pipeline).expand(**options), self)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
-from rendergraph.session.pipeline import Pipeline, load
+from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.viewer.child import Child
 from rendergraph.viewer.desk import Desk
 from rendergraph.viewer.extra import need
@@ -70,10 +70,10 @@ def view(
     need()
     from rendergraph.viewer.serve import serving  # an extra: whoever only draws has not installed it
 
-    found = pipeline if isinstance(pipeline, Pipeline) else load(pipeline)
+    found = loaded(pipeline)
     other = None
     if against is not None:
-        compared = against if isinstance(against, Pipeline) else load(against)
+        compared = loaded(against)
         other = Path(compared.selection.source).stem, compared.selection
     made = serving(Desk(found.selection, Path.cwd(), against=other), Child(device), port=port)
     return Viewer(made.url, made.start(), height)

@@ -263,6 +263,10 @@ def test_ranges_stand_beside_values() -> None:
 # --- what goes together ----------------------------------------------------------------------------------------------
 
 
+def test_one_value_and_one_axis_need_no_list() -> None:
+    assert Space.of({"a.b": 3}).runs() == Space.of("a.b=3").runs() == [{"a.b": "3"}]
+
+
 def test_zipped_axes_go_through_their_values_together() -> None:
     axes: dict[str, Any] = {"a": [1, 2], "b": ["x", "y", "z"], "c": "10:20:10"}
     assert Space.of(axes, zipped=[("c", "a")]).runs() == [

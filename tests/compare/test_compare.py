@@ -13,7 +13,7 @@ import rendergraph as rg
 from rendergraph.compare.pictures import compare
 from rendergraph.compare.reference import unique_names
 from rendergraph.compare.timing import Spread, times_of, times_within
-from rendergraph.errors import InputError
+from rendergraph.errors import InputError, UsageError
 from rendergraph.execute import FrameTimes, StepTime
 from rendergraph.images import write
 from rendergraph.metrics import SAME
@@ -21,8 +21,13 @@ from rendergraph.metrics import SAME
 SIZE = (48, 27)
 
 
+def test_nothing_cannot_be_compared(gl: rg.Session) -> None:
+    with pytest.raises(UsageError, match="no pipeline to compare"):
+        compare([], session=gl)
+
+
 def test_a_pipeline_against_itself_is_nothing_but_zeros(gl: rg.Session) -> None:
-    found = compare([rg.load("forward", size=SIZE)] * 2, frames=1, session=gl)
+    found = compare([rg.load("forward", size=SIZE), "forward"], frames=1, session=gl)
     assert [result.name for result in found.results] == ["forward", "forward-2"]
     for result in found.results:
         assert result.metrics == SAME

@@ -72,6 +72,12 @@ def test_the_page_holds_everything_it_shows(comparison: Comparison) -> None:
         assert text in page
 
 
+def test_maps_that_were_not_kept_are_not_said_to_be_there(comparison: Comparison) -> None:
+    assert "Beneath each is FLIP" in comparison_page(comparison, "c")
+    results = tuple(replace(result, flip_map=None) for result in comparison.results)
+    assert "Beneath each" not in comparison_page(replace(comparison, results=results), "c")
+
+
 def test_structure_is_said_in_lines_and_drawn_as_wide_as_the_page(comparison: Comparison) -> None:
     page = comparison_page(comparison, "")
     section = page[page.index('id="structure"') : page.index('id="memory"')]

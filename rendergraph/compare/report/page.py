@@ -226,10 +226,9 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
     what = f"the {of}{named} of frame {comparison.frame}" if measured else f"{of}pictures"
     words = f"Errors of {what} against <code>{escape(reference.name)}</code>."
     if measured:
-        words += (
-            f" Times are medians of {comparison.results[0].times.frames} frames, with the tenth to ninetieth "
-            "percentile beneath."
-        )
+        frames = comparison.results[0].times.frames
+        many = f"medians of {frames} frames, with the tenth to ninetieth percentile beneath"
+        words += f" Times are {many if frames > 1 else 'of one frame'}."
         words += " Repeats are the least and the greatest median of several measurements." if again else ""
     return table(heads, rows, "Errors, times and memory") + f"<p class=quiet>{words}</p>"
 

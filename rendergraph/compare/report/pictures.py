@@ -64,14 +64,16 @@ def sheet(comparison: Comparison, most: int) -> str:
     if reference.kind != "variant":
         source = png(eight_bit(reference.pixels, reference.encoding))
         figures.append(_figure("pic-ref", source, f"{reference.name}, the reference"))
-    maps = len(comparison.results) <= most
+    few, maps = len(comparison.results) <= most, 0
     for place, result in enumerate(comparison.results):
         if result.pixels is None:
             continue
         figure = _figure(f"pic-{place}", png(eight_bit(result.pixels, result.encoding)), result.name)
-        if maps and result.flip_map is not None:
+        if few and result.flip_map is not None:
+            maps += 1
             figure += _figure("", png(heat(result.flip_map)), f"FLIP {number(result.metrics.flip)}")
         figures.append(f"<div>{figure}</div>")
+    # Pictures that were read back from a sweep's folder have none.
     told = f"Beneath each is FLIP against {escape(reference.name)}, dark where equal." if maps else ""
     return f'<div class="sheet">{"".join(figures)}</div><p class="quiet">{told}</p>'
 
