@@ -127,7 +127,8 @@ class Connector:
                 continue
             for name, candidate in outputs.items():
                 meant = getattr(candidate, "signature", None) or getattr(candidate, "semantic", None)
-                if wanted is not None and meant is not None and meant.name == wanted.name:
+                kind = getattr(candidate, "kind", port.kind)
+                if wanted is not None and meant is not None and (meant.name, kind) == (wanted.name, port.kind):
                     return f"; '{other.id.removeprefix(other.scope)}.{name}' would fit"
         what = f"{wanted.name}()" if isinstance(wanted, Signature) else wanted.name if wanted else "anything"
         return f"; it takes {what}"

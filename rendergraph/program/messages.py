@@ -15,6 +15,8 @@ from rendergraph.program.text import StageText
 
 _SECTION = re.compile(r"\s*(Vertex|Geometry|Fragment|Compute) info\s*\Z")
 _QUOTED = re.compile(r"[`'\"]([A-Za-z_]\w*)['\"`]")
+_FUNCTION = re.compile(r"`[^`']*?([A-Za-z_]\w*)\(")
+_LACKS = re.compile(r"(vertex|geometry|fragment|compute) shader lacks")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _DECLARES = re.compile(r"\b(?:in|out|inout|uniform|buffer|flat|centroid|const|layout|struct)\b|\w+\s+\w+\s*[;(=\[]")
 
@@ -52,6 +54,10 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     text = text or "the driver refused the program and did not say why"
     last = list(texts.values())[-1]
     text = f"{last.of_node}the stages {', '.join(texts)} do not link: {text}"
+    lacking = _LACKS.search(text)
+    if lacking and lacking[1] in texts:  # it names what is not there
+        where = _first_place(texts[lacking[1]].source)
+        return [Problem("RG411", text, where.place() if where else None)]
     for stage_text in reversed(list(texts.values())):
         spot = declared_at(stage_text.source, _QUOTED.findall(message))
         if spot is not None:
@@ -100,8 +106,10 @@ def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
 def _problem(code: str, message: Said, stage: StageText) -> Problem:
     rows, said, line = stage.source, message.text.strip(), message.line
     severity: Literal["error", "warning"] = "warning" if message.is_warning else "error"
-    if not 1 <= line <= len(rows.lines):
-        return Problem(code, f"{stage.who}: {said}", severity=severity)
+    if not 1 <= line <= len(rows.lines):  # of the whole: that functions call each other, say
+        first = _first_place(rows)
+        spot = declared_at(rows, _FUNCTION.findall(said)) or (first.place() if first else None, "")
+        return Problem(code, f"{stage.who}: {said}", *spot, severity)
     origin, shown_line = rows.origins[line - 1], rows.lines[line - 1]
     column = _unsqueezed(shown_line, message.column)
     if origin.prefix:

@@ -239,6 +239,23 @@ def test_of_overloads_the_nearest_are_told(folder: Path) -> None:
     )
 
 
+def test_a_stage_without_main_is_named_by_its_own_file(folder: Path) -> None:
+    (folder / "main.frag").write_text("out vec4 c;\nvoid mein() { c = vec4(0); }\n")
+    (found,) = link_problems("error: fragment shader lacks `main'", texts(folder, "main.frag"))
+    assert found.place is not None
+    assert (Path(found.place.file).name, found.place.line) == ("main.frag", 1)
+
+
+def test_what_mesa_says_of_a_function_without_a_line_stands_at_the_function(folder: Path) -> None:
+    (folder / "main.frag").write_text(
+        "out vec4 c;\nfloat f(float x) { return f(x); }\nvoid main() { c = vec4(f(1)); }\n"
+    )
+    said = "0:0(0): error: function `float f(float)' has static recursion"
+    (found,) = compile_problems(said, texts(folder, "main.frag")["fragment"])
+    assert found.place is not None
+    assert (Path(found.place.file).name, found.place.line, found.place.column) == ("main.frag", 2, 7)
+
+
 def test_the_vertex_stage_of_the_frameworks_own(folder: Path) -> None:
     vertex = texts(folder, "main.frag")["vertex"]
     found = answer("nvidia", vertex, "gl_Position", "gl_Position")
