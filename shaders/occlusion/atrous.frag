@@ -28,11 +28,11 @@ void main() {
         ivec2 step = ivec2(i % 3, i / 3) - 1;
         ivec2 there = texel + stride * step;
         if (there != clamp(there, ivec2(0), size - 1)) continue;
-        vec4 seen = texelFetch(surfaces, there, 0);
+        vec4 seen = look_up(surfaces, there, size);
         if (seen.w == 0.0) continue;
         vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
         float weight = (step.x * step.y == 0 ? 2.0 : 1.0) * same_surface(offset, here.xyz, seen.xyz, off);
-        sum += weight * texelFetch(source, there, 0).PARTS;
+        sum += weight * look_up(source, there, size).PARTS;
         total += weight;
     }
     sum /= total;

@@ -14,10 +14,10 @@ void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     ivec2 size = textureSize(surfaces, 0);
     ivec2 texel = texel_here(size);
-    vec4 here = texelFetch(surfaces, texel, 0);
+    vec4 here = look_up(surfaces, texel, size);
     vec3 position = view_position(v, place_for(texel, size, size), here.w);
     float tolerance = 0.1 * radius + depth_error(v, here.w);
-    bent = texelFetch(source, pixel, 0).PARTS;
+    bent = look_up(source, pixel, reduced).PARTS;
     float open = openness(bent);
     vec2 rise = vec2(0.0);
     vec2 sides = vec2(0.0);
@@ -27,11 +27,11 @@ void main() {
         ivec2 there = pixel + 2 * ((i & 2) - 1) * axis;
         ivec2 inside = clamp(there, ivec2(0), reduced - 1);
         ivec2 place = surface_of(inside, size);
-        vec4 seen = texelFetch(surfaces, place, 0);
+        vec4 seen = look_up(surfaces, place, size);
         vec3 offset = view_position(v, place_for(place, size, size), seen.w) - position;
         bool near = inside == there && in_plane(offset, here.xyz, seen.xyz, tolerance);
         vec2 counted = near ? vec2(axis) : vec2(0.0);
-        rise += counted * (openness(texelFetch(source, inside, 0).PARTS) - open);
+        rise += counted * (openness(look_up(source, inside, reduced).PARTS) - open);
         sides += counted;
     }
     vec2 bend = abs(rise) * 2.0 / max(sides, 1.0);

@@ -39,9 +39,9 @@ void main() {
     vec2 near = clamp((across - vec2(texel)) / (across - vec2(place)), 0.0, 1.0);
     near = mix(near, vec2(1.0), equal(across, vec2(place)));  // at the picture's edge
     vec2 far = 1.0 - near;
-    vec4 surface = texelFetch(surfaces, place, 0);
+    vec4 surface = look_up(surfaces, place, screen);
     Seen seen = Seen(view_position(v, (vec2(place) + 0.5) / vec2(screen), surface.w), surface.xyz,
-                     texelFetch(source, own, 0).PARTS);
+                     look_up(source, own, size).PARTS);
     vec2 other = vec2(1 - 2 * odd);
     Seen above = from_y(seen, other.y);
     Around around = Around(Value(0.0), 0.0, false);

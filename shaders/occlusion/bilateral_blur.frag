@@ -32,11 +32,11 @@ void main() {
     for (int i = -reach; i <= reach; i += 2) {
         ivec2 there = clamp(pixel + i * axis, ivec2(0), last);
         ivec2 at = surface_of(there, size);
-        vec4 seen = texelFetch(surfaces, at, 0);
+        vec4 seen = look_up(surfaces, at, size);
         vec3 offset = view_position(v, place_for(at, size, screen), seen.w) - position;
         float within = clamp(0.5 * (float(wide) + 1.0 - abs(float(i) + aside)), 0.0, 1.0);
         float weight = within * same_surface(offset, here.xyz, seen.xyz, tolerance);
-        sum += weight * texelFetch(source, there, 0).r;
+        sum += weight * look_up(source, there, last + 1).r;
         total += weight;
     }
     blurred = sum / total;

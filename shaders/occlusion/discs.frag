@@ -81,7 +81,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 #if defined(LIGHT) && defined(BACK)
                 light += light_from_behind(v, there, position, here, w, region, share);
 #endif
-                seen = texelFetch(surfaces, there, 0);
+                seen = look_up(surfaces, there, size);
                 if (seen.w == 0.0) continue;
                 at = view_position(v, place_for(there, size, screen), seen.w);
             }
@@ -104,7 +104,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
                 if (!inside) sent = texelFetch(beyond_light, aside, 0).rgb;
                 else
 #endif
-                sent = texelFetch(diffuse, texel_for(there, size, screen), 0).rgb;
+                sent = look_up(diffuse, texel_for(there, size, screen), screen).rgb;
                 float towards = dot(here.xyz, offset) / apart;
                 light += sent * disc_transfer(apart, ring / SENDING_DISCS / slant, facing, towards);
             }

@@ -13,10 +13,10 @@ uniform float radius;  // metres
 Seen seen_at(View v, ivec2 pixel, ivec2 size) {
     ivec2 inside = clamp(pixel, ivec2(0), reduced - 1);
     ivec2 texel = surface_of(inside, size);
-    vec4 surface = texelFetch(surfaces, texel, 0);
+    vec4 surface = look_up(surfaces, texel, size);
     vec3 normal = inside == pixel ? surface.xyz : vec3(0.0);
     return Seen(view_position(v, place_for(texel, size, screen), surface.w), normal,
-                texelFetch(unfiltered, inside, 0).PARTS);
+                look_up(unfiltered, inside, reduced).PARTS);
 }
 
 void add(inout Value sum, inout float total, Seen here, Seen there, float share, float tolerance) {

@@ -20,13 +20,13 @@ float horizon_along(
     for (int i = 0; i < STEPS; ++i) {
         float out_to = (float(i) + stretch) / float(STEPS);
         ivec2 there = ivec2(floor((middle + out_to * reach) * vec2(size)));
-        if (there != clamp(there, ivec2(0), size - 1) || there == texel) continue;
-        vec4 seen = texelFetch(surfaces, there, 0);
-        if (seen.w == 0.0) continue;
+        vec4 seen = look_up(surfaces, there, size);
         vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
-        float apart = length(offset);
-        if (apart > radius || !rises(v, offset, here.xyz, max(here.w, seen.w))) continue;
-        horizon = max(horizon, dot(offset, eye) / apart);
+        float square = dot(offset, offset);
+        bool inside = there == clamp(there, ivec2(0), size - 1) && seen.w > 0.0 && square <= radius * radius;
+        bool counts = inside && rises(v, offset, here.xyz, max(here.w, seen.w));
+        float rise = dot(offset, eye) / length(offset);
+        horizon = counts && rise > horizon ? rise : horizon;
     }
     return clamp(horizon, -1.0, 1.0);
 }
@@ -63,9 +63,10 @@ vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = texel_here(textureSize(surfaces, 0));
+    ivec2 size = textureSize(surfaces, 0);
+    ivec2 texel = texel_here(size);
     vec4 here = texelFetch(surfaces, texel, 0);
-    vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
+    vec2 middle = place_for(texel, size, screen);
     vec3 position = view_position(v, middle, here.w);
     vec4 found = here.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : open_at(v, texel, middle, position, here);
     found = mean_of_quad(found, here, position, 0.1 * radius + depth_error(v, here.w));

@@ -15,6 +15,8 @@ float open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
     vec3 eye = to_eye(v, position);
     vec2 along = first_arm(ARMS);
     float blocked = 0.0;
+    float region = radius * radius;
+    float fade = attenuation / region;
     for (int arm = 0; arm < ARMS; ++arm) {
         float stretch = stretch_of(arm);
         // The tangent plane's line in the arm's slice, by its cosine to the eye: the sine of its elevation.
@@ -24,16 +26,14 @@ float open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
         for (int i = 0; i < STEPS; ++i) {
             float out_to = (float(i) + stretch) / float(STEPS);
             ivec2 there = ivec2(floor((middle + out_to * reach * along) * vec2(size)));
-            if (there != clamp(there, ivec2(0), size - 1) || there == texel) continue;
-            vec4 seen = texelFetch(surfaces, there, 0);
-            if (seen.w == 0.0) continue;
+            vec4 seen = look_up(surfaces, there, size);
             vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
-            float apart = length(offset);
-            if (apart > radius || !rises(v, offset, here.xyz, max(here.w, seen.w))) continue;
-            float rise = dot(offset, eye) / apart - horizon;
-            if (rise <= 0.0) continue;
-            float share = apart / radius;
-            blocked += rise * (1.0 - attenuation * share * share);
+            float square = dot(offset, offset);
+            float rise = dot(offset, eye) / length(offset) - horizon;
+            bool inside = there == clamp(there, ivec2(0), size - 1) && seen.w > 0.0 && square <= region;
+            bool counts = inside && rise > 0.0 && rises(v, offset, here.xyz, max(here.w, seen.w));
+            rise = counts ? rise : 0.0;
+            blocked += rise * (1.0 - fade * square);
             horizon += rise;
         }
         along = turned(along, ARMS);
@@ -43,9 +43,10 @@ float open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 
 void main() {
     View v = surfaces_views[0];
-    ivec2 texel = texel_here(textureSize(surfaces, 0));
+    ivec2 size = textureSize(surfaces, 0);
+    ivec2 texel = texel_here(size);
     vec4 here = texelFetch(surfaces, texel, 0);
-    vec2 middle = place_for(texel, textureSize(surfaces, 0), screen);
+    vec2 middle = place_for(texel, size, screen);
     vec3 position = view_position(v, middle, here.w);
     float open = here.w == 0.0 ? 1.0 : open_at(v, texel, middle, position, here);
     unfiltered = mean_of_quad(vec4(open), here, position, 0.1 * radius + depth_error(v, here.w)).x;

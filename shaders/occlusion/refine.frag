@@ -35,8 +35,8 @@ void main() {
     for (int i = 0; i < 4; ++i) {
         bvec2 corner = bvec2(i & 1, i >> 1);
         ivec2 there = mix(low, high, corner);
-        vec4 seen = texelFetch(surfaces, mix(start, end, corner), 0);
-        Value value = texelFetch(source, there, 0).PARTS;
+        vec4 seen = look_up(surfaces, mix(start, end, corner), screen);
+        Value value = look_up(source, there, size).PARTS;
         vec3 offset = view_position(v, mix(from, to, vec2(corner)), seen.w) - position;
         bool near = seen.w > 0.0 && abs(dot(offset, here.xyz)) < tolerance;
         vec2 part = mix(1.0 - share, share, vec2(corner));

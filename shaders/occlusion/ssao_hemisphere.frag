@@ -58,7 +58,7 @@ float blocked_along(View v, Start here, ivec2 size, vec3 along, float jitter) {
         float t = whole * reach(step, jitter);
         vec3 place = here.place + t * way;
         ivec2 there = ivec2(place.xy / place.z);
-        vec4 seen = texelFetch(surfaces, there, 0);
+        vec4 seen = look_up(surfaces, there, size);
         vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - here.position;
         float behind = -here.position.z - t * radius * along.z - seen.w;
         float outwards = dot(offset, seen.xyz);

@@ -50,7 +50,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
             vec2 way = back ? -along : along;
             ivec2 there = ivec2(floor((middle + u * u * reach * way) * vec2(size)));
             if (there != clamp(there, ivec2(0), size - 1) || there == texel) continue;
-            vec4 seen = texelFetch(surfaces, there, 0);
+            vec4 seen = look_up(surfaces, there, size);
             if (seen.w == 0.0) continue;
             vec3 at = view_position(v, place_for(there, size, screen), seen.w);
             vec3 offset = at - position;
@@ -66,7 +66,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
             float rear = share_before(s, strip.x, side);
             uint fills = sectors(min(front, rear), max(front, rear));
             if (dot(seen.xyz, offset) < 0.0) {
-                vec3 sent = texelFetch(diffuse, texel_for(there, size, screen), 0).rgb;
+                vec3 sent = look_up(diffuse, texel_for(there, size, screen), screen).rgb;
                 light += weight * float(bitCount(fills & ~filled)) * sent;
             }
             filled |= fills;

@@ -50,6 +50,12 @@ vec2 place_for(ivec2 texel, ivec2 small, ivec2 screen) {
     return (vec2(texel_for(texel, small, screen)) + 0.5) / vec2(screen);
 }
 
+// A texel of a picture of a size, by its middle: a sampler knows that there is one mip level, where `texelFetch` asks
+// for it at each pixel, which on a software rasteriser is half of its work.
+vec4 look_up(sampler2D picture, ivec2 texel, ivec2 size) {
+    return textureLod(picture, (vec2(texel) + 0.5) / vec2(size), 0.0);
+}
+
 // Clip space's w at a distance along the view axis: the distance itself, or 1 where the view is orthographic.
 float clip_w(View v, float distance) {
     return v.projection[3][3] - v.projection[2][3] * distance;

@@ -30,13 +30,13 @@ void main() {
     for (int i = 0; i < 4; ++i) {
         ivec2 corner = ivec2(i & 1, i >> 1);
         ivec2 there = clamp(first + corner, ivec2(0), size - 1);
-        vec4 seen = texelFetch(surfaces, there, 0);
+        vec4 seen = look_up(surfaces, there, size);
         if (seen.w == 0.0) continue;
         vec2 near = mix(1.0 - share, share, vec2(corner)) + 1e-3;
         vec3 offset = view_position(v, place_for(there, size, screen), seen.w) - position;
         float alike = same_surface(offset, facing, seen.xyz, 0.1 * radius + depth_error(v, distance));
         float weight = near.x * near.y * (alike + 1e-4);
-        sum += weight * texelFetch(source, there, 0).PARTS;
+        sum += weight * look_up(source, there, size).PARTS;
         total += weight;
     }
     finish(total > 0.0 ? sum / total : NOTHING);
