@@ -21,9 +21,9 @@ def ordered(positions: Floats, triangles: Indices) -> Indices:
     """The triangles, sorted where that lowers the number of vertices shaded."""
     if len(triangles) <= _BATCH:
         return triangles
-    rank = np.empty(len(positions), np.int32)
+    rank = np.empty(len(positions), np.min_scalar_type(len(positions)))  # 16 bits are sorted without comparing
     key = (parts(triangles, len(positions)).astype(np.uint64) << np.uint64(30)) | morton(positions)
-    rank[np.argsort(key, kind="stable")] = np.arange(len(positions), dtype=np.int32)
+    rank[np.argsort(key, kind="stable")] = np.arange(len(positions), dtype=rank.dtype)
     lowest = np.minimum(np.minimum(rank[triangles[:, 0]], rank[triangles[:, 1]]), rank[triangles[:, 2]])
     sorted_ = triangles[np.argsort(lowest, kind="stable")]
     return sorted_ if batch_acmr(sorted_) < batch_acmr(triangles) else triangles
