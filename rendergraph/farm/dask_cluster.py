@@ -25,6 +25,9 @@ Future: TypeAlias = Any
 
 CONNECT = 10.0
 """Seconds for a scheduler to answer, and to come back."""
+_KEPT = "what is finished is kept: --resume goes on"
+COPIES = 2
+"""Workers that have what was sent before any asks for it: the loss of one loses nothing."""
 _POLL = 0.25
 
 
@@ -115,12 +118,15 @@ class Dask(Executor):
         self._devices, self._timeout = devices, timeout
         self._station = f"rendergraph-{uuid4().hex[:12]}"
         self._bundle: Bundle | None = None
-        self._files: dict[str, Future] = {}
-        self._values: dict[str, Future] = {}
+        self._paths: dict[str, Path] = {}
+        self._values: dict[str, bytes] = {}
+        self._sent: dict[str, Future] = {}
+        self._sendings = 0
         self._done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self._tasks: dict[str, Task] = {}
         self._futures: dict[str, Future] = {}
         self._tried: dict[Task, int] = {}
+        self._sent_with: dict[Task, int] = {}  # how often had been sent what a task was given
 
     def bring(self, make: Callable[[], Bundle]) -> None:
         """Send files, and ask every worker whether it can be used.
@@ -131,9 +137,9 @@ class Dask(Executor):
         from rendergraph.farm.dask_worker import Station, fitness  # needs the extra
 
         bundle = make()
-        paths = {digest: path for path, digest in bundle.files.items()}
-        wanted = {digest: path for digest, path in paths.items() if digest not in self._files}
-        self._files |= self._scattered({digest: Path(path).read_bytes() for digest, path in wanted.items()})
+        paths = {digest: Path(path) for path, digest in bundle.files.items() if digest not in self._paths}
+        self._send({digest: path.read_bytes() for digest, path in paths.items()})
+        self._paths |= paths
         if self._bundle is None:
             station = Station(self._station, bundle.packages, tuple(self._devices), self._timeout)
             try:
@@ -155,20 +161,48 @@ class Dask(Executor):
         way = f"install it there: pip install 'rendergraph[farm]=={version('rendergraph')}'"
         return InputError(Problem("RG642", f"a worker cannot use rendergraph ({' '.join(error.split())[:200]}); {way}"))
 
-    def _scattered(self, contents: dict[str, bytes]) -> dict[str, Future]:
-        """Contents by what they are known by; Dask keeps one of each for a worker that needs it."""
-        if not contents:
-            return {}
-        named = {f"rendergraph-{digest}": content for digest, content in contents.items()}
-        found = self._client.scatter(named, hash=False)
-        return {key.removeprefix("rendergraph-"): future for key, future in found.items()}
+    def _send(self, contents: dict[str, bytes]) -> None:
+        """Send contents to workers, by their SHA-256; others get them from those when they need them.
+
+        Raises:
+            RenderError: no worker takes them.
+        """
+        begun = time.monotonic()
+        named = {f"{self._station}-{self._sendings}-{digest}": content for digest, content in contents.items()}
+        while named:
+            try:
+                found = self._client.scatter(named, hash=False, broadcast=COPIES)
+            except OSError as error:  # a worker that nobody knows yet to be gone
+                self._answers(None)
+                if time.monotonic() - begun > CONNECT:
+                    raise RenderError(Problem("RG641", f"the workers take no files ({error}); {_KEPT}")) from error
+                time.sleep(_POLL)
+            else:
+                self._sent |= {key.rpartition("-")[2]: future for key, future in found.items()}
+                return
+
+    def _send_again(self) -> None:
+        """Send everything once more, as the workers that had something of it are gone.
+
+        Raises:
+            RenderError: a file is another one by now, or no worker takes them.
+        """
+        contents = dict(self._values)
+        for digest, path in self._paths.items():
+            contents[digest] = path.read_bytes() if path.is_file() else b""
+            if hashlib.sha256(contents[digest]).hexdigest() != digest:
+                text = f"workers are gone with what is drawn from, and '{path}' has changed since; {_KEPT}"
+                raise RenderError(Problem("RG641", text))
+        self._sendings += 1
+        self._send(contents)
 
     def put(self, value: Any) -> Handle:
         """Sent to the cluster, and from there to workers whose tasks need it."""
         data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         handle = Handle(hashlib.sha256(data).hexdigest())
         if handle.digest not in self._values:
-            self._values |= self._scattered({handle.digest: data})
+            self._send({handle.digest: data})
+            self._values[handle.digest] = data
         return handle
 
     def submit(self, task: Task) -> None:
@@ -187,14 +221,14 @@ class Dask(Executor):
             needs,
             self._bundle,
             digests,
-            *(self._files[digest] for digest in digests),
-            *(self._values[digest] for digest in needs),
+            *(self._sent[digest] for digest in (*digests, *needs)),
             key=f"{self._station}-{uuid4().hex}",
             pure=False,
             retries=0,
             resources=self._resources,
         )
         self._tasks[future.key], self._futures[future.key] = task, future
+        self._sent_with[task] = self._sendings
         future.add_done_callback(self._done.put)
 
     def events(self) -> Iterator[Event]:
@@ -221,9 +255,7 @@ class Dask(Executor):
             return None
         gone = gone or time.monotonic()
         if self._client.status in ("closed", "closing") or time.monotonic() - gone > CONNECT:
-            raise RenderError(
-                Problem("RG641", "the Dask scheduler is gone; what is finished is kept: --resume goes on")
-            )
+            raise RenderError(Problem("RG641", f"the Dask scheduler is gone; {_KEPT}"))
         return gone
 
     def _told(self, task: Task, future: Future) -> Iterator[Event]:
@@ -233,6 +265,8 @@ class Dask(Executor):
                 time.sleep(_POLL)
                 self._answers(begun)
             self._answers(None)
+            if self._sent_with[task] == self._sendings:  # most likely what it was given is lost, too
+                self._send_again()
             yield from self._lost(task, "scheduler", RenderError(Problem("RG640", "the cluster lost the task")))
             return
         if future.status == "error":
@@ -268,8 +302,7 @@ class Dask(Executor):
                 if self._cluster is None and self._bundle is not None:
                     self._client.unregister_worker_plugin(self._station)
         self._futures.clear()
-        self._files.clear()
-        self._values.clear()
+        self._sent.clear()
         with contextlib.suppress(Exception):
             if self._owned:
                 self._client.close(timeout=1)

@@ -336,6 +336,34 @@ def test_64_variants_are_the_same_by_dask_though_a_worker_is_killed_and_no_disk_
         assert not list(tmp_path.glob("cluster/b/**/make.frag"))  # nor is anything left there
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("changed", [False, True])
+def test_what_was_lost_with_all_workers_is_sent_to_the_next(
+    base: rg.Pipeline, gl: rg.Session, cluster: Cluster, tmp_path: Path, changed: bool
+) -> None:
+    here = sweep(base, FEW, tmp_path / "here", frames=1, session=gl)
+    told: list[str] = []
+
+    def meanwhile(event: Mapping[str, Any]) -> None:
+        if not told:
+            for name in ("a", "b"):
+                cluster.workers[name].kill()
+            cluster.worker("c")
+            if changed:
+                (tmp_path / "make.frag").write_text(MAKE.replace("0.25", "0.5"))
+        told.append(event["event"])
+
+    with cluster.client(2) as client:
+        if changed:
+            with pytest.raises(RenderError, match=r"RG641 .*make.frag' has changed since; what is finished is kept"):
+                sweep(base, FEW, tmp_path / "there", frames=1, executor=client, events=meanwhile)
+            return
+        there = sweep(base, FEW, tmp_path / "there", frames=1, executor=client, events=meanwhile)
+    assert "lost" in told
+    assert there.failures == ()
+    same(here, tmp_path / "here", there, tmp_path / "there")
+
+
 HALO = '''"""A node of an installed plugin."""
 
 from rendergraph.api import Node, Output, Radiance, Steps, param
