@@ -10,7 +10,9 @@
 // Steps before arms: what lies between steps is never seen, while neighbours have other arms.
 #define STEPS (SAMPLES < 16 ? 4 : 8)
 #endif
+#ifndef ARMS
 #define ARMS (SAMPLES / STEPS / 2 * 2)
+#endif
 
 // Unit vector of this pixel's arm 0 of `arms` on the screen.
 vec2 first_arm(int arms) {

@@ -1,6 +1,9 @@
 // Horizon-based ambient occlusion (L. Bavoil and M. Sainz, "Image-Space Horizon-Based Ambient Occlusion", 2008): along
 // each arm the highest elevation seen so far, and of each rise what its distance leaves.
 #include "surfaces.glsl"
+#ifdef SPARSE
+#define ARMS max(SAMPLES / STEPS * 3 / 4, 2)  // reduced pixels share with more than twice as many
+#endif
 #include "arms.glsl"
 #include "quad.glsl"
 uniform sampler2D surfaces;
