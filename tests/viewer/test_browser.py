@@ -89,8 +89,14 @@ def test_a_slider_changes_the_picture_and_undo_takes_all_of_its_way_back(page: H
     box = slider.bounding_box()
     page.page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.page.mouse.down()
-    for step in range(1, 6):
-        page.page.mouse.move(box["x"] + box["width"] * (0.5 + step * 0.05), box["y"] + box["height"] / 2)
+    seen = []
+    for step in range(1, 4):
+        move = (box["x"] + box["width"] * (0.5 + step * 0.1), box["y"] + box["height"] / 2)
+        count = page.pictures()
+        page.page.mouse.move(*move)
+        page.until(f"Number(document.getElementById('picture').dataset.count) > {count}")  # the hand waits for it
+        seen.append(float(slider.input_value()))
+    assert seen == sorted(set(seen)), "it followed all the way"
     page.after(page.page.mouse.up)
     assert mean(page) > before
     page.after(lambda: page.page.click("#undo"))
@@ -233,8 +239,14 @@ def test_a_broken_shader_is_said_on_its_node_and_mended(
     )
     shader.write_text(right)
     (tmp_path / "mine.yaml").write_text("size: [16, 16]\nnodes: {g: {type: ./grey.frag}}\noutputs: {image: g.color}\n")
+    shader.write_text(right.replace("void main", "void main("))
     with rg.view("mine.yaml") as viewer:
-        hand.open(viewer.url)
+        hand.page.goto(viewer.url)
+        hand.page.wait_for_selector("#problems:has-text('RG410')")
+        assert "last good picture" not in hand.text("#problems"), "there is none yet"
+        shader.write_text(right)
+        hand.page.wait_for_selector(STILL)
+        hand.page.wait_for_selector("#problems", state="hidden")
         shader.write_text(right.replace("0.5", "0.5 +"))
         hand.page.wait_for_selector("#problems:has-text('RG410')")
         hand.page.wait_for_selector("#graph .card.wrong[aria-label^='g:']")

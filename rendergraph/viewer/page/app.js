@@ -79,7 +79,7 @@ function showProblems(extra = []) {
   $("problems").replaceChildren(...all.map(({ file, line, column, code, text }) => {
     const place = file ? `${file}${line ? `:${line}:${column}` : ""}: ` : "";
     return h("p", { class: "mono" }, `${place}${code} ${text}`);
-  }), problems.length ? h("p", {}, "The last good picture stays.") : "");
+  }), problems.length && picture ? h("p", {}, "The last good picture stays.") : "");
 }
 
 function showChanges() {

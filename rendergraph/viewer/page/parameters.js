@@ -174,9 +174,10 @@ function linkRow(graph, node, name, about, edits) {
 
 // The pipeline's own parameters, where no node is chosen; else everything that the node can be told.
 export function showParameters(place, pipeline, node, edits) {
-  // What somebody is holding or writing in is not taken from under the hand, nor is the window of a colour closed.
-  const hand = held !== null ? document.activeElement : writing;
-  const kept = hand && place.contains(hand) ? hand.closest(".parameter") : null;
+  // What somebody writes in is not taken from under the hand. What is dragged lets go, and a colour's window closes, where
+  // elements around it come and go, so all of that waits.
+  if (held !== null) return;
+  const kept = writing && place.contains(writing) ? writing.closest(".parameter") : null;
   const made = [pipeline, node, JSON.stringify(edits)];
   if (made.every((part, i) => part === drawn.made[i]) && (drawn.kept === null || drawn.kept === kept)) return;
   drawn = { made, kept };
