@@ -232,11 +232,14 @@ def cube_views(
 
 
 def frustum_planes(view: ViewMatrices) -> Points:
-    """Planes (a, b, c, d) with a x + b y + c z + d >= 0 inside, shape (n, 4); the far one is left out if infinite."""
+    """Planes (a, b, c, d) with a x + b y + c z + d >= 0 inside, shape (n, 4); without the far one where it is so far
+    that float64 does not know it from infinity."""
     rows = view.projection @ view.view
     planes = np.array([rows[3] + sign * rows[axis] for axis in (0, 1, 2) for sign in (1.0, -1.0)])
-    planes = planes[:5] if math.isinf(view.far) else planes
-    return np.array([plane / float(np.linalg.norm(plane[:3])) for plane in planes])
+    lengths = np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+    last = 5 if math.isinf(view.far) or lengths[5, 0] == 0.0 else 6
+    found: Points = planes[:last] / lengths[:last]
+    return found
 
 
 def box_planes(box: npt.ArrayLike) -> Points:

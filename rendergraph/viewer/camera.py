@@ -14,6 +14,8 @@ from rendergraph.scene.model import Camera, Vec3
 
 _STEEPEST = math.radians(89.0)  # at the pole left and right would change places
 
+_FARTHEST = 1000.0  # radii of the scene: it is a few texels then
+
 Sphere = tuple[Vec3, float]
 """Centre and radius around everything drawn."""
 
@@ -42,13 +44,16 @@ def panned(camera: Camera, sphere: Sphere, right: float, up: float) -> Camera:
 def zoomed(camera: Camera, sphere: Sphere, factor: float) -> Camera:
     """Nearer (`factor` below 1) to what it is aimed at, or farther; an orthographic one sees less, or more."""
     if camera.type == "orthographic":
-        return replace(camera, height=camera.height * factor)
+        return replace(camera, height=_within(camera.height, factor, 1e-4 * sphere[1], sphere))
     target = _target(camera, sphere)
-    arm = (_eye(camera) - target) * factor
-    least = max(2.0 * camera.near, 1e-4 * sphere[1])
-    if np.linalg.norm(arm) < least:
-        arm = unit(arm) * least
-    return _aimed(camera, target + arm, target, sphere)
+    arm = _eye(camera) - target
+    distance = _within(float(np.linalg.norm(arm)), factor, max(2.0 * camera.near, 1e-4 * sphere[1]), sphere)
+    return _aimed(camera, target + unit(arm) * distance, target, sphere)
+
+
+def _within(length: float, factor: float, least: float, sphere: Sphere) -> float:
+    """A length, scaled as far as something is left to see."""
+    return max(min(length * factor, max(_FARTHEST * sphere[1], length)), least)
 
 
 def flown(camera: Camera, sphere: Sphere, right: float, up: float, forward: float) -> Camera:

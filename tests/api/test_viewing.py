@@ -128,6 +128,12 @@ def test_planes_are_zero_at_the_corners(far: float) -> None:
     assert np.all((np.abs(distance) < 1e-9).sum(axis=1) == (3 if math.isfinite(far) else [3] * 4 + [2] * 4))
 
 
+def test_a_far_plane_that_float64_does_not_know_from_infinity_is_left_out() -> None:
+    np.testing.assert_array_equal(
+        viewing.frustum_planes(camera(far=1e18)), viewing.frustum_planes(camera(far=math.inf))
+    )
+
+
 def test_a_part_of_a_frustum_lies_between_its_distances() -> None:
     made = camera()
     corners = viewing.frustum_corners(made, 2.0, 5.0)

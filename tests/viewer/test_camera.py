@@ -60,6 +60,14 @@ def test_zooming_halves_the_distance_and_stops_at_the_target() -> None:
     assert moving.zoomed(camera(type="orthographic", height=4.0), SPHERE, 0.5).height == 2.0
 
 
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+def test_zooming_out_ends_where_the_scene_is_a_few_texels(kind: str) -> None:
+    found = camera(type=kind, height=4.0)
+    for _ in range(100):
+        found = moving.zoomed(found, SPHERE, 2.0)
+    assert (found.height if kind == "orthographic" else eye(found)[2]) == pytest.approx(2000)
+
+
 def test_flying_goes_along_the_cameras_own_axes() -> None:
     np.testing.assert_allclose(eye(moving.flown(camera(), SPHERE, 0, 0, 0.5)), [0, 1, 4])
     np.testing.assert_allclose(eye(moving.flown(camera(), SPHERE, 1, 0.5, 0)), [2, 2, 5])
