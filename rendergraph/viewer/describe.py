@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rendergraph.declare import Input, Parameter
-from rendergraph.link import Graph
+from rendergraph.errors import InputError
+from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import moves
 from rendergraph.session.values import Linked, Planned
 from rendergraph.views import graph_json, plan_json
@@ -20,7 +22,7 @@ def described(planned: Planned) -> dict[str, Any]:
         node.id: {
             "type": node.type.name,
             "doc": (node.type.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
-            "types": sorted(name for name, family in families.items() if family == node.type.family),
+            **_types(linked, node, [name for name, family in families.items() if family == node.type.family]),
             "parameters": {
                 name: _parameter(parameter, getattr(node.node, name), _added(linked, parameter))
                 for name, parameter in node.node.parameters().items()
@@ -51,6 +53,23 @@ def described(planned: Planned) -> dict[str, Any]:
         "moves": moves(linked.scene),
         "warnings": [problem.as_json() for problem in linked.warnings],
     }
+
+
+def _types(linked: Linked, node: GraphNode, family: Sequence[str]) -> dict[str, list[str]]:
+    """The types of a node's family: those that make what is read of it from what it is given, and the others."""
+    graph = linked.graph
+    ends = [end for reader in graph.nodes for links in reader.inputs.values() for end in links]
+    read = {end.port for end in (*ends, *graph.outputs.values()) if end.node == node.id}
+    found: dict[str, list[str]] = {"types": [], "other_types": []}
+    for name in sorted(family):
+        try:
+            cls = linked.catalog.get(name).cls
+        except InputError:  # a plugin's that cannot be imported
+            continue
+        given = {port for port, one in cls.inputs().items() if isinstance(one, Input) and one.takes_scene}
+        needed = {port for port, one in cls.inputs().items() if not one.optional} - given
+        found["types" if read <= cls.outputs().keys() and needed <= node.inputs.keys() else "other_types"].append(name)
+    return found
 
 
 def _added(linked: Linked, parameter: Parameter) -> tuple[str, ...]:

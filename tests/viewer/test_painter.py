@@ -143,6 +143,15 @@ def test_what_it_is_compared_with_is_drawn_on_its_scene_by_its_camera(painter: P
     assert painter.answer(Against(FORWARD)).facts["figures"]["rmse"] == 0
 
 
+def test_types_that_fit_the_links_come_before_those_that_want_others(painter: Painter) -> None:
+    sun = painter.answer(Ask(FORWARD)).facts["pipeline"]["nodes"]["sun"]
+    assert {"shadow_map", "shadow_cascaded", "shadow_cube"} <= set(sun["types"])
+    assert {"shadow_pcf", "shadow_planar", "show_shadow_map"} <= set(sun["other_types"])
+    for name in sun["types"]:
+        rg.load("forward", size=SIZE, sets=[f"sun.type={name}"]).expand()
+    assert not set(sun["types"]) & set(sun["other_types"])
+
+
 def test_a_variant_reads_back_to_what_was_on_the_page(painter: Painter, tmp_path: Path) -> None:
     changed = replace(FORWARD, sets=("display.exposure=1.5", "shadows.type=shadow_vsm", "light.smith=fast"))
     painter.answer(Ask(changed))

@@ -189,8 +189,11 @@ export function showParameters(place, pipeline, node, edits) {
     parts.push(h("p", { class: "doc" }, own.length ? "Parameters of the pipeline." : "Choose a node, here or in the graph."));
     for (const [name, found] of own) parts.push(setting(name, name, found, edits));
   } else {
+    const options = (words) => words.map((word) => h("option", { value: word }, word));
+    const others = about.other_types.filter((word) => word !== about.type);
     const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
-      ...[...new Set([about.type, ...about.types])].map((word) => h("option", { value: word }, word)));
+      ...options([...new Set([about.type, ...about.types])]),
+      others.length ? h("optgroup", { label: "with other links" }, ...options(others)) : null);
     types.value = since(edits, `${node}.type`, about.type);
     const enabled = h("input", { type: "checkbox", id: `p-${node}.enabled`, onchange: () => set(`${node}.enabled`, enabled.checked) });
     enabled.checked = since(edits, `${node}.enabled`, true);
