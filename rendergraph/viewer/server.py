@@ -70,6 +70,7 @@ class Page:
     woken: asyncio.Event = field(default_factory=asyncio.Event)
     allowance: float = 0.0
     last: float = 0.0
+    holds: bool = False
 
     def put(self, kind: str, message: bytes | str) -> None:
         """To be sent as soon as it can, in place of an older one of its kind."""
@@ -125,7 +126,7 @@ class Server:
         self._wrong = False  # the last picture failed, and pages know
         self._thumbed: Ask | None = None  # what the small pictures were made of
         self._last: dict[str, bytes | str] = {}  # by kind, for pages that come later
-        self._asks: list[tuple[Question, Callable[[Answer], None]]] = []
+        self._asks: dict[tuple[Page, type], tuple[Question, Callable[[Answer], None]]] = {}
         routes = [
             WebSocketRoute(f"/{self.token}/socket", self._socket),
             Route(f"/{self.token}/{{name:path}}", self._file),
@@ -171,7 +172,7 @@ class Server:
             pass  # it is gone
         finally:
             self._pages.discard(page)
-            if self.desk.said({"do": "hold", "on": False}):  # it may have gone with something in its hand
+            if page.holds and self.desk.said({"do": "hold", "on": False}):
                 self._want()
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, Exception):
@@ -199,20 +200,21 @@ class Server:
         act = message.get("do")
         if act == "pixel":
             place = Pixel(_unit(message.get("x")), _unit(message.get("y")))
-            self._ask(place, lambda answer: page.put("pixel", _text("pixel", dict(answer.facts))))
+            self._ask(page, place, lambda answer: page.put("pixel", _text("pixel", dict(answer.facts))))
         elif act == "save":
             path = self.desk.file(message.get("name"))
-            self._ask(Variant(self.desk.opened), lambda answer: page.put("saved", _saved(path, answer)))
+            self._ask(page, Variant(self.desk.opened), lambda answer: page.put("saved", _saved(path, answer)))
         else:
+            page.holds = bool(message.get("on")) if act == "hold" else page.holds
             if self.desk.said(message):
                 self._want()
             if _text("state", state := self.desk.state()) != self._last.get("state"):
                 self._tell("state", state)
 
-    def _ask(self, question: Question, then: Callable[[Answer], None]) -> None:
+    def _ask(self, page: Page, question: Question, then: Callable[[Answer], None]) -> None:
         """Ask something beside pictures; of the same page and kind only the last counts."""
-        self._asks = [(other, act) for other, act in self._asks if type(other) is not type(question)]
-        self._asks.append((question, then))
+        self._asks.pop((page, type(question)), None)
+        self._asks[page, type(question)] = question, then
         self._woken.set()
 
     def _want(self) -> None:
@@ -242,7 +244,7 @@ class Server:
                 continue
             self._woken.clear()
             while self._asks:
-                question, then = self._asks.pop(0)
+                question, then = self._asks.pop(next(iter(self._asks)))
                 if (answer := await self._answer(question)) is not None:
                     then(answer)
             if self._due:

@@ -104,6 +104,16 @@ def test_a_slider_changes_the_picture_and_undo_takes_all_of_its_way_back(page: H
     assert page.page.is_disabled("#undo")
 
 
+def test_another_button_on_a_slider_holds_nothing(page: Hand) -> None:
+    page.choose("display")
+    page.page.hover("[aria-label='display.exposure, slider']")
+    page.page.mouse.down(button="right")
+    page.page.hover("#name")
+    page.page.mouse.up(button="right")  # which the slider is not told of
+    page.choose("light")
+    page.page.wait_for_selector("[id='p-light.ambient']", timeout=10_000)
+
+
 def test_what_a_hand_reaches_for_stays_where_nothing_of_it_changes(page: Hand) -> None:
     """Pictures come whenever they are ready; an input made anew for each would be gone while it is clicked."""
     page.choose("display")

@@ -161,6 +161,31 @@ def test_a_page_that_goes_in_the_middle_of_a_drag_lets_go(served: Any) -> None:
         assert stays.hear("state", moved=False)
 
 
+def test_a_page_that_goes_takes_nothing_out_of_the_hand_of_another(served: Any) -> None:
+    with served.tab() as drags:
+        drags.hear("picture", still=True)
+        drags.say(do="hold", on=True)
+        with served.tab() as goes:
+            goes.hear("state")
+        drags.say(do="camera", orbit=[0.1, 0])
+        drags.hear("picture", still=False)
+        drags.say(do="hold", on=False)
+        drags.say(do="camera", name="main")
+        assert drags.hear("state", moved=False)
+
+
+def test_each_page_is_told_its_own_pixel(served: Any) -> None:
+    with served.tab() as one, served.tab() as two:
+        one.hear("picture", still=True)
+        two.hear("picture", still=True)
+        one.say(do="look", stops=1)  # while that is drawn, both wait
+        one.say(do="pixel", x=0.1, y=0.1)
+        two.say(do="pixel", x=0.9, y=0.9)
+        assert [tab.hear("pixel")[0]["pixel"]["at"] for tab in (one, two)] == [[6, 3], [57, 32]]
+        one.say(do="look", stops=0)
+        one.hear("picture", still=True)
+
+
 def test_what_is_played_goes_on_and_stops(served: Any) -> None:
     with served.tab() as tab:
         tab.say(do="frame", number=7)

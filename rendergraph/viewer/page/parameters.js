@@ -58,7 +58,7 @@ function numberField(path, id, about) {
     const range = h("input", {
       type: "range", id: `${id}-slider`, min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
     });
-    range.addEventListener("pointerdown", hold);
+    range.addEventListener("pointerdown", ({ button }) => { if (button === 0) hold(); });  // others move nothing
     range.addEventListener("input", () => { number.value = range.value; set(path, Number(range.value)); });
     for (const end of ["pointerup", "pointercancel", "change"]) range.addEventListener(end, release);
     fields.unshift(range);
