@@ -65,6 +65,7 @@ class Lighting(Node):
         default=0.03,
         min=0,
         glsl="vec3",
+        unless="environment",
         doc="Radiance from all sides, a number or RGB; an environment takes its place.",
     )
     environment_part: Literal["all", "diffuse", "specular", "table"] = define(

@@ -14,7 +14,7 @@ from rendergraph.declare.blame import told
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
-from rendergraph.errors import Mistake, is_interruption
+from rendergraph.errors import Mistake, is_interruption, suggestion
 from rendergraph.ports import History, Internal
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
@@ -154,6 +154,9 @@ def _parameters(cls: type[Node]) -> Iterator[Mistake]:
             yield Mistake(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
         if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
             yield Mistake(name, f"parameter '{name}' is {wrong}")
+        if parameter.unless and not any(parameter.unless in vars(base) for base in cls.__mro__):  # it may be dropped
+            hint = suggestion(parameter.unless, cls.inputs())
+            yield Mistake(name, f"parameter '{name}' has unless='{parameter.unless}', which is no input{hint}")
         wrong_limits = list(_limits(parameter))
         yield from wrong_limits
         sound = sound and not wrong_limits

@@ -26,6 +26,7 @@ class Parameter(Struct, frozen=True, dict=True):
         glsl: the uniform's type where it is not what `type` says.
         open_name: the name under which plugins add choices, empty where they cannot.
         needs: what the include of such a choice may say that it needs.
+        unless: the input that takes its place where that is connected, empty for none.
         name: the field's name.
         type: the field's annotation.
     """
@@ -38,6 +39,7 @@ class Parameter(Struct, frozen=True, dict=True):
     glsl: str = ""
     open_name: str = ""
     needs: tuple[str, ...] = ()
+    unless: str = ""
     name: str = ""
     type: Any = None
 
@@ -101,7 +103,14 @@ def _listed(annotation: Any) -> Iterator[Any]:
 
 
 def param(
-    *, default: Any, doc: str, unit: str = "", min: float | None = None, max: float | None = None, glsl: str = ""
+    *,
+    default: Any,
+    doc: str,
+    unit: str = "",
+    min: float | None = None,
+    max: float | None = None,
+    glsl: str = "",
+    unless: str = "",
 ) -> Any:
     """A parameter that becomes a uniform: changing it rebuilds nothing.
 
@@ -111,8 +120,9 @@ def param(
         unit: the unit's symbol, empty for a pure number.
         min, max: smallest and largest legal value, inclusive.
         glsl: the uniform's type where it is not what the annotation says (`vec3` for a number or a colour).
+        unless: an optional input that takes its place where it is connected; who sets it then is told.
     """
-    return Parameter("param", default, doc, unit, Range(min, max), glsl)
+    return Parameter("param", default, doc, unit, Range(min, max), glsl, unless=unless)
 
 
 def define(

@@ -150,6 +150,7 @@ class _Linker:
         else:
             self.problems += needs(nodes, outputs, written) + versions(nodes)
             self._crossings(nodes, infer)
+            self._idle(nodes)
             textures = self._textures(order, nodes, infer)
             self.problems += Checker(nodes, infer, self.catalog).check()
             self._check_outputs(nodes, outputs, infer)
@@ -282,6 +283,17 @@ class _Linker:
                         "('rendergraph nodes display' lists them), or call the output 'radiance'"
                     )
                     self.warnings.append(replace(found.value.problem("RG154", text), severity="warning"))
+
+    def _idle(self, nodes: Mapping[str, Draft]) -> None:
+        """What was typed to see it, and is not to be seen: a file's may be for other scenes."""
+        for draft in nodes.values():
+            for name, value in draft.spec.params.items():
+                parameter = draft.type.cls.parameters().get(name) if value.source.path is None else None
+                if parameter is None or not draft.links.get(parameter.unless):
+                    continue
+                path, place = f"{draft.spec.id}.{name}", f"{draft.spec.id}.{parameter.unless}"
+                text = f"'{path}' changes nothing: '{place}' takes its place; -s {place}=null disconnects that"
+                self.warnings.append(replace(value.problem("RG155", text), severity="warning"))
 
     def _aliases(self, references: References, written: Mapping[str, Draft]) -> dict[str, Endpoint]:
         found: dict[str, Link] = {}

@@ -25,6 +25,7 @@ def described(planned: Planned) -> dict[str, Any]:
             **_types(linked, node, [name for name, family in families.items() if family == node.type.family]),
             "parameters": {
                 name: _parameter(parameter, getattr(node.node, name), _added(linked, parameter))
+                | {"idle": parameter.unless if node.inputs.get(parameter.unless) else ""}
                 for name, parameter in node.node.parameters().items()
             },
             "inputs": {

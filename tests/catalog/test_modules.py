@@ -62,6 +62,14 @@ def plugin(tmp_path: Path) -> Path:
     return home
 
 
+def test_a_parameter_outlives_the_port_that_took_its_place(plugin: Path) -> None:
+    text = PLAIN.replace("PlainLighting", "ConstantLighting").replace("depth = DROPPED", "environment = DROPPED")
+    (plugin / "constant_lighting.py").write_text(text)
+    found = Catalog.discover([plugin], installed=False).get("constant_lighting").cls
+    assert "environment" not in found.inputs()
+    assert found.parameters()["ambient"].unless == "environment"
+
+
 def test_a_dropped_port_is_no_port() -> None:
     assert "depth" not in WithoutDepth.ports()
     assert "depth" not in WithoutDepth.inputs()

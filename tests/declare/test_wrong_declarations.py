@@ -73,6 +73,7 @@ DECLARATIONS = {
     'gain: float = param(default={1}, doc="D.")  # here': "the default of 'gain', {1}, is no value that a file can hold",
     'gain: float = param(default=1.0, min=2, max=1, doc="D.")  # here': "parameter 'gain' goes from 2 to 1, which is nothing",
     'gain: float = param(default=1.0, min="0", doc="D.")  # here': "parameter 'gain': min is '0', not a number or None",
+    'gain: float = param(default=1.0, unless="light", doc="D.")  # here': "parameter 'gain' has unless='light', which is no input",
     'gain: float = param(default=1.0, glsl="half", doc="D.")  # here': "parameter 'gain' has glsl='half', which is no GLSL type",
     'name: str = param(default="a", doc="D.")  # here': "parameter 'name' is a param of text, which no uniform holds; make it a define with Literal[…]",
     'mode: Literal["a", "b"] = param(default="a", doc="D.")  # here': "parameter 'mode' is a param of text, which no uniform holds; make it a define with Literal[…]",

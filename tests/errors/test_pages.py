@@ -26,6 +26,7 @@ ELSEWHERE = (  # need several files or a GPU
     "RG018",
     "RG131",
     "RG152",
+    "RG155",
     "RG204",
     "RG205",
     "RG206",

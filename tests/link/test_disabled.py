@@ -10,6 +10,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.catalog import Catalog
+from rendergraph.cli.explain import error_page
 from rendergraph.declare import LightFacts
 from rendergraph.errors import InputError
 from rendergraph.link import Endpoint, Graph, endpoint, link
@@ -201,6 +202,21 @@ def test_without_its_bloom_a_pipeline_draws_as_if_there_were_none(gl: rg.Session
     plain = plain.patch({"outputs": {"radiance": "light.radiance"}})
     assert np.array_equal(without["image"], plain.render(session=gl)["image"])
     assert not np.array_equal(without["image"], bloom.render(session=gl)["image"])
+
+
+def test_who_types_what_an_environment_takes_the_place_of_is_told(tmp_path: Path) -> None:
+    catalog, page = Catalog.discover(), error_page("RG155")
+
+    def said(*sets: str, around: TextureDesc | None = AROUND) -> list[str]:
+        spec = resolve("forward", catalog=catalog, sets=sets)
+        return [str(warning) for warning in link(spec, catalog, (SUN,), environment=around).warnings]
+
+    assert said("light.ambient=0.2") == [page["message"]]
+    assert said("light.ambient=0.2", "light.environment=null") == []
+    assert said("light.ambient=0.2", around=None) == []
+    (tmp_path / "mine.yaml").write_text("extends: forward\nnodes: {light: {params: {ambient: 0.2}}}\n")
+    written = resolve(tmp_path / "mine.yaml", catalog=catalog)  # it may be for scenes without
+    assert link(written, catalog, (SUN,), environment=AROUND).warnings == ()
 
 
 @pytest.mark.slow

@@ -84,7 +84,9 @@ def test_parameters_say_what_they_may_be(painter: Painter) -> None:
         "choices": [],
         "kind": "number",
         "takes": "",
+        "idle": "",
     }
+    assert nodes["light"]["parameters"]["ambient"]["idle"] == "environment"
     assert "phong" in nodes["light"]["parameters"]["shading"]["choices"]
     assert nodes["light"]["parameters"]["ambient"]["kind"] == "color"
     assert nodes["sun"]["parameters"]["resolution"]["kind"] == "integer"

@@ -124,8 +124,9 @@ function row(path, label, about, changed, fields) {
   const back = changed
     ? h("button", { class: "back", title: "Take the change back", "aria-label": `Take back ${path}`, onclick: () => send({ do: "drop", path }) }, "↺")
     : h("span");
-  const tip = [about.doc, about.takes && `Takes ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
-  return h("div", { class: changed ? "parameter set" : "parameter", title: tip, "data-path": path },
+  const idle = about.idle && `Nothing looks at it while ${about.idle} is connected.`;
+  const tip = [idle, about.doc, about.takes && `Takes ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
+  return h("div", { class: `parameter${changed ? " set" : ""}${idle ? " idle" : ""}`, title: tip, "data-path": path },
     h("span", {}, h("label", { for: id }, label)),
     h("span", { class: "field" }, ...fields, about.unit ? h("span", { class: "quiet" }, about.unit) : null), back);
 }
