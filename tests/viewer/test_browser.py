@@ -203,6 +203,9 @@ def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
 ) -> None:
     page.choose("shadows")
     page.after(lambda: page.page.select_option("[id='p-shadows.type']", "shadow_vsm"))
+    page.page.evaluate("Object.defineProperty(navigator, 'clipboard', {value: undefined})")  # as over HTTP
+    page.page.click("#copy")
+    assert page.text("#changes pre") == "-s shadows.type=shadow_vsm"
     page.page.click("#save")
     page.page.fill("#file", "soft.yaml")
     page.page.click("dialog button[value=save]")

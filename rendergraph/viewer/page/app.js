@@ -140,7 +140,9 @@ function start() {
   $("play").onclick = () => send({ do: "play", on: !state.playing });
   $("frame").onchange = () => { if ($("frame").checkValidity()) send({ do: "frame", number: Number($("frame").value) }); };
   $("scrub").oninput = () => send({ do: "frame", number: Number($("scrub").value) });
-  $("copy").onclick = () => navigator.clipboard.writeText(flags()).then(() => { $("link").textContent = "copied"; });
+  const byHand = () => chooseTab("changes");  // where a browser lets no page write there: one from another machine, over HTTP
+  $("copy").onclick = () => (navigator.clipboard
+    ? navigator.clipboard.writeText(flags()).then(() => { $("link").textContent = "copied"; }, byHand) : byHand());
   $("save").onclick = () => { $("saving").returnValue = ""; $("saving").showModal(); };
   $("saving").onclose = () => { if ($("saving").returnValue === "save") send({ do: "save", name: $("file").value }); };
   TABS.forEach((tab, i) => {
