@@ -1,6 +1,9 @@
 // Ground-truth ambient occlusion (J. Jimenez et al., 2016): in each slice through the eye and the pixel the two
 // horizons, and of the light between them the integral in closed form.
 #include "surfaces.glsl"
+#ifdef SPARSE
+#define ARMS max(SAMPLES / STEPS / 4 * 2, 2)  // reduced pixels share with more than twice as many
+#endif
 #include "arms.glsl"
 #include "slice.glsl"
 #include "quad.glsl"
@@ -58,6 +61,11 @@ vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
         whole += s.share * s.whole;
         along = turned(along, ARMS);
     }
+#ifdef SPARSE
+    // What all slices have in the mean, as the neighbours have others: a quotient of each pixel's own would count slices
+    // alike that the normal has little of. Where few neighbours are on the surface, at full size, one's own is better.
+    whole = float(ARMS / 2);
+#endif
     return vec4(open / whole, 1.0 - blocked / whole);
 }
 
