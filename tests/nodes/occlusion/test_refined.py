@@ -81,6 +81,18 @@ def test_slopes_are_interpolated_and_contacts_drawn(occlusion: Occlusion, techni
     assert np.abs(two - whole)[slope].mean() < 0.02
 
 
+@pytest.mark.parametrize("technique", ["hbao", "gtao"])
+def test_fewer_arms_of_reduced_pixels_find_as_much(occlusion: Occlusion, technique: str) -> None:
+    """Floor and wall seen aslant, all interpolated, against 16 arms a pixel: `gtao`'s slices count by their weights."""
+    scene = CORNER.replace("eye: [4, 4, 4], target: [0, 0.2, 0]", "eye: [4, 0.6, 0.5], target: [0, 0.4, -0.9]")
+    two = occlusion(technique, scene, SIZE, samples=32, radius=1.5, scale=0.5, contrast=1)
+    whole = occlusion(technique, scene, SIZE, samples=128, radius=1.5, scale=1)
+    shade = whole < 0.97
+    assert shade.mean() > 0.4
+    assert abs((two - whole)[shade].mean()) < 0.006  # 0.015 if each pixel's slices counted alike
+    assert np.sqrt(((two - whole)[shade] ** 2).mean()) < 0.035
+
+
 def test_without_a_blur_every_pixel_is_its_own(occlusion: Occlusion) -> None:
     """Noise is not interpolated: pixel by pixel the picture that knows of no other size."""
     two, whole = (occlusion("hemisphere", STUDY, SIZE, radius=0.5, blur=0, scale=scale) for scale in (0.5, 1))
