@@ -119,10 +119,13 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
         return read(shipped[source], None, limits, keep_going=True)
     path = Path(source)
     if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
-        from rendergraph.scene.meshes import MESHES  # what has another ending is rare
+        import shlex  # what has another ending is rare
+
+        from rendergraph.scene.meshes import MESHES
 
         if path.suffix.lower() in MESHES:
-            text = f"this is no pipeline but a scene; draw it with: rendergraph run forward --scene {shown_file(path)}"
+            way = f"rendergraph run forward --scene {shlex.quote(shown_file(path))}"
+            text = f"this is no pipeline but a scene; draw it with: {way}"
             raise InputError(Problem("RG013", text, Place(str(path))))
     return read(path, None, limits, keep_going=True)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 from rendergraph.declare import Input, Parameter
@@ -18,11 +18,20 @@ def described(planned: Planned) -> dict[str, Any]:
     linked = planned.linked
     graph, spec = linked.graph, linked.spec
     families = {name: family for family, names in linked.catalog.families().items() for name in names}
+    read: dict[str, set[str]] = {node.id: set() for node in graph.nodes}
+    ends = [end for reader in graph.nodes for links in reader.inputs.values() for end in links]
+    for end in (*ends, *graph.outputs.values()):
+        read[end.node].add(end.port)
     nodes = {
         node.id: {
             "type": node.type.name,
             "doc": (node.type.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
-            **_types(linked, node, [name for name, family in families.items() if family == node.type.family]),
+            **_types(
+                linked,
+                node,
+                read[node.id],
+                [name for name, family in families.items() if family == node.type.family],
+            ),
             "parameters": {
                 name: _parameter(parameter, getattr(node.node, name), _added(linked, parameter))
                 | {"idle": parameter.unless if node.inputs.get(parameter.unless) else ""}
@@ -56,11 +65,8 @@ def described(planned: Planned) -> dict[str, Any]:
     }
 
 
-def _types(linked: Linked, node: GraphNode, family: Sequence[str]) -> dict[str, list[str]]:
+def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str]) -> dict[str, list[str]]:
     """The types of a node's family: those that make what is read of it from what it is given, and the others."""
-    graph = linked.graph
-    ends = [end for reader in graph.nodes for links in reader.inputs.values() for end in links]
-    read = {end.port for end in (*ends, *graph.outputs.values()) if end.node == node.id}
     found: dict[str, list[str]] = {"types": [], "other_types": []}
     for name in sorted(family):
         try:

@@ -185,7 +185,7 @@ def test_what_is_missing_or_wrong_exits_3(cli: Any, tmp_path: Path, words: list[
     ("name", "text", "drawn"),
     [
         ("knot.glb", "glTF", "knot.glb"),
-        ("box.OBJ", "v 0 0 0", "box.OBJ"),
+        ("my box.OBJ", "v 0 0 0", "'my box.OBJ'"),
         ("ball.yaml", "scene: 1\nobjects: {}", "FILE"),
     ],
 )
