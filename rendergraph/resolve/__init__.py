@@ -127,7 +127,13 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
             way = f"rendergraph run forward --scene {shlex.quote(shown_file(path))}"
             text = f"this is no pipeline but a scene; draw it with: {way}"
             raise InputError(Problem("RG013", text, Place(str(path))))
-    return read(path, None, limits, keep_going=True)
+    try:
+        return read(path, None, limits, keep_going=True)  # it is looked for again, also where it is missing now
+    except InputError:
+        if path.exists() or path.stem not in shipped_pipelines():
+            raise
+        text = f"there is no file '{path}'; did you mean '{path.stem}', which is shipped?"
+        raise InputError(Problem("RG011", text)) from None
 
 
 def _patch(patch: Path | Mapping[str, Any], files: Files, limits: YamlLimits) -> Value:

@@ -150,6 +150,7 @@ def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path
     ("words", "message"),
     [
         (["run", "forwrd"], "RG015 there is no shipped pipeline 'forwrd'; did you mean 'forward'?"),
+        (["run", "forward.yaml"], "RG011 there is no file 'forward.yaml'; did you mean 'forward', which is shipped?"),
         (["run", "glass"], "'glass'; it is a scene, draw it with: rendergraph run forward --scene glass"),
         (["run", "forward", "--scene", "bloom"], "RG015 there is no shipped scene 'bloom'; it is a pipeline"),
         (
