@@ -15,7 +15,7 @@ out Value unfiltered;
 
 // The highest that surfaces rise along an arm, or `lowest`, as a cosine to the eye.
 float horizon_along(
-    View v, ivec2 texel, vec2 middle, vec2 reach, vec3 position, vec4 here, float lowest, float stretch
+    View v, vec2 middle, vec2 reach, vec3 position, vec4 here, float lowest, float stretch
 ) {
     ivec2 size = textureSize(surfaces, 0);
     vec3 eye = to_eye(v, position);
@@ -40,7 +40,7 @@ float below(Slice s, float horizon, float side) {
 }
 
 // Openness in w; in xyz, with FOUR, the direction of what is open.
-vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
+vec4 open_at(View v, vec2 middle, vec3 position, vec4 here) {
     vec2 reach = covered(v, radius, clip_w(v, here.w));
     vec3 eye = to_eye(v, position);
     vec2 along = first_arm(ARMS);
@@ -51,9 +51,9 @@ vec4 open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
         Slice s = slice_along(along, eye, here.xyz);
         float stretch = stretch_of(number);
         float after = horizon_along(
-            v, texel, middle, reach * along, position, here, tangent_plane(s, 1.0), stretch);
+            v, middle, reach * along, position, here, tangent_plane(s, 1.0), stretch);
         float before = horizon_along(
-            v, texel, middle, -reach * along, position, here, tangent_plane(s, -1.0), 1.0 - stretch);
+            v, middle, -reach * along, position, here, tangent_plane(s, -1.0), 1.0 - stretch);
         blocked += s.share * (below(s, after, 1.0) + below(s, before, -1.0));
 #ifdef FOUR
         open += s.share * arc_direction(s, -acos(before), acos(after));
@@ -76,7 +76,7 @@ void main() {
     vec4 here = texelFetch(surfaces, texel, 0);
     vec2 middle = place_for(texel, size, screen);
     vec3 position = view_position(v, middle, here.w);
-    vec4 found = here.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : open_at(v, texel, middle, position, here);
+    vec4 found = here.w == 0.0 ? vec4(0.0, 0.0, 0.0, 1.0) : open_at(v, middle, position, here);
     found = mean_of_quad(found, here, position, 0.1 * radius + depth_error(v, here.w));
 #ifdef FOUR
     unfiltered = vec4(mat3(v.inverse_view) * found.xyz, found.w);

@@ -12,7 +12,7 @@ uniform float radius;       // metres
 uniform float attenuation;  // 0 to 1
 out float unfiltered;
 
-float open_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
+float open_at(View v, vec2 middle, vec3 position, vec4 here) {
     ivec2 size = textureSize(surfaces, 0);
     vec2 reach = covered(v, radius, clip_w(v, here.w));
     vec3 eye = to_eye(v, position);
@@ -51,6 +51,6 @@ void main() {
     vec4 here = texelFetch(surfaces, texel, 0);
     vec2 middle = place_for(texel, size, screen);
     vec3 position = view_position(v, middle, here.w);
-    float open = here.w == 0.0 ? 1.0 : open_at(v, texel, middle, position, here);
+    float open = here.w == 0.0 ? 1.0 : open_at(v, middle, position, here);
     unfiltered = mean_of_quad(vec4(open), here, position, 0.1 * radius + depth_error(v, here.w)).x;
 }
