@@ -13,6 +13,7 @@ from rendergraph.compare.elsewhere import compared
 from rendergraph.compare.reference import (
     compared_output,
     measured_at,
+    named_reference,
     on_one_stage,
     read_picture,
     scene_name,
@@ -54,8 +55,8 @@ class _Drawn:
 
 
 def compare(
-    pipelines: Sequence[Pipeline | str | Path],
-    reference: Path | Pipeline | None = None,
+    pipelines: Sequence[Pipeline | str | Path] | Pipeline | str | Path,
+    reference: Path | Pipeline | str | None = None,
     *,
     metric: str | None = None,
     names: Sequence[str] = (),
@@ -72,7 +73,7 @@ def compare(
 
     Args:
         pipelines: what is compared, shipped names and files too; all are drawn with the first one's scene and size.
-        reference: a picture file or another pipeline; the first of `pipelines` by default.
+        reference: a picture file or another pipeline, also by its name; the first of `pipelines` by default.
         metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
         names: what the pipelines are called; as their files by default.
         frames: how many frames of each are measured; the pipelines take turns.
@@ -91,9 +92,11 @@ def compare(
     """
     from rendergraph.session.gpu import opened  # a sweep is checked without GL
 
+    if isinstance(pipelines, (Pipeline, str, Path)):
+        pipelines = [pipelines]
     if not pipelines:
         raise UsageError(Problem("RG500", "there is no pipeline to compare"))
-    loaded_ones = [loaded(each) for each in pipelines]
+    loaded_ones, reference = [loaded(each) for each in pipelines], named_reference(reference)
     own = [] if reference is None or isinstance(reference, Path) else [reference]
     with looking() as files:
         staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*loaded_ones, *own]])

@@ -12,7 +12,7 @@ from rendergraph.compare.batches import MOST_BYTES, MOST_RUNS
 from rendergraph.compare.front import pareto
 from rendergraph.compare.goals import Search
 from rendergraph.compare.prepare import prepare
-from rendergraph.compare.reference import scene_name
+from rendergraph.compare.reference import named_reference, scene_name
 from rendergraph.compare.runs import RUN, Failure
 from rendergraph.compare.study import begin, claimed, open_folder
 from rendergraph.compare.values import Comparison, Reference
@@ -88,7 +88,7 @@ def sweep(
     base: Pipeline | str | Path,
     axes: Axes,
     out: Path | str,
-    reference: Path | Pipeline | None = None,
+    reference: Path | Pipeline | str | None = None,
     *,
     metric: str | None = None,
     frames: int = 5,
@@ -117,7 +117,7 @@ def sweep(
         axes: paths with values or ranges: `{"ao.samples": [8, 16], "ao.radius": "log:0.1:1:5"}`; a `Space` of them for
             samples, or axes that go together.
         out: the folder; `results.jsonl` in it grows by a line a run that has been measured.
-        reference: a picture or a pipeline that runs are measured against; the first run by default.
+        reference: a picture or a pipeline that runs are measured against, also by its name; the first run by default.
         metric: the port whose texture is measured in place of the picture: `ao.occlusion`.
         frames: how many frames are measured, at least; runs that are there and have fewer are measured again.
         repeats: how often they are measured, each time anew: the spread of the medians says what a time is worth.
@@ -143,7 +143,7 @@ def sweep(
         RenderError: it failed while writing, or while drawing what runs are measured against.
         DeviceError: there is no usable GL device.
     """
-    base, out = loaded(base), Path(out)
+    base, out, reference = loaded(base), Path(out), named_reference(reference)
     with looking() as files:
         planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
     runs = planned.runs

@@ -12,6 +12,8 @@ from msgspec.structs import replace
 from rendergraph.compare.values import Pixels
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.metrics import Encoding, check_sizes
+from rendergraph.session.made import is_picture
+from rendergraph.session.pipeline import Pipeline, load
 from rendergraph.textures import FORMATS
 
 METRIC = "metric"
@@ -19,8 +21,14 @@ METRIC = "metric"
 WHOLE = frozenset(name for name, format in FORMATS.items() if format.family in ("int", "uint"))
 
 if TYPE_CHECKING:
-    from rendergraph.session import Pipeline
     from rendergraph.session.values import Linked
+
+
+def named_reference(reference: Path | Pipeline | str | None) -> Path | Pipeline | None:
+    """A reference, or the picture or pipeline of a name or a file."""
+    if not isinstance(reference, str):
+        return reference
+    return Path(reference) if is_picture(reference) else load(reference)
 
 
 def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:

@@ -26,6 +26,17 @@ def test_nothing_cannot_be_compared(gl: rg.Session) -> None:
         compare([], session=gl)
 
 
+def test_one_pipeline_and_a_reference_by_their_names(gl: rg.Session, tmp_path: Path) -> None:
+    found = compare(rg.load("overdraw", size=(8, 8)), "overdraw", frames=1, session=gl)
+    assert [result.metrics for result in found.results] == [SAME]
+    assert found.reference.name == "overdraw"
+    for name, message in (("overdrw", "RG015 .* did you mean 'overdraw'"), ("none.png", "none.png: RG350 ")):
+        with pytest.raises(InputError, match=message):
+            compare("overdraw", name)
+        with pytest.raises(InputError, match=message):
+            rg.sweep("overdraw", {"overdraw.top": 3}, tmp_path / "out", name)
+
+
 def test_a_pipeline_against_itself_is_nothing_but_zeros(gl: rg.Session) -> None:
     found = compare([rg.load("forward", size=SIZE), "forward"], frames=1, session=gl)
     assert [result.name for result in found.results] == ["forward", "forward-2"]
