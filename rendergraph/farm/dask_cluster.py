@@ -172,7 +172,11 @@ class Dask(Executor):
         while named:
             try:
                 found = self._client.scatter(named, hash=False, broadcast=COPIES)
-            except OSError as error:  # a worker that nobody knows yet to be gone
+            except (
+                OSError,
+                KeyError,
+                ValueError,
+            ) as error:  # a worker is gone, or goes: the scheduler has no word for it
                 self._answers(None)
                 if time.monotonic() - begun > CONNECT:
                     raise RenderError(Problem("RG641", f"the workers take no files ({error}); {_KEPT}")) from error

@@ -22,6 +22,7 @@ from rendergraph.compare.pictures import compare
 from rendergraph.compare.product import Sweep, sweep
 from rendergraph.compare.study import RESULTS
 from rendergraph.errors import InputError, RenderError, UsageError
+from rendergraph.farm import dask_cluster
 from rendergraph.farm.processes import Processes
 
 distributed: Any = pytest.importorskip("distributed")
@@ -362,6 +363,28 @@ def test_what_was_lost_with_all_workers_is_sent_to_the_next(
     assert "lost" in told
     assert there.failures == ()
     same(here, tmp_path / "here", there, tmp_path / "there")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("error", [OSError("closed"), KeyError("tcp://10.0.0.1:1"), ValueError("no replicas")])
+def test_what_a_worker_does_not_get_as_it_goes_is_sent_to_others(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """What Dask's scheduler says where a worker goes before, while and after it is sent something."""
+    sent: list[Any] = []
+
+    def scatter(client: Any, named: Any, **words: Any) -> Any:
+        sent.append(named)
+        if len(sent) == 1:
+            raise error
+        return scattered(client, named, **words)
+
+    scattered = distributed.Client.scatter
+    monkeypatch.setattr(distributed.Client, "scatter", scatter)
+    with dask_cluster.local(1, (), timeout=60.0) as farm:
+        farm.put("what is needed")
+    assert len(sent) == 2
+    assert sent[0] == sent[1]
 
 
 HALO = '''"""A node of an installed plugin."""
