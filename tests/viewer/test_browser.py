@@ -316,6 +316,15 @@ def test_two_tabs_are_one_view(page: Hand) -> None:
     other.page.locator("#stops").fill("2")
     page.page.wait_for_selector("#stops-value:has-text('2 EV')")
     assert page.page.input_value("#stops") == "2"
+    page.page.click("#tab-changes")
+    field = page.page.locator("[id='p-display.exposure']")
+    field.fill("9")
+    page.after(lambda: other.page.fill("[id='p-display.exposure']", "2") or other.page.keyboard.press("Enter"))
+    page.page.wait_for_selector("#changes td:text-is('2')")
+    assert field.input_value() == "9", "somebody writes there"
+    field.fill("1")  # what stood there before
+    left = "document.activeElement.blur(), document.getElementById('p-display.exposure').value"
+    assert page.page.evaluate(left) == "2"
     other.page.close()
     page.after(lambda: page.page.click("#undo"))
     assert other.wrong == []

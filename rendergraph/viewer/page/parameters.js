@@ -4,7 +4,7 @@ import { send } from "./socket.js";
 
 let held = null;     // the setting that a slider or a colour's window is moving, so that its way is one step of undo
 let writing = null;  // the field that somebody is writing in
-let drawn = { made: [], kept: null };  // what the inputs were made of, and the row that was not made anew
+let drawn = { made: [], kept: null, fresh: null };  // what the inputs were made of, the row that stayed, and how it would be
 
 const set = (path, value) => {
   send({ do: "set", path, value, again: held === path });
@@ -181,7 +181,7 @@ export function showParameters(place, pipeline, node, edits) {
   const kept = writing && place.contains(writing) ? writing.closest(".parameter") : null;
   const made = [pipeline, node, JSON.stringify(edits)];
   if (made.every((part, i) => part === drawn.made[i]) && (drawn.kept === null || drawn.kept === kept)) return;
-  drawn = { made, kept };
+  drawn = { made, kept, fresh: null };
   const focused = document.activeElement?.id;
   const parts = [];
   const about = pipeline.nodes[node];
@@ -215,6 +215,7 @@ export function showParameters(place, pipeline, node, edits) {
   const at = kept ? parts.findIndex((part) => part.dataset.path === kept.dataset.path) : -1;
   if (at < 0) place.replaceChildren(...parts);
   else {  // a row that is moved loses the focus, so the others go around it
+    drawn.fresh = parts[at];
     for (const other of [...place.children]) if (other !== kept) other.remove();
     kept.before(...parts.slice(0, at));
     kept.after(...parts.slice(at + 1));
@@ -229,5 +230,12 @@ export function showParameters(place, pipeline, node, edits) {
 // A field is written in from the first letter until it is taken over or left.
 export function startParameters(place) {
   place.addEventListener("input", ({ target }) => { if (target.matches("input[type=number], input[type=text]")) writing = target; });
-  for (const end of ["change", "focusout"]) place.addEventListener(end, () => { writing = null; });
+  place.addEventListener("change", () => { writing = drawn.fresh = null; });  // what was written is newer
+  place.addEventListener("focusout", ({ relatedTarget }) => {
+    writing = null;
+    const { kept, fresh } = drawn;
+    if (!fresh || kept.contains(relatedTarget)) return;
+    drawn.kept = drawn.fresh = null;
+    kept.replaceWith(fresh);  // and no other row: the hand may be on its way to one
+  });
 }
