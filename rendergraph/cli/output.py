@@ -101,20 +101,23 @@ def _write(text: str) -> None:
 
 def warn(problems: Sequence[Problem]) -> None:
     """Warnings, each once."""
-    for problem in {str(problem): problem for problem in problems}.values():
-        tell(problem)
+    Warnings().say(problems)
 
 
 class Warnings:
-    """Says each warning once, however often it comes up."""
+    """Says each warning once, however often it comes up; of several values of one setting, of the first."""
 
     def __init__(self) -> None:
-        self._said: set[str] = set()
+        self._said: set[tuple[str, str, str]] = set()
 
     def say(self, problems: Sequence[Problem]) -> None:
         """Those that have not been said."""
-        warn([problem for problem in problems if str(problem) not in self._said])
-        self._said.update(str(problem) for problem in problems)
+        for problem in problems:
+            where = str(problem.place or "")
+            said = problem.code, problem.text, where.partition("=")[0] if where.startswith("--set ") else where
+            if said not in self._said:
+                self._said.add(said)
+                tell(problem)
 
 
 def say_summary(report: dict[str, Any]) -> None:

@@ -62,8 +62,9 @@ vec4 open_at(View v, vec2 middle, vec3 position, vec4 here) {
         along = turned(along, ARMS);
     }
 #ifdef SPARSE
-    // What all slices have in the mean, as the neighbours have others: a quotient of each pixel's own would count slices
-    // alike that the normal has little of. Where few neighbours are on the surface, at full size, one's own is better.
+    // What all slices have in the mean, as the neighbours have others: a quotient of each pixel's own would count
+    // slices alike that the normal has little of. Where few neighbours are on the surface, at full size, one's own is
+    // better.
     whole = float(ARMS / 2);
 #endif
     return vec4(open / whole, 1.0 - blocked / whole);

@@ -213,7 +213,7 @@ def test_a_sweep_of_which_nothing_can_be_drawn_says_why(cli: Any, tmp_path: Path
 def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     (tmp_path / "study.yaml").write_text(
-        "sweep: 1\npipeline: forward\nsize: [32, 18]\nframes: 1\nset: {sun.resolution: 64}\nreference: shading-pbr\n"
+        "sweep: 1\npipeline: forward\nsize: [32, 18]\nframes: 1\nset: {sun.resolution: 64, light.environment: null}\nreference: shading-pbr\n"
         "minimise: rmse\nbudget: 3\nseed: 4\naxes: {light.ambient: 0.0:0.5, display.exposure: -1:1:0.5}\n"
     )
     assert cli("check", "study.yaml").err == "study.yaml: a sweep of 3 runs\n"
@@ -225,6 +225,13 @@ def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     again = cli("sweep", "study.yaml", "-o", "out", "--resume").out
     assert "3 runs kept from before" in again
     assert f"least{' ' * (len(told['search']['front'][0]) - 5)}  rmse" in again
+
+
+def test_what_is_odd_of_every_value_is_said_of_the_first(cli: Any, tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text("sweep: 1\npipeline: forward\naxes: {light.ambient: [0, 0.5, 1]}\n")
+    first, last = cli("check", "study.yaml").err.splitlines()
+    assert first.startswith("--set light.ambient=0: warning: RG155 ")
+    assert last == "study.yaml: a sweep of 3 runs"
 
 
 @pytest.mark.parametrize(
