@@ -25,10 +25,12 @@ Future: TypeAlias = Any
 
 CONNECT = 10.0
 """Seconds for a scheduler to answer, and to come back."""
-_KEPT = "what is finished is kept: --resume goes on"
 COPIES = 2
 """Workers that have what was sent before any asks for it: the loss of one loses nothing."""
 _POLL = 0.25
+_KEPT = "what is finished is kept: --resume goes on"
+_GOING = (OSError, KeyError, ValueError)
+"""What Dask's scheduler raises where a worker goes while it is sent something; it has no word for it."""
 
 
 def need() -> None:
@@ -172,11 +174,7 @@ class Dask(Executor):
         while named:
             try:
                 found = self._client.scatter(named, hash=False, broadcast=COPIES)
-            except (
-                OSError,
-                KeyError,
-                ValueError,
-            ) as error:  # a worker is gone, or goes: the scheduler has no word for it
+            except _GOING as error:
                 self._answers(None)
                 if time.monotonic() - begun > CONNECT:
                     raise RenderError(Problem("RG641", f"the workers take no files ({error}); {_KEPT}")) from error

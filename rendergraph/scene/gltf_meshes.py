@@ -10,7 +10,7 @@ from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
 from rendergraph.scene.gltf_buffers import Accessor, Buffers
 from rendergraph.scene.gltf_json import JsonObject
-from rendergraph.scene.model import FARTHEST, Floats, Mesh
+from rendergraph.scene.model import FARTHEST, Floats, Mesh, extremes
 
 _FLOAT = (5126,)
 _SMALL = (5126, 5121, 5123)
@@ -136,7 +136,8 @@ class Primitives:
         low = np.array(accessor.part.numbers("min", 3), np.float32)
         high = np.array(accessor.part.numbers("max", 3), np.float32)
         slack = 1e-4 * max(1e-30, float(np.abs(positions).max()))
-        if (positions.min(axis=0) < low - slack).any() or (positions.max(axis=0) > high + slack).any():
+        least, most = extremes(positions)
+        if (least < low - slack).any() or (most > high + slack).any():
             self._reading.warn(
                 "RG332", "bounds", f"{accessor.part.path}: positions pass 'min' or 'max'; the data is used"
             )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from rendergraph.stamps import Stamps
 Floats: TypeAlias = npt.NDArray[np.float32]
 Matrix: TypeAlias = npt.NDArray[np.float64]
 Vec3: TypeAlias = tuple[float, float, float]
+T = TypeVar("T", bound=np.floating[Any])
 
 
 FARTHEST = 1e12
@@ -31,6 +32,12 @@ FARTHEST = 1e12
 _REFLECTANCE = ("ior", "specular", "specular_color")
 _MOST_CONVEX = 10_000_000
 """Pairs of vertex and triangle that are looked at to see whether a mesh is convex: about a tenth of a second."""
+
+
+def extremes(points: npt.NDArray[T]) -> tuple[npt.NDArray[T], npt.NDArray[T]]:
+    """The least and the greatest of each coordinate of points (n, 3), (3,) each."""
+    columns = np.ascontiguousarray(points.T)  # along rows of three NumPy takes thirty times as long
+    return columns.min(axis=1), columns.max(axis=1)
 
 
 class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
@@ -58,8 +65,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     @cached_property
     def box(self) -> tuple[Floats, Floats]:
         """Minimum and maximum corner, float32 (3,) each."""
-        columns = np.ascontiguousarray(self.positions.T)  # along rows of three NumPy takes thirty times as long
-        return columns.min(axis=1), columns.max(axis=1)
+        return extremes(self.positions)
 
     @cached_property
     def plane(self) -> tuple[float, float, float, float] | None:
@@ -356,7 +362,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         low, high = boxes[[used[entry.mesh] for entry in shown]].swapaxes(0, 1)
         center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
         extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
-        (x, y, z), (u, v, w) = (center - extent).min(axis=0).tolist(), (center + extent).max(axis=0).tolist()
+        (x, y, z), (u, v, w) = extremes(center - extent)[0].tolist(), extremes(center + extent)[1].tolist()
         return (x, y, z), (u, v, w)
 
     def has_grain(self, material: Material) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.scene.model import Floats
+from rendergraph.scene.model import Floats, extremes
 
 Indices = npt.NDArray[np.uint32]
 _BATCH = 32  # triangles whose vertices a GPU typically shades together
@@ -60,15 +60,14 @@ def batch_acmr(triangles: Indices) -> float:
 
 def morton(points: Floats) -> npt.NDArray[np.uint64]:
     """30-bit Morton code of each point within the box of all."""
-    columns = np.ascontiguousarray(points.T)
-    low, high = columns.min(axis=1), columns.max(axis=1)
+    low, high = extremes(points)
     with np.errstate(over="ignore"):
         extent = max(float((high - low).max()), 1e-30)
     if not np.isfinite(extent):  # a box beyond single precision has no curve
         return np.zeros(len(points), np.uint64)
     code = np.zeros(len(points), np.uint32)
     for axis in range(3):
-        bits = ((columns[axis] - low[axis]) * np.float32(1023 / extent)).astype(np.uint32)
+        bits = ((points[:, axis] - low[axis]) * np.float32(1023 / extent)).astype(np.uint32)
         for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
             bits = (bits | (bits << np.uint32(shift))) & np.uint32(mask)
         code |= bits << np.uint32(axis)

@@ -17,7 +17,7 @@ def described(planned: Planned) -> dict[str, Any]:
     """Everything but pictures and times, as plain JSON values."""
     linked = planned.linked
     graph, spec = linked.graph, linked.spec
-    families = {name: family for family, names in linked.catalog.families().items() for name in names}
+    families = linked.catalog.families()
     read: dict[str, set[str]] = {node.id: set() for node in graph.nodes}
     ends = [end for reader in graph.nodes for links in reader.inputs.values() for end in links]
     for end in (*ends, *graph.outputs.values()):
@@ -26,12 +26,7 @@ def described(planned: Planned) -> dict[str, Any]:
         node.id: {
             "type": node.type.name,
             "doc": (node.type.cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " "),
-            **_types(
-                linked,
-                node,
-                read[node.id],
-                [name for name, family in families.items() if family == node.type.family],
-            ),
+            **_types(linked, node, read[node.id], families.get(node.type.family, ())),
             "parameters": {
                 name: _parameter(parameter, getattr(node.node, name), _added(linked, parameter))
                 | {"idle": parameter.unless if node.inputs.get(parameter.unless) else ""}
@@ -68,7 +63,7 @@ def described(planned: Planned) -> dict[str, Any]:
 def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str]) -> dict[str, list[str]]:
     """The types of a node's family: those that make what is read of it from what it is given, and the others."""
     found: dict[str, list[str]] = {"types": [], "other_types": []}
-    for name in sorted(family):
+    for name in family:
         try:
             cls = linked.catalog.get(name).cls
         except InputError:  # a plugin's that cannot be imported

@@ -205,7 +205,8 @@ class Server:
             path = self.desk.file(message.get("name"))
             self._ask(page, Variant(self.desk.opened), lambda answer: page.put("saved", _saved(path, answer)))
         else:
-            page.holds = bool(message.get("on")) if act == "hold" else page.holds
+            if act == "hold":
+                page.holds = bool(message.get("on"))
             if self.desk.said(message):
                 self._want()
             if _text("state", state := self.desk.state()) != self._last.get("state"):

@@ -213,7 +213,8 @@ def test_a_sweep_of_which_nothing_can_be_drawn_says_why(cli: Any, tmp_path: Path
 def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     (tmp_path / "study.yaml").write_text(
-        "sweep: 1\npipeline: forward\nsize: [32, 18]\nframes: 1\nset: {sun.resolution: 64, light.environment: null}\nreference: shading-pbr\n"
+        "sweep: 1\npipeline: forward\nsize: [32, 18]\nframes: 1\nreference: shading-pbr\n"
+        "set: {sun.resolution: 64, light.environment: null}\n"
         "minimise: rmse\nbudget: 3\nseed: 4\naxes: {light.ambient: 0.0:0.5, display.exposure: -1:1:0.5}\n"
     )
     assert cli("check", "study.yaml").err == "study.yaml: a sweep of 3 runs\n"
