@@ -186,6 +186,37 @@ def test_light_between_surfaces_brightens_by_the_papers_fit(occlusion: Occlusion
     assert (lit - plain).max() > 0.1
 
 
+@pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0])
+def test_horizons_weigh_the_sky_by_how_far_off_it_goes(occlusion: Occlusion, attenuation: float) -> None:
+    """`hbao` in a corner, seen from 45°: the integral of 1 - a (r / R)² over the sine, slice by slice through the eye."""
+    side, eye, target, radius = 121, 4.0, 0.8, 0.5
+    away = floor_distance(side, eye, target, "height: 3")
+    judged = (away > 0.1) & (away < 0.9 * radius)
+    to_eye = np.array([0, eye, eye - target]) / np.hypot(eye, eye - target)
+    upward = np.cross(to_eye, [1, 0, 0])
+    turns = (np.arange(360) + 0.5) * np.pi / 180
+    on_screen = np.cos(turns)[:, None] * np.array([1, 0, 0]) + np.sin(turns)[:, None] * upward
+    steps = np.linspace(0, 1, 2001)
+
+    def hidden(distance: float, along: Floats) -> float:
+        # Outwards by `out` on the screen the slice is on the floor up to the wall z = 0, and then on the wall.
+        foot = -distance / (along[2] - to_eye[2] * along[1] / to_eye[1])
+        if not 0 < foot < radius:
+            return 0.0
+        out = foot + steps * (radius - foot)
+        near = -(distance + out * along[2]) / to_eye[2]
+        far = np.hypot(out, near)
+        sine, within = near / far, far[1:] <= radius
+        weight = 1 - attenuation * ((far[1:] + far[:-1]) / 2 / radius) ** 2
+        return float((weight * np.diff(sine).clip(0))[within].sum())
+
+    expected = [1 - np.mean([hidden(distance, along) for along in on_screen]) for distance in away[judged]]
+    scene = CORNER.format(eye=eye, target=target, lens="height: 3")
+    found = occlusion("hbao", scene, (side, side), samples=128, radius=radius, scale=1, attenuation=attenuation)
+    off = found[judged, side // 2] - expected
+    assert np.abs(off[1:] + off[:-1]).max() / 2 < 0.03  # two rows share what they find
+
+
 def floor_distance(side: int, eye: float, target: float, lens: str) -> Floats:
     """Where the middle of each row of the picture of `CORNER` meets the floor: z."""
     kind, number = lens.split(": ")
