@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Input, Output, WrittenPort
+from rendergraph.declare.mistakes import RESERVED_NAMES
 from rendergraph.errors import InputError
 from rendergraph.glsl import strip_comments
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.literals import literal
 
 TAKEN = set("out uniform float int bool vec sampler half filter copy json schema image".split())  # noqa: SIM905 - as text
-WORDS = st.from_regex(r"\A[a-z]{3,8}\Z").filter(lambda word: word not in TAKEN)
+WORDS = st.from_regex(r"\A[a-z]{3,8}\Z").filter(lambda word: word not in TAKEN | RESERVED_NAMES)
 
 
 def load(folder: Path, text: str, name: str = "effect.frag") -> NodeType:
