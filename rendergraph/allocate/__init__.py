@@ -265,7 +265,7 @@ def _blocks(
 ) -> Groups:
     """Textures in blocks of memory, buffers as they are; no history and nothing kept is among them."""
     textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
-    items = [Item(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures]
+    items = tuple([Item(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])
     buffers = [group for group in by_desc if isinstance(classes[group[0]], BufferDesc)]
     blocks = [[textures[number] for number in block] for block in share_blocks(items)]
     order = {id: place for place, id in enumerate(ids)}

@@ -7,7 +7,8 @@ weight, which is NP-hard; largest first is within 1 % of the optimum on most sma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
+from functools import lru_cache
 
 from msgspec import Struct
 
@@ -22,10 +23,11 @@ class Item(Struct, frozen=True, gc=False):
     bytes: int
     first: int
     last: int
-    kind: object = None
+    kind: Hashable = None
 
 
-def share_blocks(items: Sequence[Item], *, seed: int = 0) -> list[list[int]]:
+@lru_cache(64)  # most changes of a pipeline leave what is placed what it was
+def share_blocks(items: tuple[Item, ...], *, seed: int = 0) -> tuple[tuple[int, ...], ...]:
     """Numbers of the items in each block, in time order, so that the blocks have few bytes.
 
     Largest first, each where the block grows least; of equal ones where its like is, then the tightest. Then seeded
@@ -50,7 +52,7 @@ def share_blocks(items: Sequence[Item], *, seed: int = 0) -> list[list[int]]:
                 best, least = other, taken
             if least == bound:
                 break
-    return [sorted(block, key=lambda n: items[n].first) for block in best]
+    return tuple([tuple(sorted(block, key=lambda n: items[n].first)) for block in best])
 
 
 def least_bytes(items: Sequence[Item]) -> int:

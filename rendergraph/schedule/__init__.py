@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 from msgspec import Struct, field
@@ -18,11 +19,13 @@ from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
 from rendergraph.schedule.dependencies import (
     StepKey,
+    Turns,
     Versions,
     Waits,
     contributing,
     dependencies,
     history_copies,
+    in_turn,
     readers_first,
 )
 from rendergraph.schedule.model import Cost, Model, alive_all_frame
@@ -38,6 +41,8 @@ MOVES_PER_SECOND = 150_000
 TOUCHES_PER_SECOND = 100_000
 # Sets of steps are bit masks: beyond this the search would copy more than it decides.
 MOST_SEARCHED = 1_000
+MOST_IN_TURN = 4
+"""Histories of which each set is tried as those that take a second texture: 16 sets. Of more none or all do."""
 
 
 class Schedule(Struct, frozen=True, dict=True):
@@ -128,17 +133,16 @@ def schedule(
     sinks = _sinks(expansion, kept, versions)
     whole_frame = {id: resources[id].bytes for id in alive_all_frame(resources, kept_versions)}
 
-    models: dict[Hashable, Model] = {}
+    models: dict[Hashable, tuple[Waits, Model]] = {}  # with what is waited for, so that nothing else gets its id
 
     def model_of(waits: Waits, copies: Mapping[str, int]) -> Model:
         key = id(waits), frozenset(copies.items())
         if key not in models:
             alive = whole_frame | {id: resources[id].desc.bytes * number for id, number in copies.items()}
-            models[key] = Model.of(waits, kept, resources, alive, shown, sinks)
-        return models[key]
+            models[key] = waits, Model.of(waits, kept, resources, alive, shown, sinks)
+        return models[key][1]
 
-    early = readers_first(waits, kept, kept_versions)
-    each = [_least(model_of, waits, one, resources, budget_s) for one in early]
+    each = [_least(model_of, waits, turns, resources, budget_s) for turns in readers_first(waits, kept, kept_versions)]
     found = min(each, key=lambda found: (found.cost.pool, found.cost.peak))
     found = replace(found, least=min(one.least for one in each), bound=min(one.bound for one in each))
     order, chosen = found.order, None
@@ -190,32 +194,38 @@ class _Found(Struct, frozen=True):
 def _least(
     model_of: Callable[[Waits, Mapping[str, int]], Model],
     waits: Waits,
-    early: tuple[Waits, Sequence[str]],
+    turns: Turns,
     resources: Mapping[str, Resource],
     budget_s: float,
 ) -> _Found:
-    """The best order: one in which histories are read before they are written, or one that takes another texture.
+    """The best order: one in which histories are read before they are written, or one where some take a second texture.
 
     Args:
         model_of: the steps with these waits, and so many textures of each history.
         waits: what the steps wait for.
-        early: the same with readers of histories first wherever that can be, and the histories that it concerns.
+        turns: the histories that can be read before they are written.
         resources: what the steps touch.
         budget_s: see `schedule`.
     """
-    early_waits, ids = early
-    one = history_copies(model_of(early_waits, {}).steps, resources)
-    first = _optimise(model_of(early_waits, one), early_waits, budget_s)
-    if not ids:
+    early = in_turn(waits, turns)
+    single = history_copies(model_of(early, {}).steps, resources)
+    first = _optimise(model_of(early, single), early, budget_s)
+    if not turns:
         return first
     # Every other order takes a second texture of one of them at least, of which only the smallest is sure.
-    more = [resources[id].desc.bytes for id in ids]
-    if first.least <= model_of(waits, one).bounds()[1] + min(more):
+    more = {id: resources[id].desc.bytes for id in turns}
+    if first.least <= model_of(waits, single).bounds()[1] + min(more.values()):
         return first
-    other = _optimise(model_of(waits, one | dict.fromkeys(ids, 2)), waits, budget_s)
-    best = min(first, other, key=lambda found: (found.cost.pool, found.cost.peak))
-    bound = min(first.bound, other.bound - sum(more) + min(more))
-    return replace(best, least=min(first.least, other.least), bound=bound)
+    every = len(turns) <= MOST_IN_TURN
+    found = [first]
+    for count in range(1, len(turns) + 1) if every else (len(turns),):
+        for twice in combinations(turns, count):
+            some = in_turn(waits, {id: turn for id, turn in turns.items() if id not in twice})
+            found.append(_optimise(model_of(some, single | dict.fromkeys(twice, 2)), some, budget_s))
+    best = min(found, key=lambda one: (one.cost.pool, one.cost.peak))
+    unsure = 0 if every else sum(more.values()) - min(more.values())
+    bound = min(first.bound, *[one.bound - unsure for one in found[1:]])
+    return replace(best, least=min(one.least for one in found), bound=bound)
 
 
 def _optimise(model: Model, waits: Waits, budget_s: float) -> _Found:

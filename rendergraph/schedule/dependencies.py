@@ -24,6 +24,9 @@ StepKey: TypeAlias = tuple[str, int]
 Waits: TypeAlias = Mapping[StepKey, Mapping[StepKey, tuple[str, str]]]
 """Step to the steps it waits for: the resource that is the reason, and `reads`, `continues` or `overwrites`."""
 
+Turns: TypeAlias = Mapping[str, tuple[StepKey, Sequence[StepKey]]]
+"""History to the step that first writes its next value, and the steps that are to read the last one before."""
+
 
 def touched_ids(step: Step) -> dict[str, None]:
     """Ids of the resources a step reads or writes, each once, in its own order."""
@@ -209,12 +212,12 @@ def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> 
     return copies
 
 
-def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> list[tuple[Waits, list[str]]]:
-    """The same with all who read a history's last value ahead of who writes the next, wherever that can be.
+def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> list[Turns]:
+    """The histories whose last value can be read before the next is written, where not every order is so by itself.
 
     Returns:
-        What the steps wait for then, and the histories of which not every order is so by itself. Once, but where one
-        history's readers stand in the way of another's: once for each set of them that go together.
+        As many as can be so together. One such set, but where one history's readers stand in the way of another's: each
+        that they can make.
     """
     readers: dict[str, set[StepKey]] = defaultdict(set)
     for step in kept:
@@ -223,23 +226,32 @@ def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> lis
                 readers[read.resource].add(step.key)
     ids = sorted(readers)
 
-    def in_turn(order: Sequence[str]) -> tuple[Waits, list[str]]:
-        more: dict[StepKey, dict[StepKey, tuple[str, str]]] = {key: dict(found) for key, found in waits.items()}
-        ordered: list[str] = []
+    def together(order: Sequence[str]) -> Turns:
+        more, turns = waits, {}
         for id in order:
             writers = versions.writers[id]
             writer = writers[next(iter(writers))].key
             loose = sorted(reader for reader in readers[id] if not _follows(waits, writer, reader))
             if loose and not any(_follows(more, reader, writer) for reader in readers[id]):
-                more[writer] |= dict.fromkeys(loose, (id, "overwrites"))
-                ordered.append(id)
-        return more, ordered
+                turns[id] = writer, loose
+                more = in_turn(more, {id: turns[id]})
+        return turns
 
-    found = in_turn(ids)
-    if all(id in found[1] or id not in in_turn([id])[1] for id in ids):
+    found = together(ids)
+    if all(id in found or not together([id]) for id in ids):
         return [found]
-    turns = map(in_turn, islice(permutations(ids), MOST_TURNS))
-    return list({frozenset(ordered): (more, ordered) for more, ordered in turns}.values())
+    tried = map(together, islice(permutations(ids), MOST_TURNS))
+    return list({frozenset(turns): turns for turns in tried}.values())
+
+
+def in_turn(waits: Waits, turns: Turns) -> Waits:
+    """The same with the readers of some histories ahead of those who write them."""
+    if not turns:
+        return waits
+    more: dict[StepKey, dict[StepKey, tuple[str, str]]] = {key: dict(found) for key, found in waits.items()}
+    for id, (writer, readers) in turns.items():
+        more[writer] |= dict.fromkeys(readers, (id, "overwrites"))
+    return more
 
 
 def _follows(waits: Waits, step: StepKey, other: StepKey) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rendergraph.allocate.heap import Item, least_bytes, share_blocks
 
@@ -24,7 +24,7 @@ def ways(items: list[Item]) -> Iterator[list[list[int]]]:
     return extend(0, [])
 
 
-def blocks_bytes(items: list[Item], blocks: list[list[int]]) -> int:
+def blocks_bytes(items: Sequence[Item], blocks: Sequence[Sequence[int]]) -> int:
     return sum(max(items[number].bytes for number in block) for block in blocks)
 
 
@@ -37,7 +37,7 @@ def test_the_least_of_all_ways_to_share() -> None:
     chooser = random.Random(5)
     for _ in range(200):
         items = drawn(chooser)
-        blocks = share_blocks(items)
+        blocks = share_blocks(tuple(items))
         assert sorted(map(sorted, blocks)) in [sorted(way) for way in ways(items)]
         least = min(blocks_bytes(items, way) for way in ways(items))
         assert least_bytes(items) <= least == blocks_bytes(items, blocks)
@@ -45,10 +45,10 @@ def test_the_least_of_all_ways_to_share() -> None:
 
 def test_blocks_can_need_more_than_the_peak() -> None:
     items = [Item(4, 0, 0), Item(3, 1, 1), Item(3, 1, 1)]
-    assert blocks_bytes(items, share_blocks(items)) == least_bytes(items) == 7  # of 6 that live at once
-    assert share_blocks([]) == []
+    assert blocks_bytes(items, share_blocks(tuple(items))) == least_bytes(items) == 7  # of 6 that live at once
+    assert share_blocks(()) == ()
 
 
 def test_members_are_in_the_order_of_time_and_like_goes_with_like() -> None:
     items = [Item(4, 2, 3, "a"), Item(4, 0, 1, "a"), Item(4, 0, 1, "b"), Item(4, 2, 3, "b")]
-    assert sorted(share_blocks(items)) == [[1, 0], [2, 3]]
+    assert sorted(share_blocks(tuple(items))) == [(1, 0), (2, 3)]

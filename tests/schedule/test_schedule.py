@@ -126,6 +126,22 @@ def test_a_second_texture_of_a_history_is_taken_where_reading_first_costs_more()
     assert small.peak_bytes == small.lower_bound_bytes == (2 + 1 + 8) * MIB
 
 
+def test_one_history_takes_a_second_texture_and_another_none() -> None:
+    """`keep` as above; that `far` reads first costs nothing, and a second texture of `other.old` would cost 8 MiB."""
+    steps = (
+        step("large", (), ("large.x",)),
+        step("keep", ("large.x",), ("keep.old",)),
+        step("wide", ("keep.old@",), ("wide.x",)),
+        step("far", ("other.old@",), ("far.x",)),
+        step("other", (), ("other.old",)),
+        step("show", ("keep.old", "wide.x", "far.x", "other.old"), ("show.x",)),
+    )
+    sizes = {"large.x": 8, "wide.x": 8, "keep.old": 1, "other.old": 8, "far.x": 1, "show.x": 1}
+    found = schedule(expansion(*steps, sizes=sizes, keep_old="history", other_old="history"))
+    assert found.history_copies == {"keep.old": 2, "other.old": 1}
+    assert found.peak_bytes == found.lower_bound_bytes == (2 + 8 + 8 + 1 + 1) * MIB
+
+
 @pytest.mark.parametrize("large", ["a.old", "b.old"])
 def test_of_two_histories_that_cannot_both_be_read_first_the_larger_is(large: str) -> None:
     steps = (
