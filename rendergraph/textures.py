@@ -233,10 +233,9 @@ class TextureDesc(Struct, frozen=True, gc=False):
     @property
     def bytes(self) -> int:
         """Bytes of all mips, layers and samples by formula; a driver may pad."""
-        texels, width, height = 0, self.width, self.height
-        for _ in range(self.mips):
-            texels += width * height
-            width, height = max(1, width >> 1), max(1, height >> 1)
+        texels = self.width * self.height
+        for mip in range(1, self.mips):
+            texels += max(1, self.width >> mip) * max(1, self.height >> mip)
         return texels * self.layers * self.samples * FORMATS[self.format].bytes
 
     def mip_size(self, mip: int) -> tuple[int, int]:

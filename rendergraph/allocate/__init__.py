@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from heapq import heappop, heappush
 from typing import Literal, TypeAlias
 
@@ -87,7 +88,7 @@ class MemoryFigures(Struct, frozen=True):
         return asdict(self)
 
 
-class ResourcePlan(Struct, frozen=True):
+class ResourcePlan(Struct, frozen=True, dict=True):
     """Where every resource lives.
 
     Attributes:
@@ -97,7 +98,7 @@ class ResourcePlan(Struct, frozen=True):
         placement: resource id to the indices of its physicals (two for history, else one).
         released: step position to the resources that are dead after it (for the poison mode).
         memory: bytes.
-        reasons: resource id to why it shares, or why not.
+        alias, views, heap: as `allocate` was asked.
     """
 
     schedule: Schedule
@@ -106,7 +107,9 @@ class ResourcePlan(Struct, frozen=True):
     placement: Mapping[str, tuple[int, ...]]
     released: Mapping[int, tuple[str, ...]]
     memory: MemoryFigures
-    reasons: Mapping[str, str]
+    alias: bool
+    views: bool
+    heap: bool
 
     def __repr__(self) -> str:
         memory = self.memory
@@ -119,6 +122,11 @@ class ResourcePlan(Struct, frozen=True):
     def resources(self) -> Mapping[str, Resource]:
         """The schedule's resources."""
         return self.schedule.resources
+
+    @cached_property
+    def reasons(self) -> Mapping[str, str]:
+        """Resource id to why it shares, or why not."""
+        return _reasons(self)
 
     def bytes(self, id: str) -> int:
         """Bytes of a resource by formula: of both textures where it has two; none of what is the scene's."""
@@ -173,9 +181,9 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
         placement=placement,
         released={position: tuple(ids) for position, ids in sorted(released.items())},
         memory=_memory(schedule, physicals, placement, better, sizes),
-        reasons=_reasons(
-            schedule, lifetimes, physicals, placement, _alike(descs, classes, views=views, heap=heap), alias=alias
-        ),
+        alias=alias,
+        views=views,
+        heap=heap,
     )
 
 
@@ -325,18 +333,11 @@ def _memory(
     )
 
 
-def _reasons(
-    schedule: Schedule,
-    lifetimes: Mapping[str, Lifetime],
-    physicals: Sequence[Physical],
-    placement: Mapping[str, tuple[int, ...]],
-    sharing: tuple[Kinds, str],
-    *,
-    alias: bool,
-) -> dict[str, str]:
+def _reasons(plan: ResourcePlan) -> dict[str, str]:
+    schedule, lifetimes, physicals, placement = plan.schedule, plan.lifetimes, plan.physicals, plan.placement
     names = step_names(schedule.steps)
     outputs = {id: name for name, id in reversed(list(schedule.wanted.items()))}
-    kinds, what = sharing
+    kinds, what = _alike(plan)
     count: dict[object, int] = defaultdict(int)
     for id in schedule.resources:
         count[kinds[id]] += id not in schedule.whole_frame
@@ -354,7 +355,7 @@ def _reasons(
             reasons[id] = f"it outlives the frame: its {word} is its own, and written when it is new or out of date"
         elif id in schedule.whole_frame:
             reasons[id] = f"it is filled before the first step: its {word} is its own for the whole frame"
-        elif not alias:
+        elif not plan.alias:
             reasons[id] = "aliasing is off"
         elif len(physical.members) == 1:
             reasons[id] = (
@@ -378,11 +379,16 @@ def _reasons(
     return reasons
 
 
-def _alike(descs: Kinds, classes: Kinds, *, views: bool, heap: bool) -> tuple[Kinds, str]:
+def _alike(plan: ResourcePlan) -> tuple[Kinds, str]:
     """What two textures that can share have in common, and how that is said."""
-    if heap:
+    descs = {id: resource.desc for id, resource in plan.resources.items()}
+    if plan.heap:
         return {id: isinstance(desc, TextureDesc) or desc for id, desc in descs.items()}, "is there"
-    return (classes, "is of its texel class and size") if views else (descs, "is of its format and size")
+    if plan.views:
+        return {
+            id: storage_class(resource) for id, resource in plan.resources.items()
+        }, "is of its texel class and size"
+    return descs, "is of its format and size"
 
 
 def _view(resource: Resource, physical: Physical) -> str:

@@ -91,11 +91,12 @@ def guard_band(resolution: int, texels: float) -> float:
 
 def unit(vectors: npt.ArrayLike) -> Points:
     """Vectors along the last axis made unit length; those of length zero stay zero."""
-    parts = np.ascontiguousarray(np.moveaxis(np.asarray(vectors, np.float64), -1, 0))  # NumPy is slow along short axes
+    given = np.asarray(vectors, np.float64)
+    parts = np.ascontiguousarray(given.reshape(-1, given.shape[-1]).T)  # NumPy is slow along short axes
     peak = np.abs(parts).max(axis=0, initial=0.0)
     scaled = parts / np.where(peak > 0, peak, 1.0)  # so that neither tiny nor huge vectors lose their square
     length = np.sqrt((scaled * scaled).sum(axis=0))
-    return np.ascontiguousarray(np.moveaxis(scaled / np.where(length > 0, length, 1.0), 0, -1))
+    return np.ascontiguousarray((scaled / np.where(length > 0, length, 1.0)).T).reshape(given.shape)
 
 
 def look_at(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> Matrix:

@@ -8,9 +8,10 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from msgspec import Struct
 
-from rendergraph.annotations import Range, conversion_to, fits, test_of, words_for
+from rendergraph.annotations import Range, conversion_to, test_of, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
+_is_number = test_of(float)
 
 
 class Parameter(Struct, frozen=True, dict=True):
@@ -84,7 +85,7 @@ class Parameter(Struct, frozen=True, dict=True):
         """What a value that is not finite or outside the limits must be; None where it is fine."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
         for number in parts:
-            if fits(number, float) and (wrong := self.limits.beyond(number)):
+            if _is_number(number) and (wrong := self.limits.beyond(number)):
                 return wrong
         return None
 

@@ -47,10 +47,12 @@ def framing_camera(scene: Scene, aspect: float = WIDE) -> Camera:
     away = max((right + left) / (2 * wide), (top + bottom) / (2 * tall))
     nearest = max(away - front, 1e-3 * radius)  # depth of the foremost point
     away = front + nearest
-    eye = np.array([(right - left) / 2, (top - bottom) / 2, away]) @ axes + center
-    target = eye - axes[2] * away
+    transform = np.eye(4)
+    transform[:3, :3] = axes.T
+    transform[:3, 3] = eye = np.array([(right - left) / 2, (top - bottom) / 2, away]) @ axes + center
+    target = vec3(eye - axes[2] * away)
     near = min(0.1 * radius, 0.5 * nearest)
-    return Camera("default", look_at(eye, target), fov_y=FRAMING_FOV, near=near, far=20 * radius, target=vec3(target))
+    return Camera("default", transform, fov_y=FRAMING_FOV, near=near, far=20 * radius, target=target)
 
 
 @cache

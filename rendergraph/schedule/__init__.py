@@ -57,11 +57,12 @@ class Schedule(Struct, frozen=True, dict=True):
         peak_node: the node whose step is the peak.
         least_peak_bytes: the least peak of an order that was found; this one may have a higher, as it allocates less.
         lower_bound_bytes: no legal order has a lower peak than this.
-        reasons: step key to why it stands where it stands.
         whole_frame: ids of the resources that keep their memory for the whole frame: history, kept values, and buffers
             that the CPU fills before the first step.
         waits: step key to the steps it waits for, with the resource that is the reason and `reads`, `continues` or
             `overwrites`; empty where the schedule was made by hand.
+        model: the same in numbers; None where the schedule was made by hand.
+        chosen: what picked the order where it was not memory: `in the program's order`.
     """
 
     steps: tuple[Step, ...]
@@ -72,9 +73,10 @@ class Schedule(Struct, frozen=True, dict=True):
     peak_node: str | None
     least_peak_bytes: int
     lower_bound_bytes: int
-    reasons: Mapping[tuple[str, int], str] = field(default_factory=dict)
     whole_frame: frozenset[str] = frozenset()
     waits: Waits = field(default_factory=dict)
+    model: Model | None = None
+    chosen: str | None = None
 
     @property
     def proven(self) -> bool:
@@ -85,6 +87,14 @@ class Schedule(Struct, frozen=True, dict=True):
     def shown(self) -> frozenset[str]:
         """Ids of the resources that keep their memory from their first write to the frame's end."""
         return frozenset(self.wanted.values()) - self.whole_frame
+
+    @cached_property
+    def reasons(self) -> Mapping[StepKey, str]:
+        """Step key to why it stands where it stands."""
+        if self.model is None:
+            return {}
+        number_of = {step.key: number for number, step in enumerate(self.model.steps)}
+        return order_reasons(self.model, [number_of[step.key] for step in self.steps], self.chosen)
 
     @cached_property
     def history_copies(self) -> Mapping[str, int]:
@@ -167,9 +177,10 @@ def schedule(
         peak_node=None if peak_step is None else model.steps[peak_step].node,
         least_peak_bytes=found.least,
         lower_bound_bytes=found.bound,
-        reasons=order_reasons(model, numbers, chosen),
         whole_frame=frozenset(whole_frame),
         waits=waits,
+        model=model,
+        chosen=chosen,
     )
 
 

@@ -175,6 +175,7 @@ def main() -> None:
     if sys.argv[1:2] == ["--child"]:
         child(Path(sys.argv[2]))
         return
+    gc.set_threshold(10_000)  # as a command does
     chosen = options(__doc__, processes=7, repeats=40)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "forty.yaml"
