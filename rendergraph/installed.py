@@ -46,6 +46,7 @@ class Package(Struct, frozen=True):
 class EntryPoint(Struct, frozen=True):
     """A name under which a package offers something to others, written `name = module:attribute [extra]`."""
 
+    group: str
     name: str
     value: str
     package: Package
@@ -97,16 +98,16 @@ def versions(names: Iterable[str]) -> dict[str, str | None]:
     return {name: package.version if package is not None else None for name, package in found.items()}
 
 
-def entry_points(group: str) -> Iterator[EntryPoint]:
-    """What all packages offer under a name such as `rendergraph.nodes`; nothing is imported."""
+def entry_points(*groups: str) -> Iterator[EntryPoint]:
+    """What all packages offer under names such as `rendergraph.nodes`; nothing is imported."""
     for package in packages().values():
-        within = False
+        group = ""
         for line in map(str.strip, _lines(package.folder, "entry_points.txt")):
             if line.startswith("["):
-                within = line[1:-1].strip() == group
-            elif within and "=" in line and line[0] not in "#;":
+                group = line[1:-1].strip()
+            elif group in groups and "=" in line and line[0] not in "#;":
                 name, _, value = line.partition("=")
-                yield EntryPoint(name.strip(), value.strip(), package)
+                yield EntryPoint(group, name.strip(), value.strip(), package)
 
 
 def _parts(folder: str) -> tuple[str, str]:

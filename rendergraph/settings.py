@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
 
@@ -188,6 +187,8 @@ def at_home(text: str) -> Path:
 
 
 def _neighbour(path: Path) -> str:
+    from difflib import get_close_matches  # where something is misspelt alone
+
     try:
         names = sorted(entry.name for entry in islice(path.parent.iterdir(), 1000))
     except OSError:

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from rendergraph.catalog import find, modules
 from rendergraph.catalog.configured import Named, configured, projects
+from rendergraph.catalog.extensions import GROUP as EXTENSIONS
 from rendergraph.catalog.extensions import extensions
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import NO_EXTENSIONS, Extensions, Node
@@ -58,8 +59,11 @@ class Catalog:
         named |= {path.resolve(): Named(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
         own = projects(path for path in named if path.is_dir())
-        for entry in entry_points(GROUP) if installed else ():
-            if plain(entry.package.name) not in own:
+        offered = list(entry_points(GROUP, EXTENSIONS)) if installed else []
+        if own:
+            offered = [entry for entry in offered if plain(entry.package.name) not in own]
+        for entry in offered:
+            if entry.group == GROUP:
                 _add(listed, find.package(entry.name, entry.module))
         notes = []
         for plugin in named.values():
@@ -71,7 +75,8 @@ class Catalog:
                     raise
                 notes += [replace(problem, severity="warning") for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
-        return cls(listed, extensions=extensions(folders, installed=installed, without=own), notes=tuple(notes))
+        added = extensions(folders, [entry for entry in offered if entry.group == EXTENSIONS])
+        return cls(listed, extensions=added, notes=tuple(notes))
 
     def with_file(self, name: str, file: Path) -> Catalog:
         """The same with one shader file under the name, which is most likely its path."""

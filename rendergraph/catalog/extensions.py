@@ -5,14 +5,14 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
 from rendergraph.declare.blame import raised_at, told
 from rendergraph.errors import Place, Problem, is_interruption, shown_file
-from rendergraph.installed import EntryPoint, entry_points, plain
+from rendergraph.installed import EntryPoint
 from rendergraph.stamps import look
 
 GROUP = "rendergraph.extensions"
@@ -22,26 +22,20 @@ NAME = "EXTENSION"
 """What a plugin's folder calls it."""
 
 
-def extensions(
-    folders: Iterable[tuple[str, Path]] = (), *, installed: bool = True, without: Collection[str] = ()
-) -> Extensions:
+def extensions(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Extensions:
     """What plugins add; nothing is looked for or imported before it is asked for.
 
     Args:
         folders: packages that stand for the folders of plugins the user named, and the folders.
-        installed: look at entry points too.
-        without: distributions whose entry points are left out, spelled as indexes compare them.
+        offered: the entry points of those that are installed.
     """
-    named = tuple(folders)
-    return Extensions(lambda: _sources(named, installed, without))
+    named, entries = tuple(folders), sorted(offered, key=lambda entry: entry.value)
+    return Extensions(lambda: _sources(named, entries))
 
 
-def _sources(folders: Iterable[tuple[str, Path]], installed: bool, without: Collection[str]) -> Iterator[Source]:
-    for entry in sorted(entry_points(GROUP), key=lambda entry: entry.value) if installed else ():
-        plugin = entry.package.name
-        if plain(plugin) in without:
-            continue
-        yield _source(plugin, _file(entry), entry.load, entry.value)
+def _sources(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Iterator[Source]:
+    for entry in offered:
+        yield _source(entry.package.name, _file(entry), entry.load, entry.value)
     for package, folder in folders:
         file = folder / f"{MODULE}.py"
         look(file)

@@ -16,7 +16,7 @@ from rendergraph.errors import Problem
 from rendergraph.jsonable import jsonable
 
 _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
+_CONTROL = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
 
 
 _DATA: ContextVar[TextIO | None] = ContextVar("data")
@@ -223,6 +223,7 @@ def megabytes(count: float) -> str:
 
 def _printable(text: str, stream: Any) -> str:
     """Text that the stream's encoding can hold, and without control characters that would steer a terminal."""
-    text = _CONTROL.sub(lambda found: repr(found[0])[1:-1], text)
+    if not text.isprintable():
+        text = re.sub(_CONTROL, lambda found: repr(found[0])[1:-1], text)
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)

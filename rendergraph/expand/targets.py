@@ -84,12 +84,14 @@ def onto_nothing(request: StepRequest, writes: Iterable[Write]) -> str | None:
     state = request.options.get("state")
     if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):
         return None
+    tested = request.kind != "fullscreen" if state.depth_test is None else state.depth_test
+    if state.blend is None and not tested:
+        return None
     colors = [write for write in writes if write.use == "color"] if state.blend is not None else []
     blends = state.blend if isinstance(state.blend, tuple) else (state.blend,) * len(colors)
     for write, blend in zip(colors, blends, strict=False):
         if write.load == "discard" and blend is not None and blend.takes_destination:
             return f"it blends onto '{write.resource}', which holds nothing yet; declare it with `clear=`"
-    tested = request.kind != "fullscreen" if state.depth_test is None else state.depth_test
     for write in writes:
         if write.use == "depth" and write.load == "discard" and tested and state.depth_func != "always":
             return f"it tests depth against '{write.resource}', which holds nothing yet; declare it with `clear=0.0`"

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.glsl.names import blank
-from rendergraph.stamps import Stamp, look, stamp
+from rendergraph.stamps import Stamp, look
 
 MAX_BYTES = 1_000_000
 """Bytes of one stage's text after includes."""
@@ -87,6 +87,7 @@ class Links:
 
     def __init__(self) -> None:
         self._followed: dict[str, str] = {}
+        self._led: dict[Path, str] = {}
         self._files: dict[tuple[Path, str, Path], Path | None] = {}
 
     def follow(self, path: str) -> str:
@@ -104,7 +105,10 @@ class Links:
 
     def of(self, path: Path) -> str:
         """The same of a path that may begin in the current folder."""
-        return self.follow(str(path if path.is_absolute() else Path.cwd() / path))
+        found = self._led.get(path)
+        if found is None:
+            found = self._led[path] = self.follow(str(path if path.is_absolute() else Path.cwd() / path))
+        return found
 
     def file(self, folder: Path, name: str, home: Path) -> Path | None:
         """What a name in a folder stands for, whether it is there or not; None where that lies outside of `home`."""
@@ -152,8 +156,7 @@ def runs(file: Path) -> tuple[str, tuple[Run, ...]]:
     Raises:
         InputError: the file cannot be read.
     """
-    look(file)
-    return _runs(file, stamp(file))
+    return _runs(file, look(file))
 
 
 @lru_cache(maxsize=256)
