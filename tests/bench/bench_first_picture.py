@@ -47,10 +47,13 @@ from rendergraph.cli.app import main
 main(sys.argv[1:])
 """
 IMPORT = """\
-import importlib, sys
+import gc, importlib, sys
+gc.set_threshold(10_000)
 for name in sys.argv[1:]:
     importlib.import_module(name)
+gc.freeze()
 """
+"""Cycles are looked for as seldom as the command looks for them."""
 BESIDE = {"in a studio": "default size", "imports": "NumPy, moderngl", "NumPy, moderngl": "NumPy, moderngl"}
 """What a row is compared with, where that is not the program by hand."""
 
