@@ -12,7 +12,7 @@ _BOOL = {"true": True, "True": True, "TRUE": True, "false": False, "False": Fals
 _INT = re.compile(r"[-+]?[0-9]+\Z")
 _BASED = re.compile(r"0o[0-7]+\Z|0x[0-9a-fA-F]+\Z")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
-_SPECIAL = re.compile(r"([-+]?)\.(?:inf|Inf|INF)\Z|\.(?:nan|NaN|NAN)\Z")
+_SPECIAL = r"([-+]?)\.(?:inf|Inf|INF)\Z|\.(?:nan|NaN|NAN)\Z"
 _MOST_WHOLE = 2**63
 
 
@@ -37,7 +37,7 @@ def scalar(text: str) -> Scalar:
         if math.isinf(number):
             raise ValueError("the number is too large; infinity is written .inf")
         return number
-    special = _SPECIAL.match(text)
+    special = re.match(_SPECIAL, text)
     if special is None:
         return text
     if special[1] is None:

@@ -17,7 +17,7 @@ Scalar: TypeAlias = "str | int | float | bool | None"
 Index: TypeAlias = "str | int | float"
 Data: TypeAlias = "Scalar | list[Value] | dict[Any, Value] | Broken"
 
-_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # what YAML takes for the end of a line
+_BREAK = "\r\n|[\r\n\x85\u2028\u2029]"  # what YAML takes for the end of a line
 _LONGEST_LINE = 400
 
 
@@ -36,14 +36,14 @@ class Source(Struct, eq=False, dict=True):
 
     @cached_property
     def _starts(self) -> list[int]:
-        return [0, *(match.end() for match in _BREAK.finditer(self.text))]
+        return [0, *(match.end() for match in re.finditer(_BREAK, self.text))]
 
     def line(self, number: int) -> str:
         """The text of a line, from 1; empty where there is none or where it is too long to show."""
         if not 0 < number <= len(self._starts):
             return ""
         text = self.text[self._starts[number - 1] : self._starts[number - 1] + _LONGEST_LINE + 1]
-        text = _BREAK.split(text, maxsplit=1)[0]
+        text = re.split(_BREAK, text, maxsplit=1)[0]
         return text if len(text) <= _LONGEST_LINE and text.expandtabs(1).isprintable() else ""
 
     def at(self, offset: int) -> tuple[int, int]:

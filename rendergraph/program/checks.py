@@ -33,9 +33,9 @@ _MOVING = {
     "environment_block": "how bright the environment is and how it is turned, which may move",
     "pass_view_block": "the view it is drawn with",
 }
-_SAMPLER = re.compile(r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);")
-_NAME = re.compile(r"[A-Za-z_]\w*")
-_BRACES = re.compile(r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)")
+_SAMPLER = r"\buniform\s+(?:(?:lowp|mediump|highp)\s+)?([iu]?sampler\w+)\s+([^;]+);"
+_NAME = r"[A-Za-z_]\w*"
+_BRACES = r"(?:\A|(?<=[;{}]))([^;{}]*)\{([^{}]*)\}(?=\s*([A-Za-z_]\w*)?)"
 _SAMPLERS = {"texture2d": "sampler2D", "texture2d_array": "sampler2DArray", "texture_cube": "samplerCube"}
 
 
@@ -168,8 +168,8 @@ def _always(text: str) -> str:
 def _samplers(text: str) -> dict[str, list[str]]:
     """The types that a text declares each of its samplers with."""
     found: dict[str, list[str]] = {}
-    for kind, names in _SAMPLER.findall(text):
-        for name in _NAME.findall(names):
+    for kind, names in re.findall(_SAMPLER, text):
+        for name in re.findall(_NAME, names):
             found.setdefault(name, []).append(kind)
     return found
 
@@ -222,7 +222,7 @@ def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
 
 def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
     """Each uniform or storage block with the names a text uses it by: its members', or its own (`block {…} own`)."""
-    for before, body, own in _BRACES.findall(without_directives(text)):
+    for before, body, own in re.findall(_BRACES, without_directives(text)):
         words = tokens(before)
         storage = next((at for at, word in enumerate(words) if word in ("uniform", "buffer")), None)
         if storage is not None and (name := head(words[storage:]).rest[:1]):

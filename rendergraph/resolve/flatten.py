@@ -19,7 +19,7 @@ from rendergraph.resolve.spec import NodeSpec, PipelineParameter, Scope
 
 MOST_NODES = 10_000
 MOST_NESTED = 32
-_REFERENCE = re.compile(rf"\$({NAME.pattern})")
+_REFERENCE = rf"\$({NAME.pattern})"
 
 
 class Flattener:
@@ -201,7 +201,7 @@ class Flattener:
         """A value with `$name` replaced; None where a name is unknown or its parameter is wrong."""
         data = value.data
         if isinstance(data, str) and data.startswith("$"):
-            match = _REFERENCE.match(data)
+            match = re.match(_REFERENCE, data)
             if data.startswith("$$"):
                 return value.with_data(data[1:])
             if match is None:

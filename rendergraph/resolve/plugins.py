@@ -19,7 +19,7 @@ from rendergraph.installed import version
 from rendergraph.resolve.words import is_bare
 from rendergraph.settings import Roots
 
-_PACKAGE = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9_-]{0,98}[A-Za-z0-9])?\Z")
+_PACKAGE = r"[A-Za-z0-9](?:[A-Za-z0-9_-]{0,98}[A-Za-z0-9])?\Z"
 
 
 class Plugins:
@@ -91,7 +91,7 @@ class Plugins:
 
     def _package(self, value: Value, name: str) -> None:
         """A package that the pipeline needs; its node types come by its entry point."""
-        if not _PACKAGE.match(name):  # what is said is typed into a shell
+        if not re.match(_PACKAGE, name):  # what is said is typed into a shell
             self._say(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
             return
         self.written.setdefault(name, value)

@@ -13,7 +13,7 @@ from rendergraph.read import entries
 from rendergraph.resolve.merge import NamesOf, TypeNames
 
 _ID = "[A-Za-z_][A-Za-z0-9_-]*"
-_PATH = re.compile(rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z")
+_PATH = rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z"
 
 
 class Setting(Struct, frozen=True):
@@ -50,7 +50,7 @@ def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
     for path, raw in given:
         is_text = not isinstance(sets, Mapping)
         source = Source(f"--set {shown(f'{path}={raw}' if is_text and raw is not None else path, 80)}")
-        match = _PATH.match(path)
+        match = re.match(_PATH, path)
         if raw is None and is_text:
             problems.append(source.problem("RG120", "a setting is written PATH=VALUE, as in light.ambient=0.1"))
         elif match is None or (match[1] and match[2] is None):

@@ -16,9 +16,8 @@ from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
 from rendergraph.textures import FORMATS, BufferDesc, Normal, TextureDesc
 
-_MACRO = re.compile(r"[A-Za-z_]\w*\Z")
-_ATTRIBUTE = re.compile(r"[1-4]?[fiu][1248]?(?:/[vi])?\Z")
-_PADDING = re.compile(r"\d+x[1248]?(?:/[vi])?\Z")
+_ATTRIBUTE = r"[1-4]?[fiu][1248]?(?:/[vi])?\Z"
+_PADDING = r"\d+x[1248]?(?:/[vi])?\Z"
 
 
 _Count: TypeAlias = Annotated[int, Range(1)]
@@ -156,7 +155,7 @@ def macro(name: str, value: Macro) -> str:
     Raises:
         Misuse: its name is none, or GLSL cannot write the value.
     """
-    if not _MACRO.match(name):
+    if not re.match(r"[A-Za-z_]\w*\Z", name):
         raise Misuse(f"defines has the name {quoted(name)}, which cannot be a macro's")
     if (isinstance(value, float) and not math.isfinite(value)) or "\n" in str(value):
         raise Misuse(f"defines gives {name} the value {value!r}, which GLSL cannot write")
@@ -194,9 +193,9 @@ def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> d
     for layout, port in (value or {}).items():
         example = "it reads like '3f 2f in_position in_uv'"
         words = layout.split() if isinstance(layout, str) else []
-        formats = [word for word in words if _ATTRIBUTE.match(word) or _PADDING.match(word)]
+        formats = [word for word in words if re.match(_ATTRIBUTE, word) or re.match(_PADDING, word)]
         names = words[len(formats) :]
-        wanted = sum(not _PADDING.match(word) for word in formats)
+        wanted = sum(not re.match(_PADDING, word) for word in formats)
         ordered = words[: len(formats)] == formats and all(name.isidentifier() for name in names)
         if not names or not formats or not ordered:
             raise Misuse(f"attributes has the layout {quoted(layout)}; {example}")
