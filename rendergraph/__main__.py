@@ -2,7 +2,7 @@
 
 import sys
 
-from rendergraph.cli.app import main
+from rendergraph.cli import main
 
 if __name__ == "__main__":
     sys.exit(main())

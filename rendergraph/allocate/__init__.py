@@ -151,7 +151,8 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
         id for id in sorted(lifetimes, key=lambda id: (lifetimes[id].first, id)) if id not in schedule.whole_frame
     ]
     by_desc = _colour(shareable, lifetimes, descs, descs)
-    by_class = _colour(shareable, lifetimes, descs, classes)
+    alike = len(set(classes.values())) == len(set(descs.values()))  # each class has one description
+    by_class = by_desc if alike else _colour(shareable, lifetimes, descs, classes)
     better: list[tuple[Tier, Groups]] = []  # tiers above the one asked for
     if not alias:
         groups = [[id] for id in shareable]

@@ -1,5 +1,39 @@
 """The command line: one file a verb, imported when it is called; nothing here but words, files and exit codes."""
 
-from rendergraph.cli.app import main
+from __future__ import annotations
+
+import atexit
+import gc
+import os
+import sys
+from collections.abc import Sequence
+
+from rendergraph.cli.watchdog import watch
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run one command line, as `rendergraph.cli.app.main`; without words the process's own, which it prepares for that.
+
+    Args:
+        args: words after the program's name; the process's own by default.
+
+    Returns:
+        The exit code of design.md §7.
+    """
+    if args is None:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's threads wait for matrices that nothing here has
+        gc.set_threshold(100_000)  # what is made at the start stays: to look for cycles in it takes up to 20 ms
+        watch()
+        atexit.register(_leave)
+    from rendergraph.cli.app import main as run  # after the process is prepared
+
+    return run(sys.argv[1:] if args is None else args)
+
+
+def _leave() -> None:
+    """All that is left goes with the process, and need not be looked through for cycles."""
+    if "OpenImageIO" not in sys.modules:  # whose bindings tell of every object that is still there
+        gc.freeze()
+
 
 __all__ = ["main"]

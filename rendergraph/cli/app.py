@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
-import gc
 import importlib
 import os
 import signal
@@ -16,7 +14,6 @@ from types import FrameType
 from typing import NoReturn
 
 from rendergraph.cli.output import be_quiet, only_data, print_error, say
-from rendergraph.cli.watchdog import watch
 from rendergraph.cli.words import click
 from rendergraph.errors import Interruption, Place, Problem, RendergraphError, suggestion
 from rendergraph.version import __version__
@@ -132,21 +129,16 @@ def group() -> None:
     """
 
 
-def main(args: Sequence[str] | None = None) -> int:
+def main(args: Sequence[str]) -> int:
     """Run one command line.
 
     Args:
-        args: words after the program's name; the process's own by default.
+        args: words after the program's name.
 
     Returns:
         The exit code of design.md §7.
     """
-    if args is None:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's threads wait for matrices that nothing here has
-        gc.set_threshold(10_000)  # what is made at the start stays: looking for cycles after each 700 took 20 ms of it
-        watch()
-        atexit.register(_leave)
-    words = list(sys.argv[1:] if args is None else args)
+    words = list(args)
     as_json = "--json" in words
     be_quiet(False)
     try:
@@ -201,12 +193,6 @@ def _invoke(words: list[str]) -> int:
     except click.exceptions.Exit as done:
         return int(done.exit_code)
     return 0
-
-
-def _leave() -> None:
-    """All that is left goes with the process, and need not be looked through for cycles."""
-    if "OpenImageIO" not in sys.modules:  # whose bindings tell of every object that is still there
-        gc.freeze()
 
 
 def _told(problems: Sequence[Problem], code: int, as_json: bool) -> int:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 
 from msgspec.structs import replace
 
-from rendergraph.declare import Facts, Function, InOut, Input, Part, Port, TextureInfo, Views
+from rendergraph.declare import Facts, Function, InOut, Input, Part, Port, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
@@ -29,7 +30,6 @@ class Recording:
         requests: what the node asked for, in order.
         unfilled: what it asked to draw and the scene has nothing of; left out where that changes nothing.
         links: connected inputs whose textures have layers; `ENVIRONMENT` stands for the scene's.
-        facts: what the node may ask.
         own: the ends of the textures and buffers that the node makes or continues, by port.
         defines, uniforms, includes: what its parameters give to each of its steps.
     """
@@ -40,25 +40,34 @@ class Recording:
         self.used_ports = used
         self.requests: list[StepRequest] = []
         self.unfilled: list[str] = []
-        self.links: dict[str, tuple[Endpoint, ...]] = {}
-        inputs: dict[str, tuple[TextureInfo, ...]] = {}
-        for name, ends in node.inputs.items():
-            there = tuple([end for end in ends if end.now not in graph.empty]) if graph.empty else ends
-            self.links[name] = there
-            if there:
-                inputs[name] = tuple([graph.textures[end.now] for end in there if end.now in graph.textures])
-        facts = Facts(graph.size, graph.lights, inputs, objects=graph.objects or (), environment=graph.environment)
-        around = [name for name, port in node.type.read.items() if port.takes_scene and name not in inputs]
-        if around:
-            self.links |= dict.fromkeys(around, (ENVIRONMENT,)) if facts.of_scene else {}
-            facts = replace(facts, inputs=inputs | dict.fromkeys(around, facts.of_scene))
-        self.facts = facts
+        self.links: dict[str, tuple[Endpoint, ...]] = dict(node.inputs)
+        if graph.empty:
+            self.links = {
+                name: tuple([e for e in ends if e.now not in graph.empty]) for name, ends in node.inputs.items()
+            }
+        if graph.environment is not None:
+            around = [name for name, port in node.type.read.items() if port.takes_scene and not self.links.get(name)]
+            self.links |= dict.fromkeys(around, (ENVIRONMENT,))
         self.own = {name: Endpoint(node.id, name) for name in node.type.written}
         self.defines = define_parameters(node.node, node.choices)
         self.uniforms = param_uniforms(node.node)
         self.includes = tuple([(name.upper(), file) for name, file in node.choices.items()])
 
     # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
+
+    @cached_property
+    def facts(self) -> Facts:
+        """What the node may ask."""
+        graph = self.graph
+        facts = Facts(graph.size, graph.lights, objects=graph.objects or (), environment=graph.environment)
+        inputs = {
+            name: facts.of_scene
+            if ends == (ENVIRONMENT,)
+            else tuple([graph.textures[end.now] for end in ends if end.now in graph.textures])
+            for name, ends in self.links.items()
+            if ends
+        }
+        return replace(facts, inputs=inputs)
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         """What a port's texture or buffer is allocated from."""

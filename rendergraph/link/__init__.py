@@ -152,7 +152,7 @@ class _Linker:
             self._crossings(nodes, infer)
             self._idle(nodes)
             textures = self._textures(order, nodes, infer)
-            self.problems += Checker(nodes, infer, self.catalog).check()
+            self.problems += Checker(nodes, textures, infer, self.catalog).check()
             self._check_outputs(nodes, outputs, infer)
         members = {name: _member(draft, infer) for name, draft in nodes.items()}
         self.problems += infer.problems if not knots else ()

@@ -19,8 +19,11 @@ Accepts = Callable[[type[Node]], bool]
 class Checker:
     """Checks links of one graph; collects problems."""
 
-    def __init__(self, nodes: Mapping[str, Draft], infer: Infer, catalog: Catalog) -> None:
+    def __init__(
+        self, nodes: Mapping[str, Draft], textures: Mapping[Endpoint, TextureInfo], infer: Infer, catalog: Catalog
+    ) -> None:
         self.nodes = nodes
+        self.textures = textures
         self.infer = infer
         self.catalog = catalog
         self.problems: list[Problem] = []
@@ -40,7 +43,7 @@ class Checker:
     # One link ---------------------------------------------------------------------------------------------------------
 
     def _link(self, draft: Draft, port: Input | InOut, link: Link) -> None:
-        info = self.infer.info(link.source)
+        info = self.textures.get(link.source.now)
         if info is None:
             return
         source = self.nodes[link.source.node].ports[link.source.port]
@@ -131,7 +134,7 @@ class Checker:
             for node, other in self.nodes.items()
             for name, made in other.type.cls.outputs().items()
             if other is not draft
-            and (info := self.infer.info(Endpoint(node, name))) is not None
+            and (info := self.textures.get(Endpoint(node, name))) is not None
             and port_kind(made, info) == port.kind
             and _means(port, info.semantic)
         ]
@@ -141,7 +144,7 @@ class Checker:
         """Another port of the same node that would fit."""
         source = self.nodes[link.source.node]
         for name, other in source.type.cls.outputs().items():
-            info = self.infer.info(Endpoint(link.source.node, name))
+            info = self.textures.get(Endpoint(link.source.node, name))
             if name == link.source.port or info is None or not isinstance(port, Input):
                 continue
             if isinstance(port.semantic, Signature):
@@ -164,7 +167,7 @@ class Checker:
         for name, port in draft.type.written.items():
             if isinstance(port, Output | InOut):
                 needs = port.needs if isinstance(port, Output) else ()
-                info = self.infer.info(Endpoint(draft.spec.id, name)) if all(map(draft.links.get, needs)) else None
+                info = self.textures.get(Endpoint(draft.spec.id, name)) if all(map(draft.links.get, needs)) else None
                 if info is not None and info.desc is not None:
                     made.setdefault(info.desc.size, name)
         if not made:
@@ -178,7 +181,7 @@ class Checker:
             return
         for name, taken in draft.type.read.items():
             for link in draft.links[name] if taken.size == "same" else ():
-                info = self.infer.info(link.source)
+                info = self.textures.get(link.source.now)
                 if info is None or info.desc is None or info.desc.size in made:
                     continue
                 (size, target), *_ = made.items()

@@ -23,7 +23,10 @@ from rendergraph.textures import BufferDesc, TextureDesc
 class Recorder(Protocol):
     """What `Steps` asks of the stage that expands a graph; node authors never meet it."""
 
-    facts: Facts
+    @property
+    def facts(self) -> Facts:
+        """What the node may ask."""
+        ...
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         """What a port's texture or buffer is allocated from."""

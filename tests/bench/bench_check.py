@@ -152,7 +152,7 @@ def cold(path: Path) -> dict[str, Any]:
 
 def child(path: Path) -> None:
     """What `cold` runs: import everything the stages import, then once; looking for cycles as seldom as a command does."""
-    gc.set_threshold(10_000)
+    gc.set_threshold(100_000)
     import networkx  # noqa: F401
     import numpy  # noqa: F401
     import yaml  # noqa: F401
@@ -175,7 +175,7 @@ def main() -> None:
     if sys.argv[1:2] == ["--child"]:
         child(Path(sys.argv[2]))
         return
-    gc.set_threshold(10_000)  # as a command does
+    gc.set_threshold(100_000)  # as a command does
     chosen = options(__doc__, processes=7, repeats=40)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "forty.yaml"

@@ -48,7 +48,7 @@ main(sys.argv[1:])
 """
 IMPORT = """\
 import gc, importlib, sys
-gc.set_threshold(10_000)
+gc.set_threshold(100_000)
 for name in sys.argv[1:]:
     importlib.import_module(name)
 gc.freeze()
