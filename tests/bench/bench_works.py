@@ -2,7 +2,8 @@
 
 W1: a million triangles in 25 spheres under one light. W2: a ground under them, and a 1024² shadow map. W3: ambient
 occlusion of 32 samples, too. Camera and light move in each frame, at 1280×720; `works_by_hand.py` is the other half. CPU
-time of frames, threads of the rasteriser included, and of the first frame with everything that it takes to get there.
+time of frames, threads of the rasteriser included, and of the first frame with everything that it takes to get there but
+for imports, each in a process of its own: what one program leaves behind makes the next one's first frame cheaper or dearer.
 Goal: at most 1.0.
 """
 
@@ -10,17 +11,26 @@ from __future__ import annotations
 
 import gc
 import math
+import os
+import statistics
+import subprocess
+import sys
 import tempfile
 import time
+from collections.abc import Callable
 from importlib import import_module
+from itertools import count, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
+import numpy.typing as npt
 from bench_forward import FAR, FOV_Y, INTENSITY, NEAR, TARGET, spheres
 from forward_by_hand import look_at, perspective, sphere
-from measure import Row, check_pictures, compare, keep_memory, options, report, save
+from measure import Draw, Row, check_pictures, compare, keep_memory, options, report, save
 from works_by_hand import Deferred, Moving, ground
+
+import rendergraph as rg
 
 SIZE = (1280, 720)
 GROUND, HALF = -5.6, 20.0
@@ -91,63 +101,104 @@ def by_hand(name: str) -> Any:
     return kind(SIZE, sphere(200, 101), models, colors, surfaces, np.eye(4), tuple(EYES[0]), light, INTENSITY, **more)
 
 
-def bench(name: str, *, frames: int, turns: int, folder: str | None) -> Row:
-    """One of the works."""
-    import rendergraph as rg
+class Drawn(NamedTuple):
+    """A program of a work: `draw` so many frames more, and the last `picture`, (height, width, 4)."""
 
-    made_of = rg.Session
-    for late in LATE:  # `bench_first_picture` has what imports take
-        import_module(late)
-    gc.collect()  # whoever comes first would pay for what was made before
-    begun = time.process_time()
+    draw: Draw
+    picture: Callable[[], npt.NDArray[Any]]
+
+
+def hand_drawn(name: str) -> Drawn:
+    """The hand-written program with its camera and its light moving, each frame read back."""
     program = by_hand(name)
     projection = perspective(FOV_Y, SIZE[0] / SIZE[1], NEAR, FAR)
-    number_of = {"ours": 0, "hand": 0}
+    numbers = count()
 
-    def hand(count: int) -> None:
+    def draw(frames: int) -> None:
         with program.ctx:
-            for _ in range(count):
-                number_of["hand"] += 1
-                share = (number_of["hand"] - 1) / 30 / SECONDS
+            for number in islice(numbers, frames):
+                share = number / 30 / SECONDS
                 eye, direction = (ends[0] + (ends[1] - ends[0]) * share for ends in (EYES, DIRECTIONS))
                 program.look(look_at(eye, TARGET), projection, eye, -direction / np.linalg.norm(direction))
                 program.draw()
                 program.bytes = program.screen.read(components=4)
 
-    hand(1)
-    first = {"hand": time.process_time() - begun}
-    pictures = {"by_hand": np.frombuffer(program.bytes, "u1").reshape(SIZE[1], SIZE[0], 4)[::-1]}
-    with tempfile.TemporaryDirectory() as temporary:
-        file = Path(temporary) / "work.yaml"
-        file.write_text(scene(name != "W1"))
-        gc.collect()
-        begun = time.process_time()
-        with made_of() as session:
-            pipeline = rg.load("ssao-hemisphere" if name == "W3" else "forward", scene=file, size=SIZE, sets=SETS[name])
-            with session.device.current():
-                drawing = session.compile(pipeline, outputs=["image"], warm_up=False)
+    return Drawn(draw, lambda: np.frombuffer(program.bytes, "u1").reshape(SIZE[1], SIZE[0], 4)[::-1])
 
-            def ours(count: int) -> None:
-                with session.device.current():
-                    for _ in range(count):
-                        number_of["ours"] += 1
-                        drawing.draw(number_of["ours"])
-                        pictures["framework"] = drawing.read()["image"]
 
-            ours(1)
-            first["ours"] = time.process_time() - begun
-            save(folder, **{f"{name}_{who}": picture for who, picture in pictures.items()})
-            share = {"W1": 0.0, "W2": 0.02, "W3": 0.1}[name]  # edges of shadows; another occlusion
-            check_pictures(name, pictures["framework"], pictures["by_hand"], bound=6, share=share)
-            print(f"{name}: first frame {first['ours']:.2f} s, by hand {first['hand']:.2f} s", flush=True)
-            return compare(name, ours, hand, frames=frames, turns=turns, goal=1.0)
+def ours_drawn(name: str, session: rg.Session, file: Path) -> Drawn:
+    """The same by the framework, of a scene file."""
+    pipeline = rg.load("ssao-hemisphere" if name == "W3" else "forward", scene=file, size=SIZE, sets=SETS[name])
+    with session.device.current():
+        drawing = session.compile(pipeline, outputs=["image"], warm_up=False)
+    numbers = count(1)
+    last: dict[str, Any] = {}
+
+    def draw(frames: int) -> None:
+        with session.device.current():
+            for number in islice(numbers, frames):
+                drawing.draw(number)
+                last["image"] = drawing.read()["image"]
+
+    return Drawn(draw, lambda: last["image"])
+
+
+def first_frame(name: str, who: str, file: Path) -> NoReturn:
+    """Print the CPU seconds of a first frame, from the first line that makes something; for a process of its own."""
+    rg.Session  # noqa: B018 - `bench_first_picture` has what imports take
+    for late in LATE:
+        import_module(late)
+    gc.collect()
+    begun = time.process_time()
+    drawn = hand_drawn(name) if who == "hand" else ours_drawn(name, rg.Session().__enter__(), file)
+    drawn.draw(1)
+    print(time.process_time() - begun, flush=True)
+    os._exit(0)  # what is left is no part of it
+
+
+def first_frames(name: str, file: Path, pairs: int) -> dict[str, float]:
+    """Seconds of CPU time of the first frame of each, in processes that take turns, and the ratio: medians."""
+    taken: dict[str, list[float]] = {"ours": [], "hand": []}
+    for _ in range(pairs):
+        for who, times in taken.items():
+            command = [sys.executable, __file__, "--first", name, who, str(file)]
+            times.append(float(subprocess.run(command, capture_output=True, text=True, check=True).stdout))
+    ratio = statistics.median(ours / hand for ours, hand in zip(*taken.values(), strict=True))
+    return {who: statistics.median(times) for who, times in taken.items()} | {"ratio": ratio}
+
+
+def bench(name: str, file: Path, *, frames: int, turns: int, folder: str | None) -> Row:
+    """Frames of one of the works."""
+    hand = hand_drawn(name)
+    with rg.Session() as session:
+        ours = ours_drawn(name, session, file)
+        hand.draw(1)
+        ours.draw(1)
+        pictures = {"by_hand": hand.picture(), "framework": ours.picture()}
+        save(folder, **{f"{name}_{who}": picture for who, picture in pictures.items()})
+        share = {"W1": 0.0, "W2": 0.02, "W3": 0.1}[name]  # edges of shadows; another occlusion
+        check_pictures(name, pictures["framework"], pictures["by_hand"], bound=6, share=share)
+        return compare(name, ours.draw, hand.draw, frames=frames, turns=turns, goal=1.0)
 
 
 def main() -> None:
-    chosen = options(__doc__, frames=1, turns=20, work=0)
     keep_memory()
-    names = list(SETS) if not chosen.work else [f"W{chosen.work}"]
-    report([bench(name, frames=chosen.frames, turns=chosen.turns, folder=chosen.save) for name in names], chosen.json)
+    if sys.argv[1:2] == ["--first"]:
+        first_frame(sys.argv[2], sys.argv[3], Path(sys.argv[4]))
+    chosen = options(__doc__, frames=1, turns=20, work=0, pairs=5)
+    rows: list[Row] = []
+    firsts: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory() as temporary:
+        file = Path(temporary) / "work.yaml"
+        for name in SETS if not chosen.work else [f"W{chosen.work}"]:
+            file.write_text(scene(name != "W1"))
+            if chosen.pairs:
+                firsts[name] = first_frames(name, file, chosen.pairs)
+            if chosen.turns:
+                rows.append(bench(name, file, frames=chosen.frames, turns=chosen.turns, folder=chosen.save))
+    report(rows, chosen.json, **({"first_frames_s": firsts} if chosen.json else {}))
+    for name, first in firsts.items() if not chosen.json else ():
+        print(f"{name}: first frame {first['ours']:.2f} s, by hand {first['hand']:.2f} s, ratio {first['ratio']:.2f}")
 
 
 if __name__ == "__main__":
