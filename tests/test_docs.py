@@ -21,7 +21,9 @@ import pytest
 import yaml
 
 import rendergraph as rg
-from rendergraph.cli.app import VERBS, main
+from rendergraph.cli.app import VERBS, group, main
+from rendergraph.link import endpoint
+from rendergraph.resources import shipped_pipelines
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -49,6 +51,36 @@ def blocks(page: Path) -> Iterator[Block]:
     text = page.read_text(encoding="utf-8")
     for found in re.finditer(r"^(`{3,})(\w+)\n(.*?)^\1$", text, re.MULTILINE | re.DOTALL):
         yield Block(text.count("\n", 0, found.start()) + 1, found[2], found[3])
+
+
+def commands_in_the_text(page: Path) -> list[str]:
+    """`rendergraph …` between backticks, those with words of their own; what stands in blocks is run."""
+    text = re.sub(r"^(`{3,}).*?^\1$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    found = [" ".join(words.split()) for words in re.findall(r"`(rendergraph [^`]+)`", text)]
+    return [command for command in dict.fromkeys(found) if " " in command.removeprefix("rendergraph ")]
+
+
+@pytest.mark.parametrize(
+    ("page", "command"),
+    [(page, command) for page in PAGES for command in commands_in_the_text(page) if "…" not in command],
+    ids=lambda value: value if isinstance(value, str) else str(value.relative_to(ROOT)),
+)
+def test_a_command_in_the_text_is_one(page: Path, command: str) -> None:
+    """Its options are there, and what is shipped takes its settings, changes by all of them, and has what it taps."""
+    verb, *words = shlex.split(command)[1:]
+    with group.make_context("rendergraph", [verb, *words]) as context:
+        found = group.get_command(context, verb)
+        assert found is not None
+        asked = found.make_context(verb, words, parent=context).params
+    if verb not in ("run", "compare", "bench", "plan", "view"):
+        return
+    for pipeline in set(shipped_pipelines()) & {asked.get("pipeline"), *asked.get("pipelines", ())}:
+        for more in asked.get("withs") or [()]:
+            sets = [*asked["sets"], *more]
+            linked = rg.load(pipeline, scene=asked["scene"], environment=asked["environment"], sets=sets).link()
+            assert not linked.graph.warnings
+            for tap in asked.get("taps", ()):
+                endpoint(linked.graph, tap.name)
 
 
 @pytest.mark.slow
