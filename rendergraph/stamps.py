@@ -38,16 +38,13 @@ def stamp(path: Path | str) -> Stamp:
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
-def look(path: Path | str) -> Stamp:
-    """Note a file or folder, before it is opened, and give its state; in a collection it is that of the first look."""
-    looked, name = _LOOKED.get(), os.fspath(path)
-    if looked is None:
-        return stamp(name)
-    if name not in looked:
-        name = os.path.abspath(name)
+def look(path: Path | str) -> None:
+    """Note a file or folder, before it is opened; the first look counts."""
+    looked = _LOOKED.get()
+    if looked is not None and os.fspath(path) not in looked:
+        name = os.path.abspath(path)
         if name not in looked:
             looked[name] = stamp(name)
-    return looked[name]
 
 
 def again(stamps: Stamps) -> None:

@@ -92,7 +92,8 @@ def guard_band(resolution: int, texels: float) -> float:
 def unit(vectors: npt.ArrayLike) -> Points:
     """Vectors along the last axis made unit length; those of length zero stay zero."""
     given = np.asarray(vectors, np.float64)
-    parts = np.ascontiguousarray(given.reshape(-1, given.shape[-1]).T)  # NumPy is slow along short axes
+    rows = given.reshape(math.prod(given.shape[:-1]), given.shape[-1])
+    parts = np.ascontiguousarray(rows.T)  # NumPy is slow along short axes
     peak = np.abs(parts).max(axis=0, initial=0.0)
     scaled = parts / np.where(peak > 0, peak, 1.0)  # so that neither tiny nor huge vectors lose their square
     length = np.sqrt((scaled * scaled).sum(axis=0))

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.glsl.names import blank
-from rendergraph.stamps import Stamp, look
+from rendergraph.stamps import Stamp, look, stamp
 
 MAX_BYTES = 1_000_000
 """Bytes of one stage's text after includes."""
@@ -156,7 +156,8 @@ def runs(file: Path) -> tuple[str, tuple[Run, ...]]:
     Raises:
         InputError: the file cannot be read.
     """
-    return _runs(file, look(file))
+    look(file)
+    return _runs(file, stamp(file))
 
 
 @lru_cache(maxsize=256)

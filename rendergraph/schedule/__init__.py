@@ -122,7 +122,8 @@ def schedule(
 
     Args:
         expansion: what the nodes recorded.
-        budget_s: how long to search, in seconds of an ordinary machine; counted in steps tried, not by a clock.
+        budget_s: how long to search, in seconds of an ordinary machine; counted in steps tried, not by a clock. Once
+            for each set of histories that could take a second texture, where that is not decided without.
         shuffle: seed of a random legal order instead, for tests.
         keep_order: the program's order instead, for debugging; where both are given this one counts.
 
@@ -225,7 +226,8 @@ def _least(
         return first
     # Every other order takes a second texture of one of them at least, of which only the smallest is sure.
     more = {id: resources[id].desc.bytes for id in turns}
-    if first.least <= model_of(waits, single).bounds()[1] + min(more.values()):
+    pool, peak = [bound + min(more.values()) for bound in model_of(waits, single).bounds()]
+    if first.cost.pool <= pool and first.least <= peak:
         return first
     every = len(turns) <= MOST_IN_TURN
     found = [first]
@@ -250,7 +252,7 @@ def _optimise(model: Model, waits: Waits, budget_s: float) -> _Found:
     return _Found(cost, tuple(model.steps[step] for step in order), waits, least, bound)
 
 
-_MOST_ORDERS = 64
+_MOST_ORDERS = 256
 _orders: dict[Hashable, tuple[Cost, Sequence[int], int, int]] = {}
 """What was found for a model before: most changes of a pipeline leave the order what it was."""
 

@@ -243,3 +243,10 @@ def test_a_narrowed_view_holds_its_rectangle() -> None:
     sides = clip(matrix, [(x * 5, y * 5, -5.0) for x, y in ((-0.2, 0.1), (0.4, 0.3))])
     np.testing.assert_allclose(sides[:, :2], [[-0.8, -0.8], [0.8, 0.8]], atol=1e-9)
     np.testing.assert_allclose(clip(matrix, [(0, 0, -2.0), (0, 0, -10.0)])[:, 2], [-1, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(0,), (3,), (0, 3), (2, 0), (4, 2, 3)])
+def test_unit_vectors_along_the_last_axis_of_any_shape(shape: tuple[int, ...]) -> None:
+    vectors = np.random.default_rng(1).normal(size=shape)
+    lengths = np.sqrt((vectors**2).sum(axis=-1, keepdims=True))
+    np.testing.assert_allclose(viewing.unit(vectors), vectors / lengths, rtol=1e-15)

@@ -43,8 +43,8 @@ rg.load("forward", scene=sys.argv[1], size=(640, 360)).render(outputs=["image"])
 LOADED = """\
 import atexit, sys
 atexit.register(lambda: print(*sys.modules))
-from rendergraph.cli.app import main
-main(sys.argv[1:])
+from rendergraph.cli import main
+main()
 """
 IMPORT = """\
 import gc, importlib, sys

@@ -162,7 +162,7 @@ def first_frames(name: str, file: Path, pairs: int) -> dict[str, float]:
     for _ in range(pairs):
         for who, times in taken.items():
             command = [sys.executable, __file__, "--first", name, who, str(file)]
-            times.append(float(subprocess.run(command, capture_output=True, text=True, check=True).stdout))
+            times.append(float(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout))
     ratio = statistics.median(ours / hand for ours, hand in zip(*taken.values(), strict=True))
     return {who: statistics.median(times) for who, times in taken.items()} | {"ratio": ratio}
 
@@ -196,7 +196,8 @@ def main() -> None:
                 firsts[name] = first_frames(name, file, chosen.pairs)
             if chosen.turns:
                 rows.append(bench(name, file, frames=chosen.frames, turns=chosen.turns, folder=chosen.save))
-    report(rows, chosen.json, **({"first_frames_s": firsts} if chosen.json else {}))
+    if rows or chosen.json:
+        report(rows, chosen.json, **({"first_frames_s": firsts} if chosen.json else {}))
     for name, first in firsts.items() if not chosen.json else ():
         print(f"{name}: first frame {first['ours']:.2f} s, by hand {first['hand']:.2f} s, ratio {first['ratio']:.2f}")
 
