@@ -55,9 +55,13 @@ class Recording:
 
     # What `steps.Recorder` promises to nodes ------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def facts(self) -> Facts:
         """What the node may ask."""
+        return self._facts
+
+    @cached_property
+    def _facts(self) -> Facts:
         graph = self.graph
         facts = Facts(graph.size, graph.lights, objects=graph.objects or (), environment=graph.environment)
         inputs = {
