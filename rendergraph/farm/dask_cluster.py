@@ -128,6 +128,7 @@ class Dask(Executor):
         self._tasks: dict[str, Task] = {}
         self._futures: dict[str, Future] = {}
         self._tried: dict[Task, int] = {}
+        self._gone_with: dict[Task, int] = {}  # how often what a task was given went with workers
         self._sent_with: dict[Task, int] = {}  # how often had been sent what a task was given
 
     def bring(self, make: Callable[[], Bundle]) -> None:
@@ -269,7 +270,8 @@ class Dask(Executor):
             self._answers(None)
             if self._sent_with[task] == self._sendings:  # most likely what it was given is lost, too
                 self._send_again()
-            yield from self._lost(task, "scheduler", RenderError(Problem("RG640", "the cluster lost the task")))
+            error = RenderError(Problem("RG640", "the cluster lost the task"))
+            yield from self._lost(task, "scheduler", error, self._gone_with, self.workers + 1)
             return
         if future.status == "error":
             error = future.exception()
@@ -287,9 +289,13 @@ class Dask(Executor):
             else:
                 yield Failed(task, worker, value)
 
-    def _lost(self, task: Task, worker: str, error: Any) -> Iterator[Event]:
-        self._tried[task] = self._tried.get(task, 0) + 1
-        if self._tried[task] < ATTEMPTS:
+    def _lost(
+        self, task: Task, worker: str, error: Any, tried: dict[Task, int] | None = None, most: int = ATTEMPTS
+    ) -> Iterator[Event]:
+        """Begin a task again, unless that was too often; where what it was given is gone, each worker counts."""
+        tried = self._tried if tried is None else tried
+        tried[task] = tried.get(task, 0) + 1
+        if tried[task] < most:
             self.submit(task)
             yield Lost(task, worker, tuple(error.problems))
         else:

@@ -192,8 +192,9 @@ def test_a_value_that_fails_is_a_row_there_as_here(base: rg.Pipeline, tmp_path: 
 
 
 def test_a_file_that_changes_meanwhile_is_told(base: rg.Pipeline, tmp_path: Path) -> None:
-    def change(event: Mapping[str, Any]) -> None:
-        (tmp_path / "make.frag").write_text(MAKE.replace("0.25", "0.5"))
+    def change(event: Mapping[str, Any]) -> None:  # at once: whoever reads it meanwhile shall not find half of it
+        (tmp_path / "new.frag").write_text(MAKE.replace("0.25", "0.5"))
+        (tmp_path / "new.frag").replace(tmp_path / "make.frag")
 
     found = sweep(base, FEW, tmp_path / "out", frames=1, executor="processes:1", events=change)
     assert len(found.comparison.results) == 6  # one group, begun before: what it was planned of was read before, too
