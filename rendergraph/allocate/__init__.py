@@ -386,9 +386,8 @@ def _alike(plan: ResourcePlan) -> tuple[Kinds, str]:
     if plan.heap:
         return {id: isinstance(desc, TextureDesc) or desc for id, desc in descs.items()}, "is there"
     if plan.views:
-        return {
-            id: storage_class(resource) for id, resource in plan.resources.items()
-        }, "is of its texel class and size"
+        classes = {id: storage_class(resource) for id, resource in plan.resources.items()}
+        return classes, "is of its texel class and size"
     return descs, "is of its format and size"
 
 

@@ -277,7 +277,7 @@ class _Versions:
         text = onto_nothing(request, writes)
         if text is not None:
             raise self._refused(recording, request, "RG429", text)
-        touching: list[Read | Write] = [*writes, *reads]
+        touching: tuple[Read | Write, ...] = (*writes, *reads)
         uses = {touched.use for touched in touching}
         if len(writes) > 1 or "depth_test" in uses:
             text = ill_matched(self.resources, writes, reads)

@@ -362,7 +362,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         low, high = boxes[[used[entry.mesh] for entry in shown]].swapaxes(0, 1)
         center = np.einsum("nij,nj->ni", transforms[:, :3, :3], (low + high) / 2) + transforms[:, :3, 3]
         extent = np.einsum("nij,nj->ni", np.abs(transforms[:, :3, :3]), (high - low) / 2)
-        (x, y, z), (u, v, w) = extremes(center - extent)[0].tolist(), extremes(center + extent)[1].tolist()
+        low, high = extremes(np.concatenate([center - extent, center + extent]))
+        (x, y, z), (u, v, w) = low.tolist(), high.tolist()
         return (x, y, z), (u, v, w)
 
     def has_grain(self, material: Material) -> bool:

@@ -248,9 +248,9 @@ def in_turn(waits: Waits, turns: Turns) -> Waits:
     """The same with the readers of some histories ahead of those who write them."""
     if not turns:
         return waits
-    more: dict[StepKey, dict[StepKey, tuple[str, str]]] = {key: dict(found) for key, found in waits.items()}
+    more = dict(waits)
     for id, (writer, readers) in turns.items():
-        more[writer] |= dict.fromkeys(readers, (id, "overwrites"))
+        more[writer] = {**more[writer], **dict.fromkeys(readers, (id, "overwrites"))}
     return more
 
 
