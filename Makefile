@@ -1,9 +1,12 @@
 # What a change must pass: pip install -e ".[dev]" && make check
-# What runs on one core goes two at a time; the tests come last, so that pytest's own closing line is the last one.
+# Single-threaded checks run two at a time. The tests come last, so that pytest's summary is the last line.
 
 WORKERS ?= 2
 
-.PHONY: check format lint types imports docs pages pictures test quick clean
+# Mesa compiles each shader once and keeps it here, for all workers and for later runs: compiling takes most of the tests' time.
+export MESA_SHADER_CACHE_DIR ?= $(CURDIR)/.cache/mesa
+
+.PHONY: check nightly format lint types imports docs pages pictures test quick clean
 
 check:
 	$(MAKE) --jobs=2 --output-sync --no-print-directory lint types imports pages
@@ -27,19 +30,24 @@ imports:
 docs:
 	sphinx-build -q -W --keep-going -b html docs docs/_build/html
 
-# The same without drawing pictures for the reference: that what is shipped draws, the tests find.
+# The same without rendering pictures for the reference: the tests show that everything shipped renders.
 pages:
 	sphinx-build -q -W --keep-going -D pictures=0 -b html docs docs/_build/pages
 
-# The stored pictures of docs/images, as their list says; all take some minutes. ONLY=ssao: those with that in their names.
+# Redraw the pictures of docs/images as listed in pictures.yaml; all of them take some minutes. ONLY=ssao selects by name.
 pictures:
 	python docs/images/draw.py $(ONLY)
 
 test:
 	pytest -n $(WORKERS)
 
+# Under a minute, while working.
 quick:
 	pytest -n $(WORKERS) -m "not slow"
 
+# What is slow by nature: every pipeline in every mode, long fuzzing, large references, a second driver. Takes about an hour.
+nightly:
+	pytest -n $(WORKERS) --nightly
+
 clean:
-	rm -rf build dist docs/_build docs/reference/generated
+	rm -rf build dist docs/_build docs/reference/generated .cache

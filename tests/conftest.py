@@ -36,6 +36,18 @@ PIPELINE = "nodes:\n  a: {type: wrong}\noutputs: {image: a.color}\n"
 WHITE = "out vec4 color;\nvoid main() { color = vec4(1.0); }\n"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--nightly", action="store_true", help="run only the tests that are slow by nature")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Tests marked `nightly` run with `--nightly`, all others without."""
+    nightly = bool(config.getoption("--nightly"))
+    chosen = [item for item in items if ("nightly" in item.keywords) == nightly]
+    config.hook.pytest_deselected(items=[item for item in items if ("nightly" in item.keywords) != nightly])
+    items[:] = chosen
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """The folder of reference data and assets beside the project; tests that need it skip where it is missing."""
