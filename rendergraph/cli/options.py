@@ -133,9 +133,9 @@ def _positive(text: str) -> float:
 
 
 def _executor(text: str) -> str:
-    from rendergraph.farm.choose import check_word
+    from rendergraph.farm.executors import check_executor_name
 
-    return check_word(text)
+    return check_executor_name(text)
 
 
 def _devices(text: str) -> tuple[int, ...]:

@@ -120,15 +120,15 @@ def command(
             report = draw(expanded, targets, gpu)
     else:
         from rendergraph.cli.parts import draw_in_parts
-        from rendergraph.farm.bundle import bundled
-        from rendergraph.farm.choose import chosen
+        from rendergraph.farm.bundle import make_bundle
+        from rendergraph.farm.executors import make_executor
 
         if tap_all is not None:
             raise UsageError(Problem("RG500", "--tap-all looks at one pipeline closely, and is drawn by one process"))
         nodes = expanded.linked.graph.nodes
         modules = {type(node.node).__module__ for node in nodes}
-        with chosen(executor, None, device, tasks=2, devices=devices, timeout=timeout) as farm:
-            farm.bring(lambda: bundled(files, selection.plugins, modules))
+        with make_executor(executor, None, device, tasks=2, devices=devices, timeout=timeout) as farm:
+            farm.upload_inputs(lambda: make_bundle(files, selection.plugins, modules))
             report = draw_in_parts(expanded, targets, farm, warnings=warnings, quiet=as_json)
     say_summary(report)
     if as_json:

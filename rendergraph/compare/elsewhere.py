@@ -12,7 +12,7 @@ from rendergraph.compare.groups import Against, First, Variant, drawn_from
 from rendergraph.compare.timing import Times, times_of
 from rendergraph.compare.values import Difference, Pixels, Reference, Result, light_error, not_finite_pixels
 from rendergraph.diff import diff
-from rendergraph.farm import Executor, Failed, Handle, Item, Task, Worker
+from rendergraph.farm import Executor, Handle, Task, TaskFailed, TaskOutput, Worker
 from rendergraph.metrics import Encoding, Metrics
 from rendergraph.session import stages
 
@@ -68,7 +68,7 @@ class Comparing(Task):
 
     def run(self, worker: Worker) -> Iterator[Found]:
         """Everything about it."""
-        against: Against = worker.take(self.against)
+        against: Against = worker.value(self.against)
         planned, gpu = self.variant.plan(worker), worker.gpu
         graph, plugins = planned.linked.graph, planned.linked.catalog.extensions.metrics()
         shown = stages.draw_last(planned.for_frames(range(1, self.frame + 1)), gpu)
@@ -78,10 +78,10 @@ class Comparing(Task):
             found, map_ = metrics.same(pixels, plugins), None
         else:
             key = "outputs", self.base.digest, self.frame
-            if key not in worker.kept:
+            if key not in worker.cache:
                 base = self.base.plan(worker)
-                worker.kept[key] = base.linked.graph, every_output(gpu, base, self.frame)
-            base_graph, tapped = worker.kept[key]
+                worker.cache[key] = base.linked.graph, every_output(gpu, base, self.frame)
+            base_graph, tapped = worker.cache[key]
             seen = every_output(gpu, planned, self.frame)
             first = first_difference(tapped, seen, planned.plan, graph, diff(base_graph, graph))
             names = (self.variant.name, against.name)
@@ -143,9 +143,9 @@ def compared(
     device: Mapping[str, object] = {}
     against: Against | None = None
     for event in farm.events():
-        if isinstance(event, Failed):
+        if isinstance(event, TaskFailed):
             raise type(event.error)(event.error.problems) from event.error
-        if not isinstance(event, Item):
+        if not isinstance(event, TaskOutput):
             continue
         if isinstance(event.value, Found):
             drawn[event.value.number] = event.value

@@ -14,8 +14,8 @@ from rendergraph.compare.timing import Times
 from rendergraph.compare.values import Pixels, light_error, machine, not_finite_pixels
 from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.farm import Handle, Task, Worker
-from rendergraph.farm.bundle import at_home, placed
-from rendergraph.farm.tasks import of_the_worker
+from rendergraph.farm.bundle import map_remote_paths, relocate_selection
+from rendergraph.farm.tasks import is_retryable
 from rendergraph.metrics import Encoding, Metrics
 from rendergraph.session import stages
 from rendergraph.session.frame import figures_of
@@ -75,7 +75,7 @@ class Variant:
         """
         if self.planned is not None:
             return self.planned
-        pipeline = Pipeline(placed(self.selection, worker.root), catalog)
+        pipeline = Pipeline(relocate_selection(self.selection, worker.root), catalog)
         planned = stages.plan(stages.expand(pipeline.link()))
         if drawn_from(planned) != self.digest:
             text = f"what '{self.name}' is drawn from is not the same on worker '{worker.name}' as when the work began"
@@ -213,7 +213,7 @@ class Group(Task):
                 yield Unable(variant.number, _at_home(error, worker))
         variants = [each for each in planned if each is not None]
         own = [variant for variant, each in zip(self.variants, planned, strict=True) if each is not None]
-        against: Against | None = worker.take(self.against) if self.against is not None else None
+        against: Against | None = worker.value(self.against) if self.against is not None else None
         waiting = fitting(variants, range(len(variants)), self.most_bytes) if variants else []
         done: set[int] = set()
         while waiting:
@@ -229,7 +229,7 @@ class Group(Task):
                 left = [place for place in batch.numbers if own[place].number not in done]
                 if len(batch.numbers) > 1:  # each alone, so that only the one at fault fails, and in its own words
                     waiting[:0] = [alone for place in left for alone in fitting(variants, [place], self.most_bytes)]
-                elif against is None or of_the_worker(error):
+                elif against is None or is_retryable(error):
                     raise
                 else:
                     yield Unable(own[next(iter(batch.numbers))].number, _at_home(error, worker))
@@ -238,7 +238,7 @@ class Group(Task):
         self, worker: Worker, batch: Batch, variants: Sequence[Planned], own: Sequence[Variant], against: Against | None
     ) -> Iterator[Told]:
         undrawn = [place for place in batch.numbers if not own[place].drawn]
-        on = worker.kept.setdefault("machine", machine())
+        on = worker.cache.setdefault("machine", machine())
         if undrawn:
             for drawn in list(draw(worker.gpu, variants, batch, self.frame)):
                 if drawn.number in undrawn:
@@ -258,7 +258,7 @@ class Group(Task):
 
 
 def _at_home(error: InputError | RenderError, worker: Worker) -> InputError | RenderError:
-    found = at_home(error, worker.root)
+    found = map_remote_paths(error, worker.root)
     assert isinstance(found, InputError | RenderError)  # of the same kind
     return found
 

@@ -20,7 +20,7 @@ from rendergraph.compare.prepare import check_sweep
 from rendergraph.compare.product import Sweep, sweep
 from rendergraph.compare.values import Result
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
-from rendergraph.farm.choose import Where, chosen
+from rendergraph.farm.executors import ExecutorChoice, make_executor
 from rendergraph.session.progress import Progress, shown
 from rendergraph.session.wanted import figures
 
@@ -77,7 +77,7 @@ def search(
     resume: bool = False,
     session: Gpu | None = None,
     device: int | None = None,
-    executor: Where = None,
+    executor: ExecutorChoice = None,
     devices: Sequence[int] = (),
     timeout: float | None = None,
     progress: Progress | bool | None = None,
@@ -105,7 +105,7 @@ def search(
     check_search(base, space, reference, minimise, options.get("metric"))
     knobs = {knob.name: knob for knob in map(_Knob, space.groups)}
     trials: list[tuple[dict[str, str], Result | None]] = []
-    who = chosen(
+    who = make_executor(
         executor, session, device, tasks=1, devices=devices, timeout=timeout, travels=base.catalog is None
     )  # a few runs at a time are one group: this process, unless somebody is named
     with who as farm, shown(progress, "runs") as tell:

@@ -23,8 +23,8 @@ from rendergraph.compare.timing import Times, times_of
 from rendergraph.compare.values import Comparison, Difference, Reference, Result, light_error, not_finite_pixels
 from rendergraph.diff import diff
 from rendergraph.errors import Problem, UsageError
-from rendergraph.farm.bundle import bundled
-from rendergraph.farm.choose import Where, chosen
+from rendergraph.farm.bundle import make_bundle
+from rendergraph.farm.executors import ExecutorChoice, make_executor
 from rendergraph.link import Graph
 from rendergraph.session import stages
 from rendergraph.session.pipeline import Pipeline, loaded
@@ -65,7 +65,7 @@ def compare(
     session: Gpu | None = None,
     device: int | None = None,
     progress: Progress | bool | None = None,
-    executor: Where = "serial",
+    executor: ExecutorChoice = "serial",
     devices: Sequence[int] = (),
     timeout: float | None = None,
 ) -> Comparison:
@@ -108,9 +108,11 @@ def compare(
     if executor not in (None, "serial"):
         measured = Reference(str(reference), "file", picture[0], encoding, output) if picture else None
         travels, modules = all(each.catalog is None for each in [*loaded_ones, *own]), _modules(planned)
-        who = chosen(executor, None, device, tasks=len(pipelines), devices=devices, timeout=timeout, travels=travels)
+        who = make_executor(
+            executor, None, device, tasks=len(pipelines), devices=devices, timeout=timeout, travels=travels
+        )
         with who as farm, shown(progress, "pipelines") as tell:
-            farm.bring(lambda: bundled(files, loaded_ones[0].selection.plugins, modules))
+            farm.upload_inputs(lambda: make_bundle(files, loaded_ones[0].selection.plugins, modules))
             step = _Steps(len(pipelines), tell)
             against, results, noticed, drew = compared(
                 farm, planned, names, bool(own), measured, output, encoding, frame, frames, step

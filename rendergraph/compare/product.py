@@ -17,8 +17,8 @@ from rendergraph.compare.runs import RUN, Failure
 from rendergraph.compare.study import begin, claimed, open_folder
 from rendergraph.compare.values import Comparison, Reference
 from rendergraph.compare.work import Events, Pictures, Work
-from rendergraph.farm.bundle import bundled
-from rendergraph.farm.choose import Where, chosen
+from rendergraph.farm.bundle import make_bundle
+from rendergraph.farm.executors import ExecutorChoice, make_executor
 from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.session.progress import Progress, shown
 from rendergraph.stamps import looking
@@ -102,7 +102,7 @@ def sweep(
     session: Gpu | None = None,
     device: int | None = None,
     progress: Progress | bool | None = None,
-    executor: Where = None,
+    executor: ExecutorChoice = None,
     devices: Sequence[int] = (),
     timeout: float | None = None,
     events: Events | None = None,
@@ -155,7 +155,7 @@ def sweep(
         redrawn = sum(number not in work.results and (run.folder / RUN).exists() for number, run in enumerate(runs))
         if work.missing or planned.other:
             with (
-                chosen(
+                make_executor(
                     executor,
                     session,
                     device,
@@ -166,7 +166,7 @@ def sweep(
                 ) as farm,
                 shown(progress, "runs") as tell,
             ):
-                farm.bring(lambda: bundled(files, base.selection.plugins, planned.modules))
+                farm.upload_inputs(lambda: make_bundle(files, base.selection.plugins, planned.modules))
                 begin(out, planned.study)
                 work.draw(farm, tell)
     results = tuple(work.results[number] for number in sorted(work.results))

@@ -17,7 +17,7 @@ from rendergraph.compare.runs import Failure, drop, found_again, give_up, keep, 
 from rendergraph.compare.timing import NO_TIMES, enough
 from rendergraph.compare.values import Reference, Result
 from rendergraph.errors import RendergraphError
-from rendergraph.farm import Executor, Failed, Finished, Handle, Item, Lost
+from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOutput, TaskRetried
 
 Pictures: TypeAlias = Literal["all", "best"]
 """Which pictures of a sweep stay."""
@@ -114,15 +114,15 @@ class Work:
                 group = [missing[0]]
             self._submit(farm, group)
         for event in farm.events():
-            if isinstance(event, Item):
+            if isinstance(event, TaskOutput):
                 self._take(farm, event.value, event.worker)
-            elif isinstance(event, Lost):
+            elif isinstance(event, TaskRetried):
                 self.retries += 1
                 self._say("lost", event.worker, task=event.task.name, reason=_text(event.problems))
-            elif isinstance(event, Failed):
+            elif isinstance(event, TaskFailed):
                 self._failed(farm, event)
             else:
-                assert isinstance(event, Finished)
+                assert isinstance(event, TaskFinished)
                 self._say("finished", event.worker, task=event.task.name, seconds=round(event.seconds, 3))
             progress(len(self.prepared.runs) - len(self.missing), len(self.prepared.runs))
 
@@ -234,7 +234,7 @@ class Work:
             if self.results[number].pixels is not None:
                 self.results[number] = replace(self.results[number], pixels=None, flip_map=None)
 
-    def _failed(self, farm: Executor, event: Failed) -> None:
+    def _failed(self, farm: Executor, event: TaskFailed) -> None:
         """A task came to nothing: its runs are tried each alone, and a run that was alone is given up."""
         if not isinstance(event.task, Group):
             raise event.error

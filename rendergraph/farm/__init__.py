@@ -6,6 +6,28 @@ do not depend on which executor it is.
 
 from __future__ import annotations
 
-from rendergraph.farm.tasks import Event, Executor, Failed, Finished, Handle, Item, Lost, Serial, Task, Worker
+from rendergraph.farm.tasks import (
+    Event,
+    Executor,
+    Handle,
+    Serial,
+    Task,
+    TaskFailed,
+    TaskFinished,
+    TaskOutput,
+    TaskRetried,
+    Worker,
+)
 
-__all__ = ["Event", "Executor", "Failed", "Finished", "Handle", "Item", "Lost", "Serial", "Task", "Worker"]
+__all__ = [
+    "Event",
+    "Executor",
+    "Handle",
+    "Serial",
+    "Task",
+    "TaskFailed",
+    "TaskFinished",
+    "TaskOutput",
+    "TaskRetried",
+    "Worker",
+]

@@ -70,7 +70,7 @@ class Bundle:
         return {VARIABLE: os.pathsep.join(str(_moved(Path(part), root)) for part in parts)}
 
 
-def bundled(looked_at: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
+def make_bundle(looked_at: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
     """The bundle of work.
 
     Args:
@@ -174,7 +174,7 @@ def unfit(needed: Mapping[str, tuple[str, str]], worker: str) -> InputError | No
     return InputError(problems) if problems else None
 
 
-def placed(selection: Selection, root: Path | None) -> Selection:
+def relocate_selection(selection: Selection, root: Path | None) -> Selection:
     """A selection whose files lie beneath a folder as they lie beneath `/` where it was made."""
     if root is None:
         return selection
@@ -193,7 +193,7 @@ def _moved(path: Path, root: Path) -> Path:
     return root / path.relative_to(path.anchor) if path.is_absolute() else path
 
 
-def at_home(error: RendergraphError, root: Path | None) -> RendergraphError:
+def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphError:
     """An error whose files are called as where they came from."""
     if root is None:
         return error

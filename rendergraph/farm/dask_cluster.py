@@ -15,8 +15,19 @@ from typing import Any, TypeAlias
 from uuid import uuid4
 
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
-from rendergraph.farm.bundle import Bundle, bundled
-from rendergraph.farm.tasks import ATTEMPTS, Event, Executor, Failed, Finished, Handle, Item, Lost, Task, of_the_worker
+from rendergraph.farm.bundle import Bundle, make_bundle
+from rendergraph.farm.tasks import (
+    ATTEMPTS,
+    Event,
+    Executor,
+    Handle,
+    Task,
+    TaskFailed,
+    TaskFinished,
+    TaskOutput,
+    TaskRetried,
+    is_retryable,
+)
 from rendergraph.installed import version
 
 Client: TypeAlias = Any  # an extra, of which most is not typed
@@ -131,7 +142,7 @@ class Dask(Executor):
         self._gone_with: dict[Task, int] = {}  # how often what a task was given went with workers
         self._sent_with: dict[Task, int] = {}  # how often had been sent what a task was given
 
-    def bring(self, make: Callable[[], Bundle]) -> None:
+    def upload_inputs(self, make: Callable[[], Bundle]) -> None:
         """Send files, and ask every worker whether it can be used.
 
         Raises:
@@ -213,7 +224,7 @@ class Dask(Executor):
         from rendergraph.farm.dask_worker import perform  # needs the extra
 
         if self._bundle is None:
-            self.bring(lambda: bundled((), ()))
+            self.upload_inputs(lambda: make_bundle((), ()))
         assert self._bundle is not None
         digests = sorted(set(self._bundle.files.values()))
         needs = [handle.digest for handle in task.needs]
@@ -281,13 +292,13 @@ class Dask(Executor):
         worker, told = future.result()
         for kind, value in told:
             if kind == "item":
-                yield Item(task, value, worker)
+                yield TaskOutput(task, value, worker)
             elif kind == "finished":
-                yield Finished(task, worker, value)
-            elif kind == "lost" or of_the_worker(value):
+                yield TaskFinished(task, worker, value)
+            elif kind == "lost" or is_retryable(value):
                 yield from self._lost(task, worker, value)
             else:
-                yield Failed(task, worker, value)
+                yield TaskFailed(task, worker, value)
 
     def _lost(
         self, task: Task, worker: str, error: Any, tried: dict[Task, int] | None = None, most: int = ATTEMPTS
@@ -297,9 +308,9 @@ class Dask(Executor):
         tried[task] = tried.get(task, 0) + 1
         if tried[task] < most:
             self.submit(task)
-            yield Lost(task, worker, tuple(error.problems))
+            yield TaskRetried(task, worker, tuple(error.problems))
         else:
-            yield Failed(task, worker, error, lost=True)
+            yield TaskFailed(task, worker, error, lost=True)
 
     def close(self) -> None:
         """Leave the cluster: what still runs for us there ends, and so does a cluster that was started for it."""

@@ -18,8 +18,8 @@ from distributed import WorkerPlugin, get_worker
 
 from rendergraph.errors import Problem, RenderError, RendergraphError
 from rendergraph.farm.bundle import Bundle, unfit
-from rendergraph.farm.child import Child, started
 from rendergraph.farm.processes import FIRST
+from rendergraph.farm.worker_process import Child, started
 
 
 class Station(WorkerPlugin):
@@ -109,7 +109,7 @@ class Station(WorkerPlugin):
     def _start(self, bundle: Bundle) -> Child:
         root = self._root(bundle)
         words = {"name": self._who, "device": self._device, "root": str(root), "home": bundle.home}
-        self._child = started("rendergraph.farm.child:work", words, bundle.environment(root))
+        self._child = started("rendergraph.farm.worker_process:work", words, bundle.environment(root))
         self._ready, self._has = False, set()
         return self._child
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from msgspec import structs
 
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.farm.bundle import placed
-from rendergraph.farm.tasks import Executor, Failed, Item, Task, Worker
+from rendergraph.farm.bundle import relocate_selection
+from rendergraph.farm.tasks import Executor, Task, TaskFailed, TaskOutput, Worker
 from rendergraph.images.saving import Saved, encoded, viewable_as
 from rendergraph.session import stages
 from rendergraph.session.pipeline import Pipeline
@@ -76,7 +76,7 @@ class Chunk(Task):
 
     def run(self, worker: Worker) -> Iterator[Shown | Frame]:
         """Each frame; and at last the last one without its pictures, for its times."""
-        pipeline = Pipeline(placed(self.selection, worker.root))
+        pipeline = Pipeline(relocate_selection(self.selection, worker.root))
         expanded = stages.expand(pipeline.link(), self.options)
         frame: Frame | None = None
         for frame in stages.draw(expanded, worker.gpu, lead=self.lead):
@@ -130,10 +130,10 @@ def drawn(farm: Executor, parts: Sequence[Chunk]) -> Iterator[Shown | Frame]:
     for part in parts:
         farm.submit(part)
     for event in farm.events():
-        if isinstance(event, Failed):
+        if isinstance(event, TaskFailed):
             error: RendergraphError = event.error
             raise type(error)(error.problems) from error
-        if isinstance(event, Item):
+        if isinstance(event, TaskOutput):
             if isinstance(event.value, Shown):
                 if event.value.number in seen:  # by a worker that was lost afterwards
                     continue

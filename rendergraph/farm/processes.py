@@ -13,8 +13,19 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError
-from rendergraph.farm.child import Child, started
-from rendergraph.farm.tasks import ATTEMPTS, Event, Executor, Failed, Finished, Handle, Item, Lost, Task, of_the_worker
+from rendergraph.farm.tasks import (
+    ATTEMPTS,
+    Event,
+    Executor,
+    Handle,
+    Task,
+    TaskFailed,
+    TaskFinished,
+    TaskOutput,
+    TaskRetried,
+    is_retryable,
+)
+from rendergraph.farm.worker_process import Child, started
 
 TIMEOUT = 600.0
 """Seconds that a worker may say nothing before it is taken to hang."""
@@ -105,7 +116,7 @@ class Processes(Executor):
         if seat.child is None:
             words = {"name": seat.name, "device": seat.device}
             seat.ready = False
-            seat.child, seat.has = started("rendergraph.farm.child:work", words, self._environment), set()
+            seat.child, seat.has = started("rendergraph.farm.worker_process:work", words, self._environment), set()
         seat.task, seat.heard = task, time.monotonic()
         try:
             for handle in task.needs:
@@ -126,17 +137,17 @@ class Processes(Executor):
             return
         seat.heard, seat.ready = time.monotonic(), True
         if kind == "item":
-            yield Item(seat.task, value, seat.name)
+            yield TaskOutput(seat.task, value, seat.name)
         elif kind == "finished":
             task, seat.task = seat.task, None
-            yield Finished(task, seat.name, value)
+            yield TaskFinished(task, seat.name, value)
         elif kind == "unable":
             self._retire(seat, value)
-        elif kind == "failed" and of_the_worker(value):
+        elif kind == "failed" and is_retryable(value):
             yield self._lost(seat, value)
         elif kind == "failed":
             task, seat.task = seat.task, None
-            yield Failed(task, seat.name, value)
+            yield TaskFailed(task, seat.name, value)
 
     def _gone(self, seat: _Seat) -> Event:
         """What to say of a process whose pipe has closed."""
@@ -153,8 +164,8 @@ class Processes(Executor):
         self._tried[task] = self._tried.get(task, 0) + 1
         if self._tried[task] < self._attempts:
             self._waiting.append(task)
-            return Lost(task, seat.name, tuple(error.problems))
-        return Failed(task, seat.name, error, lost=True)
+            return TaskRetried(task, seat.name, tuple(error.problems))
+        return TaskFailed(task, seat.name, error, lost=True)
 
     def _retire(self, seat: _Seat, error: DeviceError) -> None:
         """A seat without a device: the others go on.

@@ -58,7 +58,7 @@ class Worker:
 
     Attributes:
         name: for messages and events.
-        kept: what a task leaves for the next ones here, by keys of its own.
+        cache: what a task leaves for the next ones here, by keys of its own.
         root: the folder beneath which files lie that were sent here; None where they are found at their own places.
     """
 
@@ -66,7 +66,7 @@ class Worker:
 
     def __init__(self, name: str, gpu: Gpu | None = None, device: int | None = None) -> None:
         self.name = name
-        self.kept: dict[Any, Any] = {}
+        self.cache: dict[Any, Any] = {}
         self._values: dict[str, Any] = {}
         self._gpu, self._device = gpu, device
         self._stack = ExitStack()
@@ -84,11 +84,11 @@ class Worker:
             self._gpu = self._stack.enter_context(opened(None, self._device))
         return self._gpu
 
-    def give(self, handle: Handle, value: Any) -> None:
+    def store(self, handle: Handle, value: Any) -> None:
         """Put something here that tasks need."""
         self._values[handle.digest] = value
 
-    def take(self, handle: Handle) -> Any:
+    def value(self, handle: Handle) -> Any:
         """What a handle stands for."""
         return self._values[handle.digest]
 
@@ -98,7 +98,7 @@ class Worker:
 
 
 @dataclass(frozen=True, eq=False)
-class Item:
+class TaskOutput:
     """A task has handed out a value."""
 
     task: Task
@@ -107,7 +107,7 @@ class Item:
 
 
 @dataclass(frozen=True, eq=False)
-class Finished:
+class TaskFinished:
     """A task is done; all its items have come."""
 
     task: Task
@@ -116,7 +116,7 @@ class Finished:
 
 
 @dataclass(frozen=True, eq=False)
-class Lost:
+class TaskRetried:
     """A worker was lost with a task, or gave up for reasons of its own; another one begins the task again."""
 
     task: Task
@@ -125,7 +125,7 @@ class Lost:
 
 
 @dataclass(frozen=True, eq=False)
-class Failed:
+class TaskFailed:
     """A task will not be done.
 
     Attributes:
@@ -147,7 +147,7 @@ class Failed:
         return tuple(self.error.problems)
 
 
-Event: TypeAlias = "Item | Finished | Lost | Failed"
+Event: TypeAlias = "TaskOutput | TaskFinished | TaskRetried | TaskFailed"
 
 
 class Executor(AbstractContextManager["Executor"], ABC):
@@ -182,7 +182,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
     def put(self, value: Any) -> Handle:
         """Something that tasks need, which can be pickled; each worker gets it once."""
 
-    def bring(self, make: Callable[[], Bundle]) -> None:
+    def upload_inputs(self, make: Callable[[], Bundle]) -> None:
         """Send what pipelines are drawn from to workers that do not share a disk with this process.
 
         Raises:
@@ -198,7 +198,7 @@ class Executor(AbstractContextManager["Executor"], ABC):
         self.close()
 
 
-def of_the_worker(error: BaseException) -> bool:
+def is_retryable(error: BaseException) -> bool:
     """Whether another worker may have more luck than the one that raised this."""
     if isinstance(error, RendergraphError):
         return isinstance(error, DeviceError) or any(problem.code in _OF_THE_DEVICE for problem in error.problems)
@@ -233,16 +233,16 @@ class Serial(Executor):
             task, begun = self._waiting.popleft(), time.monotonic()
             try:
                 for value in task.run(self._worker):
-                    yield Item(task, value, self._worker.name)
+                    yield TaskOutput(task, value, self._worker.name)
             except (InputError, RenderError) as error:
-                yield Failed(task, self._worker.name, error)
+                yield TaskFailed(task, self._worker.name, error)
             else:
-                yield Finished(task, self._worker.name, time.monotonic() - begun)
+                yield TaskFinished(task, self._worker.name, time.monotonic() - begun)
 
     def put(self, value: Any) -> Handle:
         """It stays where it is."""
         handle = Handle(f"{id(value):x}")
-        self._worker.give(handle, value)
+        self._worker.store(handle, value)
         return handle
 
     def close(self) -> None:

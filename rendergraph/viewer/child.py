@@ -11,7 +11,7 @@ import threading
 from multiprocessing.connection import Connection
 
 from rendergraph.errors import Problem, RenderError, RendergraphError
-from rendergraph.farm import child as farm
+from rendergraph.farm import worker_process as farm
 from rendergraph.viewer.questions import Answer, Question
 
 PATIENCE = 30.0

@@ -21,7 +21,7 @@ import rendergraph as rg
 from rendergraph.compare.batches import MOST_RUNS
 from rendergraph.compare.groups import Group
 from rendergraph.compare.product import Sweep, sweep
-from rendergraph.farm import Event, Finished, Item, Serial, Task, Worker
+from rendergraph.farm import Event, Serial, Task, TaskFinished, TaskOutput, Worker
 
 AXES: dict[str, list[float | str]] = {
     "shadows.taps": [1, 2, 3, 4],
@@ -45,7 +45,7 @@ class Metered(Serial):
 
     def submit(self, task: Task) -> None:
         """As it would arrive elsewhere."""
-        handles = {handle.digest: self._worker.take(handle) for handle in task.needs}
+        handles = {handle.digest: self._worker.value(handle) for handle in task.needs}
         super().submit(pickle.loads(pickle.dumps(task)))
         assert handles or not task.needs
 
@@ -63,9 +63,9 @@ class Metered(Serial):
                 spent += process_time() - begun
                 if value is None:
                     break
-                yield Item(task, value, "elsewhere")
+                yield TaskOutput(task, value, "elsewhere")
             self.costs.setdefault(len(task.variants), []).append(spent)
-            yield Finished(task, "elsewhere", spent)
+            yield TaskFinished(task, "elsewhere", spent)
 
 
 def modelled(workers: int, costs: dict[int, float], client: float, start: float) -> tuple[float, int]:

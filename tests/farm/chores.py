@@ -31,7 +31,7 @@ class Chore(Task):
     needs: tuple[Handle, ...] = ()
 
     def run(self, worker: Worker) -> Iterator[Any]:
-        yield worker.name, os.getpid(), *(worker.take(each) for each in self.needs)
+        yield worker.name, os.getpid(), *(worker.value(each) for each in self.needs)
         if self.does == "fails":
             raise InputError(Problem("RG104", "wrong everywhere"))
         if self.does == "lacks memory":

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from rendergraph.errors import DeviceError, UsageError
-from rendergraph.farm import Failed, Finished, Item, Lost, Serial
-from rendergraph.farm.choose import chosen
+from rendergraph.farm import Serial, TaskFailed, TaskFinished, TaskOutput, TaskRetried
+from rendergraph.farm.executors import make_executor
 from rendergraph.farm.processes import Processes
 
 Chores = Callable[..., Any]
@@ -34,13 +34,13 @@ def test_what_is_lost_is_tried_again_and_given_up_at_last(chore: Chores, tmp_pat
             farm.submit(chore(does, does, tmp_path / does.replace(" ", "-"), (handle,)))
         events = list(farm.events())
         farm.submit(chore("later"))
-        assert [type(event) for event in farm.events()] == [Item, Finished]
-    assert of(events, "nothing") == [Item, Finished]
-    assert of(events, "dies once") == [Item, Lost, Item, Finished]
-    assert of(events, "fails") == [Item, Failed]
+        assert [type(event) for event in farm.events()] == [TaskOutput, TaskFinished]
+    assert of(events, "nothing") == [TaskOutput, TaskFinished]
+    assert of(events, "dies once") == [TaskOutput, TaskRetried, TaskOutput, TaskFinished]
+    assert of(events, "fails") == [TaskOutput, TaskFailed]
     for does in ("dies", "hangs", "lacks memory"):
-        assert of(events, does) == [Item, Lost, Item, Failed]
-    failed = {event.task.name: event for event in events if isinstance(event, Failed)}
+        assert of(events, does) == [TaskOutput, TaskRetried, TaskOutput, TaskFailed]
+    failed = {event.task.name: event for event in events if isinstance(event, TaskFailed)}
     assert {name: event.lost for name, event in failed.items()} == {
         "dies": True,
         "fails": False,
@@ -49,7 +49,7 @@ def test_what_is_lost_is_tried_again_and_given_up_at_last(chore: Chores, tmp_pat
     }
     assert "ended (SIGKILL)" in str(failed["dies"].error)
     assert "said nothing for 2 s" in str(failed["hangs"].error)
-    items = [event for event in events if isinstance(event, Item)]
+    items = [event for event in events if isinstance(event, TaskOutput)]
     assert all(event.value[2] == [1, 2, 3] for event in items)
     pids = {event.value[1] for event in items}
     assert 7 <= len(pids) <= 9  # seven were lost, and two are there at a time
@@ -105,17 +105,17 @@ def alive(pid: int) -> bool:
 
 @pytest.mark.parametrize("word", ["threads", "processes:0", "processes:x", "dask://", "dask://host"])
 def test_executors_that_there_are_not_are_told(word: str) -> None:
-    with pytest.raises(UsageError, match=r"RG641 there is no executor .*processes:N"), chosen(word, tasks=2):
+    with pytest.raises(UsageError, match=r"RG641 there is no executor .*processes:N"), make_executor(word, tasks=2):
         pass
 
 
 def test_little_work_stays_here_and_much_goes_out_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    from rendergraph.farm import choose
+    from rendergraph.farm import executors
 
     def made(tasks: int, cores: int, devices: tuple[int, ...] = ()) -> tuple[type, int]:
-        monkeypatch.setattr(choose, "cores", lambda: cores)
+        monkeypatch.setattr(executors, "cores", lambda: cores)
         monkeypatch.setattr("rendergraph.gl.egl.hardware", lambda: devices)
-        with chosen(None, tasks=tasks) as farm:
+        with make_executor(None, tasks=tasks) as farm:
             return type(farm), farm.workers
 
     assert made(1, 64) == (Serial, 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rendergraph.errors import InputError, Problem, RenderError
-from rendergraph.farm import Event, Failed, Finished, Item, Serial, Task, Worker
+from rendergraph.farm import Event, Serial, Task, TaskFailed, TaskFinished, TaskOutput, Worker
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Count(Task):
 def told(events: Iterator[Event]) -> list[tuple[Any, ...]]:
     found: list[tuple[Any, ...]] = []
     for event in events:
-        if isinstance(event, Item):
+        if isinstance(event, TaskOutput):
             found.append((event.task.name, event.value))
         else:
             found.append((event.task.name, type(event)))
@@ -42,13 +42,13 @@ def test_items_come_in_order_and_a_failed_task_does_not_stop_the_next() -> None:
         events = farm.events()
         assert [next(events) for _ in range(2)][1].task.name == "a"
         farm.submit(Count("c", 0))
-        assert told(events) == [("a", Finished), ("b", ("here", 0)), ("b", Failed), ("c", Finished)]
+        assert told(events) == [("a", TaskFinished), ("b", ("here", 0)), ("b", TaskFailed), ("c", TaskFinished)]
 
 
 def test_what_a_task_says_of_itself_is_no_fault_of_the_worker() -> None:
-    from rendergraph.farm.tasks import of_the_worker
+    from rendergraph.farm.tasks import is_retryable
 
-    assert not of_the_worker(InputError(Problem("RG104", "x")))
-    assert not of_the_worker(RenderError(Problem("RG508", "x")))
-    assert of_the_worker(RenderError(Problem("RG612", "x")))
-    assert of_the_worker(MemoryError())
+    assert not is_retryable(InputError(Problem("RG104", "x")))
+    assert not is_retryable(RenderError(Problem("RG508", "x")))
+    assert is_retryable(RenderError(Problem("RG612", "x")))
+    assert is_retryable(MemoryError())

@@ -35,7 +35,7 @@ def started(main: str, words: Mapping[str, Any], environment: Mapping[str, str] 
     told = json.dumps({"path": sys.path, "words": {**words, "pipe": theirs.fileno()}, "parent": os.getpid()})
     program = (
         "import json, sys; told = json.loads(sys.argv[1]); sys.path[:] = told['path']\n"
-        "from rendergraph.farm.child import end_with\n"
+        "from rendergraph.farm.worker_process import end_with\n"
         f"end_with(told['parent'])\nfrom {module} import {function}\n{function}(**told['words'])"
     )
     with theirs:
@@ -95,7 +95,7 @@ def work(pipe: int, name: str, device: int | None, root: str | None = None, home
         home: the current folder, as it is called where they came from.
     """
     from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError  # in the process itself alone
-    from rendergraph.farm.bundle import at_home  # likewise
+    from rendergraph.farm.bundle import map_remote_paths  # likewise
     from rendergraph.farm.tasks import Handle, Worker  # likewise
 
     worker = Worker(name, device=device)
@@ -111,14 +111,14 @@ def work(pipe: int, name: str, device: int | None, root: str | None = None, home
         while True:
             kind, *told = end.recv()
             if kind == "give":
-                worker.give(Handle(told[0]), told[1])
+                worker.store(Handle(told[0]), told[1])
                 continue
             begun = time.monotonic()
             try:
                 for value in told[0].run(worker):
                     end.send(("item", value))
             except RendergraphError as error:
-                end.send(("failed", at_home(error, worker.root)))
+                end.send(("failed", map_remote_paths(error, worker.root)))
             except MemoryError:
                 end.send(("failed", RenderError(Problem("RG640", "the worker ran out of memory"))))
             else:

@@ -15,7 +15,7 @@ from rendergraph.farm.tasks import Executor, Serial
 if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
 
-Where: TypeAlias = "str | Executor | Any | None"
+ExecutorChoice: TypeAlias = "str | Executor | Any | None"
 """Who works: a word, an executor, a Dask `Client`; None leaves it to the size of the work."""
 WORDS = "serial, processes, processes:N, dask, dask:N or dask://HOST:PORT"
 ENOUGH_CORES = 4
@@ -24,8 +24,8 @@ _MOST = 1024
 
 
 @contextmanager
-def chosen(
-    where: Where = None,
+def make_executor(
+    where: ExecutorChoice = None,
     session: Gpu | None = None,
     device: int | None = None,
     *,
@@ -58,7 +58,7 @@ def chosen(
 
 
 def _made(
-    where: Where,
+    where: ExecutorChoice,
     session: Gpu | None,
     device: int | None,
     tasks: int,
@@ -95,7 +95,7 @@ def _made(
     return of(where, device, timeout=timeout)
 
 
-def check_word(text: str) -> str:
+def check_executor_name(text: str) -> str:
     """The word, if it names an executor.
 
     Raises:
