@@ -221,7 +221,8 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         from rendergraph.compare.notebook import notebook_html  # for notebooks alone
-        from rendergraph.compare.report.parts import eight_bit, heat, number  # see above
+        from rendergraph.compare.report.parts import eight_bit, number  # see above
+        from rendergraph.images import heat_map  # see above
 
         reference, pictures, rows = self.reference, [], []
         if reference.kind != "variant":
@@ -230,7 +231,7 @@ class Comparison:
             assert result.pixels is not None
             pictures.append((result.name, eight_bit(result.pixels, result.encoding)))
             if result.flip_map is not None:
-                pictures.append((f"FLIP of {result.name}: {number(result.metrics.flip)}", heat(result.flip_map)))
+                pictures.append((f"FLIP of {result.name}: {number(result.metrics.flip)}", heat_map(result.flip_map)))
         for result in self.results:
             m, ms = result.metrics, number(result.times.headline.median, 2)
             psnr = "∞" if m.psnr is None else number(m.psnr, 2)

@@ -21,7 +21,7 @@ from rendergraph.images.saving import (
     stands_for,
     viewable_as,
 )
-from rendergraph.images.view import from_srgb, to_srgb, viewable
+from rendergraph.images.view import from_srgb, heat_map, to_srgb, viewable
 
 __all__ = [
     "EXTENSIONS",
@@ -34,6 +34,7 @@ __all__ = [
     "decode_light",
     "encoded",
     "from_srgb",
+    "heat_map",
     "is_numbered",
     "numbered",
     "output_for",

@@ -28,6 +28,8 @@ _LIGHT = frozenset({"radiance", "albedo", "emissive", "luminance"})
 _WINDOW_DEPTH = frozenset({"depth", "shadow_map"})  # reversed: greater is nearer
 _UNIT = frozenset({"display_color", "visibility", "occlusion", "material"})
 _NAN_COLOR = (255, 0, 255)
+# Black through purple and orange to pale yellow: brightness alone gives the order.
+_HEAT = np.array([(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float64)
 
 
 def to_srgb(linear: Pixels) -> npt.NDArray[np.float32]:
@@ -51,6 +53,15 @@ def to_bytes(unit: Pixels) -> Bytes:
         return unit
     values = np.nan_to_num(np.asarray(unit, dtype=np.float32), nan=0.0, posinf=1.0, neginf=0.0)
     return (np.clip(values, 0.0, 1.0) * 255 + 0.5).astype(np.uint8)
+
+
+def heat_map(values: Pixels) -> Bytes:
+    """Values 0…1 as colours; NaN counts as 1."""
+    position = np.clip(np.nan_to_num(values, nan=1.0), 0, 1) * (len(_HEAT) - 1)
+    lower = np.minimum(position.astype(int), len(_HEAT) - 2)
+    fraction = (position - lower)[..., np.newaxis]
+    mixed = _HEAT[lower] * (1 - fraction) + _HEAT[lower + 1] * fraction
+    return np.asarray(mixed + 0.5).astype(np.uint8)
 
 
 def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) -> Bytes:

@@ -18,7 +18,6 @@ import numpy.typing as npt
 from msgspec.structs import replace
 
 from rendergraph import images, stamps
-from rendergraph.compare.report.parts import heat
 from rendergraph.compile import Executable
 from rendergraph.document import Source, from_plain
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
@@ -261,8 +260,8 @@ class Painter:
             figures, flip = measure(a, b)
             facts["figures"] = figures.as_json()
             difference = np.abs(a.astype(np.int16) - b.astype(np.int16)).max(axis=-1).astype(np.float32) / 255
-            files["difference"] = self._encoded(heat(np.clip(difference * 8, 0, 1)), ".png")
-            files["flip"] = self._encoded(heat(flip), ".png")
+            files["difference"] = self._encoded(images.heat_map(np.clip(difference * 8, 0, 1)), ".png")
+            files["flip"] = self._encoded(images.heat_map(flip), ".png")
         return Answer(facts, files)
 
     @_said.register

@@ -19,8 +19,6 @@ from rendergraph.images import viewable, write
 from rendergraph.metrics import Encoding, Pixels
 
 SOFTWARE = "software rasteriser: no measure of a GPU"
-# Black through purple and orange to pale yellow: brightness alone tells the order.
-_MAP = np.array([(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float64)
 
 
 def software_note(software: bool) -> str:
@@ -39,15 +37,6 @@ def png(pixels: npt.NDArray[np.uint8]) -> str:
 def eight_bit(pixels: Pixels, encoding: Encoding) -> npt.NDArray[np.uint8]:
     """A compared output as 8 bits."""
     return viewable(pixels, {"display": "display_color", "linear": "radiance"}.get(encoding, "any"))
-
-
-def heat(values: Pixels) -> npt.NDArray[np.uint8]:
-    """Values 0…1 as colours."""
-    place = np.clip(np.nan_to_num(values, nan=1.0), 0, 1) * (len(_MAP) - 1)
-    low = np.minimum(place.astype(int), len(_MAP) - 2)
-    part = (place - low)[..., np.newaxis]
-    mixed = _MAP[low] * (1 - part) + _MAP[low + 1] * part
-    return np.asarray(mixed + 0.5).astype(np.uint8)
 
 
 def img(identity: str, source: str, alt: str) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from html import escape
 
-from rendergraph.compare.report.parts import eight_bit, heat, img, number, png
+from rendergraph.compare.report.parts import eight_bit, img, number, png
 from rendergraph.compare.values import Comparison
-from rendergraph.images import viewable
+from rendergraph.images import heat_map, viewable
 
 
 def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
@@ -71,7 +71,7 @@ def sheet(comparison: Comparison, most: int) -> str:
         figure = _figure(f"pic-{place}", png(eight_bit(result.pixels, result.encoding)), result.name)
         if few and result.flip_map is not None:
             maps += 1
-            figure += _figure("", png(heat(result.flip_map)), f"FLIP {number(result.metrics.flip)}")
+            figure += _figure("", png(heat_map(result.flip_map)), f"FLIP {number(result.metrics.flip)}")
         figures.append(f"<div>{figure}</div>")
     # Pictures that were read back from a sweep's folder have none.
     told = f"Beneath each is FLIP against {escape(reference.name)}, dark where equal." if maps else ""
