@@ -13,7 +13,6 @@ import numpy.typing as npt
 from msgspec import Struct, field
 
 from rendergraph.annotations import Range
-from rendergraph.api.viewing import shifted
 from rendergraph.compile import Executable
 from rendergraph.compile.executable import source_of_buffer, source_of_region, source_of_view
 from rendergraph.declare import Node, Port, Views
@@ -26,6 +25,7 @@ from rendergraph.gl.saved_state import settle
 from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.ports import Count
+from rendergraph.projection import shifted
 from rendergraph.scene.frame_scene import FrameScene
 from rendergraph.scene.model import Scene
 from rendergraph.steps import Step, ViewMatrices

@@ -15,9 +15,9 @@ import msgspec
 
 import rendergraph
 import rendergraph.api
-import rendergraph.api.viewing
 import rendergraph.errors
 import rendergraph.ports
+import rendergraph.projection
 import rendergraph.scene.model
 import rendergraph.steps.frame
 import rendergraph.steps.model
@@ -87,13 +87,13 @@ def pages() -> Iterator[tuple[str, str]]:
             "## Constants\n\n" + table(("name", "value"), constants),
         ),
     )
-    views = rendergraph.api.viewing
+    views = rendergraph.projection
     functions = {name: value for name, value in vars(views).items() if inspect.isfunction(value) and name[0] != "_"}
     yield (
         "views.md",
         page(
             "Views",
-            "`from rendergraph.api import viewing`: what `update` makes views with.",
+            "`from rendergraph.api import projection`: what `update` makes views with.",
             _doc(views),
             *(_entry(name, value) for name, value in functions.items()),
         ),

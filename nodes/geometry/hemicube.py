@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rendergraph.api import Frame, Node, SceneError, Steps, Views, structural, viewing
+from rendergraph.api import Frame, Node, SceneError, Steps, Views, projection, structural
 
 
 def _square(node: Hemicube, _facts: object) -> tuple[int, int]:
@@ -44,10 +44,10 @@ class Hemicube(Node):
             raise SceneError("a hemicube stands around an eye, and this camera is orthographic; take `guard_band`")
         to_world = np.linalg.inv(camera.view)
         right, up, forward, eye = to_world[:3, 0], to_world[:3, 1], -to_world[:3, 2], to_world[:3, 3]
-        whole = viewing.frustum(-near, near, -near, near, near, camera.far)
-        half = viewing.frustum(0, near, -near, near, near, camera.far)  # x is where the camera looks
+        whole = projection.frustum(-near, near, -near, near, near, camera.far)
+        half = projection.frustum(0, near, -near, near, near, camera.far)  # x is where the camera looks
         size = self.resolution, self.resolution
         frame.set_views(self.front, [replace(camera, projection=whole, size=size)])
         for port, along in ((self.left, -right), (self.right, right), (self.up, up), (self.down, -up)):
-            view = viewing.view_along(along, forward, eye)
+            view = projection.view_along(along, forward, eye)
             frame.set_views(port, [replace(camera, view=view, projection=half, size=size)])

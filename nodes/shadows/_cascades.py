@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api import ViewMatrices, viewing
+from rendergraph.api import ViewMatrices, projection
 
 Points = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def farthest_seen(camera: ViewMatrices, box: Points) -> float:
 
     Else every step of the camera would move all splits, and with them every texel of the maps.
     """
-    corners = viewing.box_corners(box)
+    corners = projection.box_corners(box)
     farthest = float((-(corners @ camera.view[2, :3] + camera.view[2, 3])).max())
     steps = math.ceil(_STEP * math.log2(max(farthest / camera.near, 2.0)) - 1e-9)
     return float(min(camera.near * 2 ** (steps / _STEP), camera.far))
@@ -56,7 +56,7 @@ def slice_sphere(camera: ViewMatrices, begin: float, end: float) -> tuple[Points
 
     The radius depends on the projection alone, to the last bit: it stays as it is when the camera moves and turns.
     """
-    corners = viewing.frustum_corners(replace(camera, view=np.eye(4)), begin, end)
+    corners = projection.frustum_corners(replace(camera, view=np.eye(4)), begin, end)
     first, last = corners[:4].mean(axis=0), corners[4:].mean(axis=0)
     axis = last - first
     # Along the axis the nearest corners and the farthest ones are equally far from the best centre.
@@ -65,7 +65,7 @@ def slice_sphere(camera: ViewMatrices, begin: float, end: float) -> tuple[Points
     share = min(max(gap / (2 * float(axis @ axis)), 0.0), 1.0)
     center = first + share * axis
     radius = float(np.sqrt(((corners - center) ** 2).sum(axis=1).max()))
-    return (viewing.inverse_rigid(camera.view) @ np.append(center, 1.0))[:3], radius
+    return (projection.inverse_rigid(camera.view) @ np.append(center, 1.0))[:3], radius
 
 
 def cascade_view(
@@ -83,19 +83,19 @@ def cascade_view(
         casting: points around what casts, shape (n, 3).
         resolution: texels along a side.
     """
-    rotation = viewing.view_along(direction)
+    rotation = projection.view_along(direction)
     center, radius = rotation[:2, :3] @ ball[0], ball[1]
-    size = np.full(2, 2 * radius * viewing.guard_band(resolution, _MARGIN))
+    size = np.full(2, 2 * radius * projection.guard_band(resolution, _MARGIN))
     texel = size / resolution
     if len(casting):
         across = casting @ rotation[:2, :3].T
         low, high = across.min(axis=0), across.max(axis=0)
-        span = (high - low) * viewing.guard_band(resolution, _MARGIN)
+        span = (high - low) * projection.guard_band(resolution, _MARGIN)
         within = np.clip(center, np.minimum(low + radius, high), np.maximum(high - radius, low))
         center = np.where(size < span, np.round(within / texel) * texel, (low + high) / 2)
         size = np.minimum(size, span)
     else:
         center = np.round(center / texel) * texel
-    along = viewing.box_corners(box) @ rotation[2, :3]
+    along = projection.box_corners(box) @ rotation[2, :3]
     low_corner, high_corner = np.append(center - size / 2, along.min()), np.append(center + size / 2, along.max())
-    return viewing.orthographic_view(rotation, low_corner, high_corner, resolution)
+    return projection.orthographic_view(rotation, low_corner, high_corner, resolution)

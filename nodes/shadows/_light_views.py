@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api import ViewMatrices, casting_lights, viewing
+from rendergraph.api import ViewMatrices, casting_lights, projection
 
 Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
@@ -62,11 +62,11 @@ def directional_view(
     Across the light it is as narrow as what the camera sees of the box and as what casts; what lies outside is lit.
     Along the light it holds the whole box, for what stands outside the picture may cast into it.
     """
-    rotation = viewing.view_along(direction, _grain(direction, camera))
-    corners = viewing.box_corners(box)
+    rotation = projection.view_along(direction, _grain(direction, camera))
+    corners = projection.box_corners(box)
     along = corners @ rotation[2, :3]
     low, high = np.full(2, -np.inf), np.full(2, np.inf)
-    for points in (viewing.visible_part(camera, box), casting, corners):
+    for points in (projection.visible_part(camera, box), casting, corners):
         if not len(points):
             continue
         across = rotation[:2, :3] @ points.T
@@ -74,7 +74,7 @@ def directional_view(
         if np.any(lower > higher):  # nothing that casts is near what is seen
             break
         low, high = lower, higher
-    return viewing.orthographic_view(
+    return projection.orthographic_view(
         rotation, np.append(low, along.min()), np.append(high, along.max()), resolution, _MARGIN
     )
 
@@ -86,9 +86,11 @@ def spot_view(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -> 
     it begins at what casts and ends at what is seen.
     """
     box = np.asarray(scene.bounds, np.float64)
-    cone = viewing.cone_view(light.position, light.direction, min(light.outer, _WIDEST), *reach(light, box), resolution)
-    planes = viewing.frustum_planes(cone)
-    seen = viewing.region_corners(np.concatenate([planes, viewing.frustum_planes(camera), viewing.box_planes(box)]))
+    half_angle = min(light.outer, _WIDEST)
+    cone = projection.cone_view(light.position, light.direction, half_angle, *reach(light, box), resolution)
+    planes = projection.frustum_planes(cone)
+    visible = [planes, projection.frustum_planes(camera), projection.box_planes(box)]
+    seen = projection.region_corners(np.concatenate(visible))
     boxes = casting_points(scene, light.direction, light.position).reshape(-1, 8, 3)
     casting, begin = _within_cone(cone, boxes)
     widest = np.full(2, 1 / cone.projection[0, 0])
@@ -100,7 +102,7 @@ def spot_view(light: Any, scene: Any, camera: ViewMatrices, resolution: int) -> 
         if np.all(lower < higher):  # else nothing that casts is near what is seen
             low, high, far = lower, higher, float(distances.max()) * 1.001
             near = max(min(begin * 0.999, far * 0.5), cone.near)
-    return viewing.narrowed_view(cone, low, high, near, far, _MARGIN)
+    return projection.narrowed_view(cone, low, high, near, far, _MARGIN)
 
 
 def _slopes(view: ViewMatrices, points: Points) -> tuple[Points, Points]:
@@ -123,9 +125,9 @@ def _within_cone(cone: ViewMatrices, boxes: Points) -> tuple[Points, float]:
     seen = np.all((slopes.max(axis=1) > -widest) & (slopes.min(axis=1) < widest), axis=1)
     near = float(distances[before][seen].min(initial=cone.far))
     found = [slopes[seen].reshape(-1, 2)]
-    sides = viewing.frustum_planes(cone)[:5]
+    sides = projection.frustum_planes(cone)[:5]
     for box in boxes[~before & np.any(distances > cone.near, axis=1)]:  # of those beside the light, what is before it
-        faces = [viewing.clip_polygon(box[list(face)], sides) for face in viewing.BOX_FACES]
+        faces = [projection.clip_polygon(box[list(face)], sides) for face in projection.BOX_FACES]
         if sum(map(len, faces)):
             found.append(_slopes(cone, np.concatenate([face.reshape(-1, 3) for face in faces]))[0])
             near = cone.near
@@ -134,7 +136,7 @@ def _within_cone(cone: ViewMatrices, boxes: Points) -> tuple[Points, float]:
 
 def point_views(light: Any, box: Points, resolution: int) -> Sequence[ViewMatrices]:
     """Six perspective views around a point light, in the order of a cube map's faces; each a little wider than 90°."""
-    return viewing.cube_views(light.position, *reach(light, box), resolution, _MARGIN)
+    return projection.cube_views(light.position, *reach(light, box), resolution, _MARGIN)
 
 
 def reach(light: Any, box: Points) -> tuple[float, float]:
@@ -153,7 +155,7 @@ def _grain(direction: Sequence[float] | Matrix, camera: ViewMatrices) -> Matrix:
     forward = np.asarray(direction, np.float64) / np.linalg.norm(direction)
     looking = -camera.view[2, :3]
     flat = looking - forward * (looking @ forward)
-    return flat if np.linalg.norm(flat) > 0.1 else viewing.any_side(direction)
+    return flat if np.linalg.norm(flat) > 0.1 else projection.any_side(direction)
 
 
 # --- what casts -------------------------------------------------------------------------------------------------------

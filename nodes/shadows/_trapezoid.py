@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api import ViewMatrices, viewing
+from rendergraph.api import ViewMatrices, projection
 
 Matrix = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float64]
@@ -91,7 +91,7 @@ def warped(view: ViewMatrices, points: Points, camera: ViewMatrices, focus: floa
     start, end = flat[-2:]
     if np.linalg.norm(end - start) < 1e-4:
         return view  # seen along the light
-    hull = viewing.clip_polygon(np.pad(_hull(flat[:-2]), ((0, 0), (0, 1))), _SQUARE)[:, :2]
+    hull = projection.clip_polygon(np.pad(_hull(flat[:-2]), ((0, 0), (0, 1))), _SQUARE)[:, :2]
     found = trapezoid_around(hull, start, end - start, focus) if len(hull) > 2 else None
     if found is None:
         return view
@@ -99,7 +99,7 @@ def warped(view: ViewMatrices, points: Points, camera: ViewMatrices, focus: floa
     small /= (
         small[2] @ np.append(found, np.ones((4, 1)), axis=1).T
     ).min()  # at least 1: nothing leaves the depth range
-    small[:2] /= viewing.guard_band(view.size[0], margin)
+    small[:2] /= projection.guard_band(view.size[0], margin)
     warp = np.eye(4)
     warp[np.ix_([0, 1, 3], [0, 1, 3])] = small
     return replace(view, projection=warp @ view.projection)

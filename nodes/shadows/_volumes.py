@@ -21,8 +21,8 @@ from rendergraph.api import (
     ViewMatrices,
     casting_lights,
     param,
+    projection,
     structural,
-    viewing,
 )
 
 from ._casting import Casting
@@ -186,7 +186,7 @@ class CountsVolumes(HasVolumes):
         lights, ways = self.ways(frame)
         for layer, light in enumerate(lights):
             if light.range is not None and light.type != "directional":
-                frame.set_region(layer, *viewing.sphere_bounds(frame.camera, light.position, light.range))
+                frame.set_region(layer, *projection.sphere_bounds(frame.camera, light.position, light.range))
             else:
                 frame.set_region(layer)
         if self.silhouettes == "gpu":
@@ -262,7 +262,7 @@ def touches_near_pyramid(camera: ViewMatrices, light: Points, centers: Points, r
         light: its place, homogeneous.
         centers, radii: of the balls.
     """
-    corners = viewing.frustum_corners(camera, far=2 * max(camera.near, 1e-6))[[0, 1, 3, 2]]
+    corners = projection.frustum_corners(camera, far=2 * max(camera.near, 1e-6))[[0, 1, 3, 2]]
     middle = corners.mean(axis=0)
     across = np.cross(corners[1] - corners[0], corners[3] - corners[0])
     to_light = light[:3] - light[3] * middle

@@ -19,8 +19,8 @@ from rendergraph.api import (
     ViewMatrices,
     Views,
     define,
+    projection,
     structural,
-    viewing,
 )
 
 from ._light_views import reach
@@ -95,11 +95,11 @@ class ShadowCubeMap(MapTechnique):
         for index in point_lights(self, facts):
             light = scene.lights[index]
             near, far = reach(light, np.asarray(scene.bounds, np.float64))
-            projection = viewing.perspective(math.pi / 2, 1.0, near, far)
+            perspective = projection.perspective(math.pi / 2, 1.0, near, far)
             views = []
             for along, sign, right, turn in _FACES:
-                matrix = viewing.view_along(sign * np.eye(3)[along], turn * np.eye(3)[right], light.position)
+                matrix = projection.view_along(sign * np.eye(3)[along], turn * np.eye(3)[right], light.position)
                 views.append(
-                    ViewMatrices(matrix, projection, (self.resolution, self.resolution), near, far, light=index)
+                    ViewMatrices(matrix, perspective, (self.resolution, self.resolution), near, far, light=index)
                 )
             frame.set_views(self.views, views)

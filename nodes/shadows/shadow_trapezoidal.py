@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rendergraph.api import Frame, ViewMatrices, param, viewing
+from rendergraph.api import Frame, ViewMatrices, param, projection
 
 from ._trapezoid import warped
 from .shadow_map import ShadowMapNode
@@ -37,5 +37,5 @@ class ShadowTrapezoidal(ShadowMapNode):
         if light.type == "point":
             return views
         eye = self.eye(frame)
-        seen = viewing.visible_part(eye, np.asarray(frame.scene.bounds, np.float64))
+        seen = projection.visible_part(eye, np.asarray(frame.scene.bounds, np.float64))
         return [warped(view, seen, eye, self.focus, _MARGIN) for view in views]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from rendergraph.api.viewing import unit
 from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.projection import unit
 from rendergraph.scene import scene_build
 from rendergraph.scene.environments import shipped
 from rendergraph.scene.framing import WIDE, bounding_sphere, framing_camera

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rendergraph.api import viewing
+from rendergraph import projection
 from rendergraph.declare import LightFacts
 from rendergraph.scene.model import Camera, Matrix, Scene
 from rendergraph.steps import ViewMatrices
@@ -15,12 +15,11 @@ def view_matrices(camera: Camera, size: tuple[int, int]) -> ViewMatrices:
     An off-centre `frustum` keeps its own left, right, bottom and top.
     """
     width, height = size
-    return ViewMatrices(
-        viewing.inverse_rigid(camera.transform), projection(camera, width / height), size, camera.near, camera.far
-    )
+    view = projection.inverse_rigid(camera.transform)
+    return ViewMatrices(view, projection_matrix(camera, width / height), size, camera.near, camera.far)
 
 
-def projection(camera: Camera, aspect: float) -> Matrix:
+def projection_matrix(camera: Camera, aspect: float) -> Matrix:
     """View space to OpenGL clip space (z in -w…w) as (4, 4).
 
     Args:
@@ -30,10 +29,10 @@ def projection(camera: Camera, aspect: float) -> Matrix:
     near, far = camera.near, camera.far
     if camera.type == "orthographic":
         top = camera.height / 2
-        return viewing.orthographic(-top * aspect, top * aspect, -top, top, near, far)
+        return projection.orthographic(-top * aspect, top * aspect, -top, top, near, far)
     if camera.type == "frustum" and camera.frustum is not None:
-        return viewing.frustum(*camera.frustum, near, far)
-    return viewing.perspective(camera.fov_y, aspect, near, far)
+        return projection.frustum(*camera.frustum, near, far)
+    return projection.perspective(camera.fov_y, aspect, near, far)
 
 
 def light_facts(scene: Scene) -> tuple[LightFacts, ...]:

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api.viewing import look_at
+from rendergraph.projection import look_at
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera, Scene, Vec3
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api.viewing import unit
+from rendergraph.projection import unit
 from rendergraph.scene.model import Floats, Matrix, Mesh, Vec3
 
 Doubles = npt.NDArray[np.float64]

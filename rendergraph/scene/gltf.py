@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rendergraph.api.viewing import unit
 from rendergraph.document import shown
+from rendergraph.projection import unit
 from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import placement, quaternion_matrix, rigid, vec3
 from rendergraph.scene.gltf_buffers import Buffers, split_glb

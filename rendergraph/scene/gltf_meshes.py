@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api.viewing import unit
+from rendergraph.projection import unit
 from rendergraph.scene.files import Reading, UniqueNames
 from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
 from rendergraph.scene.gltf_buffers import Accessor, Buffers

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.api.viewing import unit
 from rendergraph.document import shown
+from rendergraph.projection import unit
 from rendergraph.scene.files import Reading, UniqueNames, named
 from rendergraph.scene.geometry import Doubles, face_normals, mean_normals
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from msgspec.structs import replace
 
-from rendergraph.api.viewing import look_at, unit
+from rendergraph.projection import look_at, unit
 from rendergraph.scene.geometry import euler_matrix, placement, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
 

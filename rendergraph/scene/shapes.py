@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from rendergraph.api.viewing import unit
 from rendergraph.keys import Key
 from rendergraph.keys.forms import number, vector, whole
+from rendergraph.projection import unit
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Matrix, Mesh
 from rendergraph.scene.polygons import clip_ears

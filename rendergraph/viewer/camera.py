@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
 
-from rendergraph.api.viewing import look_at, unit
+from rendergraph.projection import look_at, unit
 from rendergraph.scene.geometry import vec3
 from rendergraph.scene.model import Camera, Vec3
 

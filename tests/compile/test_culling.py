@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rendergraph.api import Depth, Node, Output, State, Steps, viewing
+from rendergraph.api import Depth, Node, Output, State, Steps, projection
 from rendergraph.compile.culling import seen
 from rendergraph.scene import pack
 from rendergraph.scene.cameras import view_matrices
@@ -49,7 +49,7 @@ def _cameras(count: int) -> list[Camera]:
     random = np.random.default_rng(count)
     found = []
     for number in range(count):
-        pose = np.linalg.inv(viewing.view_along(random.normal(size=3), random.normal(size=3)))
+        pose = np.linalg.inv(projection.view_along(random.normal(size=3), random.normal(size=3)))
         pose[:3, 3] = random.uniform(-4, 4, 3)
         kind = ("perspective", "orthographic", "frustum")[number % 3]
         far = math.inf if number % 2 and kind == "perspective" else random.uniform(1, 8)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import rendergraph as rg
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Node, Output
-from rendergraph.api.viewing import look_at
+from rendergraph.projection import look_at
 from rendergraph.scene.model import Camera
 from tests.execute.test_modes import KINDS, SHADERS, Mix, Parents, Source, Stamp, Tally, graph
 

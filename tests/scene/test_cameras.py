@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rendergraph.api import viewing
-from rendergraph.api.viewing import look_at
+from rendergraph import projection
+from rendergraph.projection import look_at
 from rendergraph.scene import pack
-from rendergraph.scene.cameras import projection, view_matrices
+from rendergraph.scene.cameras import projection_matrix, view_matrices
 from rendergraph.scene.geometry import translation
 from rendergraph.scene.model import Camera
 from rendergraph.steps import ViewMatrices
@@ -31,15 +31,15 @@ def test_projections(vectors: dict[str, object]) -> None:
     for case in vectors["projections"]["cases"]:  # type: ignore[index]  # plain JSON
         near, far, aspect = case["near"], case["far"], case["aspect"]
         camera = Camera("c", EYE, fov_y=case["yfov"], near=near, far=far)
-        assert np.allclose(projection(camera, aspect), case["perspective"], rtol=1e-12, atol=1e-12)
+        assert np.allclose(projection_matrix(camera, aspect), case["perspective"], rtol=1e-12, atol=1e-12)
         endless = Camera("c", EYE, fov_y=case["yfov"], near=near, far=math.inf)
-        assert case["eps"] == viewing.INFINITE_EPSILON
-        assert np.allclose(projection(endless, aspect), case["infinite_eps"], rtol=1e-12, atol=1e-12)
-        assert np.allclose(projection(camera, aspect) @ case["point"], case["clip_perspective"], rtol=1e-12)
+        assert case["eps"] == projection.INFINITE_EPSILON
+        assert np.allclose(projection_matrix(endless, aspect), case["infinite_eps"], rtol=1e-12, atol=1e-12)
+        assert np.allclose(projection_matrix(camera, aspect) @ case["point"], case["clip_perspective"], rtol=1e-12)
         if "orthographic" in case:
             height = 2 / case["orthographic"][1][1]
             flat = Camera("c", EYE, "orthographic", height=height, near=near, far=far)
-            wide = projection(flat, case["orthographic"][1][1] / case["orthographic"][0][0])
+            wide = projection_matrix(flat, case["orthographic"][1][1] / case["orthographic"][0][0])
             assert np.allclose(wide, case["orthographic"], rtol=1e-12, atol=1e-12)
 
 
@@ -53,15 +53,15 @@ def test_frustum_of_a_symmetric_camera_is_the_perspective_one() -> None:
     straight = Camera("c", EYE, fov_y=1.0, near=0.5, far=9)
     top = 0.5 * math.tan(0.5)
     off = Camera("c", EYE, "frustum", frustum=(-top * 2, top * 2, -top, top), near=0.5, far=9)
-    assert np.allclose(projection(off, 1.0), projection(straight, 2.0))
+    assert np.allclose(projection_matrix(off, 1.0), projection_matrix(straight, 2.0))
     shifted = Camera("c", EYE, "frustum", frustum=(0, 2, -1, 1), near=1, far=9)
-    corner = projection(shifted, 1.0) @ (0, -1, -1, 1)
+    corner = projection_matrix(shifted, 1.0) @ (0, -1, -1, 1)
     assert np.allclose(corner / corner[3], (-1, -1, -1, 1))
 
 
 def test_orthographic_is_as_high_as_it_says() -> None:
     camera = Camera("c", EYE, "orthographic", height=4, near=1, far=11)
-    clip = projection(camera, 2.0)
+    clip = projection_matrix(camera, 2.0)
     assert np.allclose(clip @ (4, 2, -1, 1), (1, 1, -1, 1))
     assert np.allclose(clip @ (-4, -2, -11, 1), (-1, -1, 1, 1))
 
@@ -105,28 +105,28 @@ def test_eye_of_an_orthographic_view_points_at_the_viewer() -> None:
 
 def test_inverse_rigid_is_the_inverse() -> None:
     transform = translation((1, 2, 3)) @ look_at((3, 1, 2), (0, 1, 0))
-    assert np.allclose(viewing.inverse_rigid(transform) @ transform, np.eye(4), atol=1e-14)
+    assert np.allclose(projection.inverse_rigid(transform) @ transform, np.eye(4), atol=1e-14)
 
 
-DIRECTION = viewing.view_along((0.2, -0.5, -1), eye=(1, 2, 3))
+DIRECTION = projection.view_along((0.2, -0.5, -1), eye=(1, 2, 3))
 
 
 @pytest.mark.parametrize(
-    ("projection", "near", "far"),
+    ("matrix", "near", "far"),
     [
-        (viewing.perspective(0.9, 1.5, 5.6e-5, 100), 5.6e-5, 100.0),
-        (viewing.perspective(0.9, 1.5, 0.1, math.inf), 0.1, math.inf),
-        (viewing.frustum(-0.1, 0.3, -0.2, 0.1, 0.5, 20), 0.5, 20.0),
-        (viewing.orthographic(-1, 3, 2, 4, -2, 7), -2.0, 7.0),
+        (projection.perspective(0.9, 1.5, 5.6e-5, 100), 5.6e-5, 100.0),
+        (projection.perspective(0.9, 1.5, 0.1, math.inf), 0.1, math.inf),
+        (projection.frustum(-0.1, 0.3, -0.2, 0.1, 0.5, 20), 0.5, 20.0),
+        (projection.orthographic(-1, 3, 2, 4, -2, 7), -2.0, 7.0),
     ],
 )
-def test_depth_is_reversed(projection: Any, near: float, far: float) -> None:
+def test_depth_is_reversed(matrix: Any, near: float, far: float) -> None:
     """1 at the near plane, 0 at the far one or at infinity, between them (1 - z) / 2 of the classical z, in float32."""
-    view = ViewMatrices(DIRECTION, projection, (8, 8), near, far)
+    view = ViewMatrices(DIRECTION, matrix, (8, 8), near, far)
     made = block(pack.pack_view(view))["projection"].T.astype(np.float64)
 
-    def depth(matrix: Any, *place: float) -> float:
-        clip = matrix @ place
+    def depth(of: Any, *place: float) -> float:
+        clip = of @ place
         return float(clip[2] / clip[3])
 
     assert depth(made, 0, 0, -near, 1) == pytest.approx(1, rel=3e-7)
@@ -134,7 +134,7 @@ def test_depth_is_reversed(projection: Any, near: float, far: float) -> None:
     assert depth(made, *end) == pytest.approx(0, abs=0 if far == math.inf else 6e-8)
     for share in (0.01, 0.3, 0.8):
         distance = near + share * (min(far, 50) - near)
-        expected = (1 - depth(projection, 0.3, -0.2, -distance, 1)) / 2
-        slack = viewing.INFINITE_EPSILON if far == math.inf else 0.0
+        expected = (1 - depth(matrix, 0.3, -0.2, -distance, 1)) / 2
+        slack = projection.INFINITE_EPSILON if far == math.inf else 0.0
         assert depth(made, 0.3, -0.2, -distance, 1) == pytest.approx(expected, rel=3e-6, abs=slack)
-    np.testing.assert_array_equal(made[[0, 1, 3]], projection[[0, 1, 3]].astype(np.float32))
+    np.testing.assert_array_equal(made[[0, 1, 3]], matrix[[0, 1, 3]].astype(np.float32))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rendergraph.api.viewing import unit
 from rendergraph.document import Source, from_plain
 from rendergraph.keys import Form
+from rendergraph.projection import unit
 from rendergraph.scene.geometry import face_normals
 from rendergraph.scene.model import Mesh
 from rendergraph.scene.shapes import SHAPES, build, mesh

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rendergraph.api.viewing import look_at
+from rendergraph.projection import look_at
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
 from rendergraph.viewer import camera as moving

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from rendergraph.nodes.shadows._light_views import light_views
 
 import rendergraph as rg
-from rendergraph.api import viewing
+from rendergraph.api import projection
 from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.frame_scene import FrameScene
 
@@ -56,7 +56,7 @@ def test_a_frustum_has_twelve_edges(session: rg.Session) -> None:
     found, scene = drawn(session, "shadow_study", {"shadow_map": "sun.shadow_map"}, icons=False)
     camera = view_matrices(next(iter(scene.cameras.values())), SIZE)
     (view,) = light_views(scene.lights[0], FrameScene(scene), camera, 64)
-    corners = viewing.frustum_corners(view)
+    corners = projection.frustum_corners(view)
     edges = [(a, b) for a in range(8) for b in range(a) if (a ^ b).bit_count() == 1]
     far = distances(scene, corners[edges])
     assert found.sum() > 60

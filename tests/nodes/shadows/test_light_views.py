@@ -13,8 +13,8 @@ from rendergraph.nodes.shadows import _light_views as views
 from rendergraph.nodes.shadows.shadow_map import ShadowMapNode
 
 from rendergraph.api import SceneError
-from rendergraph.api.viewing import box_corners, look_at, visible_part
-from rendergraph.scene.cameras import projection
+from rendergraph.api.projection import box_corners, look_at, visible_part
+from rendergraph.scene.cameras import projection_matrix
 from rendergraph.scene.frame_scene import FrameScene
 from rendergraph.scene.model import Camera, Light, Mesh, Object, Scene
 from rendergraph.steps import ViewMatrices
@@ -25,7 +25,7 @@ def camera(
 ) -> ViewMatrices:
     made = Camera("c", look_at(eye, target), type=kind, near=0.1, far=far, height=3.0)
     return ViewMatrices(
-        np.asarray(np.linalg.inv(made.transform), np.float64), projection(made, 1.5), (300, 200), 0.1, far
+        np.asarray(np.linalg.inv(made.transform), np.float64), projection_matrix(made, 1.5), (300, 200), 0.1, far
     )
 
 

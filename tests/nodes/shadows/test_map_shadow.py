@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 TWO_SPANS = '''
 from dataclasses import replace
 import numpy as np
-from rendergraph.api import Frame, Node, Output, ShadowMap, Steps, Views, viewing
+from rendergraph.api import Frame, Node, Output, ShadowMap, Steps, Views, projection
 
 
 class TwoSpans(Node):
@@ -34,7 +34,7 @@ class TwoSpans(Node):
             steps.fullscreen("even.frag", out=self.shadow_map.layer(layer), value=1.0 - layer)
 
     def update(self, frame: Frame) -> None:
-        above = viewing.orthographic_view(viewing.view_along((0, -1, 0)), (-50, -50, -50), (50, 50, 50), 16)
+        above = projection.orthographic_view(projection.view_along((0, -1, 0)), (-50, -50, -50), (50, 50, 50), 16)
         spans = ((0.0, SPLIT + 1.5), (SPLIT, np.inf))
         frame.set_views(self.views, [replace(above, light=0, span=span) for span in spans])
 '''

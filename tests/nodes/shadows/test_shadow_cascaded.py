@@ -15,7 +15,7 @@ from rendergraph.nodes.shadows._cascades import overlapping_spans, split_distanc
 from rendergraph.nodes.shadows.shadow_cascaded import ShadowCascaded
 
 import rendergraph as rg
-from rendergraph.api import ViewMatrices, viewing
+from rendergraph.api import ViewMatrices, projection
 from rendergraph.scene.frame_scene import FrameScene
 from rendergraph.scene.model import Scene
 
@@ -95,8 +95,8 @@ class Seen:
 
 
 def camera(eye: Any, target: Any, far: float = 300.0) -> ViewMatrices:
-    view = viewing.inverse_rigid(viewing.look_at(eye, target))
-    return ViewMatrices(view, viewing.perspective(0.8, 1.6, 0.1, far), (320, 200), 0.1, far)
+    view = projection.inverse_rigid(projection.look_at(eye, target))
+    return ViewMatrices(view, projection.perspective(0.8, 1.6, 0.1, far), (320, 200), 0.1, far)
 
 
 FIELD = Field()
@@ -128,9 +128,9 @@ def test_every_point_that_is_seen_is_in_its_part(count: int, far: float, eye: An
     points = points[np.all(np.abs(clip(seen, points)) <= 1, axis=1)]
     assert len(points) > 200
     distance = -(points @ seen.view[2, :3] + seen.view[2, 3])
-    casts = points @ viewing.view_along(SUN)[:2, :3].T  # in the light's plane, within what casts
-    posts = np.concatenate([viewing.box_corners(Box().box) + one.transform[:3, 3] for one in FIELD.objects])
-    across = posts @ viewing.view_along(SUN)[:2, :3].T
+    casts = points @ projection.view_along(SUN)[:2, :3].T  # in the light's plane, within what casts
+    posts = np.concatenate([projection.box_corners(Box().box) + one.transform[:3, 3] for one in FIELD.objects])
+    across = posts @ projection.view_along(SUN)[:2, :3].T
     within = np.all((casts >= across.min(axis=0)) & (casts <= across.max(axis=0)), axis=1)
     assert views[0].span[0] == 0
     assert views[-1].span[1] == math.inf

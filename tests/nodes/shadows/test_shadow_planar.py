@@ -12,7 +12,7 @@ import pytest
 from rendergraph.nodes.shadows.shadow_planar import projection_on
 
 import rendergraph as rg
-from rendergraph.api import viewing
+from rendergraph.api import projection
 from rendergraph.errors import InputError
 
 Floats = npt.NDArray[np.float64]
@@ -63,12 +63,12 @@ def test_points_fall_on_the_plane_along_the_light() -> None:
 
 def rays(depth: Floats, light: Any, spheres: list[tuple[Floats, float]]) -> tuple[Any, Floats, Floats]:
     """Whether spheres leave the light free at each seen position, by how much they miss or hit, and the positions."""
-    view = viewing.inverse_rigid(viewing.look_at((0.5, 4, 5.5), (0, 0.5, 0)))
-    projection = viewing.perspective(np.radians(45), SIZE[0] / SIZE[1], 0.1, 50)
-    projection[2] = (projection[3] - projection[2]) / 2
+    view = projection.inverse_rigid(projection.look_at((0.5, 4, 5.5), (0, 0.5, 0)))
+    matrix = projection.perspective(np.radians(45), SIZE[0] / SIZE[1], 0.1, 50)
+    matrix[2] = (matrix[3] - matrix[2]) / 2
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
     clip = np.stack([(x + 0.5) / SIZE[0] * 2 - 1, 1 - (y + 0.5) / SIZE[1] * 2, depth, np.ones_like(depth)], -1)
-    world = clip @ np.linalg.inv(projection @ view).T
+    world = clip @ np.linalg.inv(matrix @ view).T
     world = world[..., :3] / world[..., 3:]
     free = np.ones(depth.shape, bool)
     margin = np.full(depth.shape, np.inf)

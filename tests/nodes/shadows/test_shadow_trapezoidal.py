@@ -13,7 +13,7 @@ import pytest
 from rendergraph.nodes.shadows._trapezoid import apex_distance, trapezoid_around, trapezoid_to_square, warped
 
 import rendergraph as rg
-from rendergraph.api import ViewMatrices, viewing
+from rendergraph.api import ViewMatrices, projection
 
 Floats = npt.NDArray[np.float64]
 BOX = np.array([[-40.0, 0, -120], [40, 4, 20]])
@@ -46,18 +46,18 @@ def test_four_fifths_go_to_what_is_in_focus() -> None:
 
 
 def camera(eye: Any, target: Any) -> ViewMatrices:
-    view = viewing.inverse_rigid(viewing.look_at(eye, target))
-    return ViewMatrices(view, viewing.perspective(0.8, 1.6, 0.1, 300), (320, 200), 0.1, 300.0)
+    view = projection.inverse_rigid(projection.look_at(eye, target))
+    return ViewMatrices(view, projection.perspective(0.8, 1.6, 0.1, 300), (320, 200), 0.1, 300.0)
 
 
 def uniform(seen: ViewMatrices) -> tuple[ViewMatrices, Floats]:
     """A parallel view around what a camera sees of the box."""
-    rotation = viewing.view_along(SUN)
-    points = viewing.visible_part(seen, BOX)
+    rotation = projection.view_along(SUN)
+    points = projection.visible_part(seen, BOX)
     across = points @ rotation[:3, :3].T
-    along = viewing.box_corners(BOX) @ rotation[2, :3]
+    along = projection.box_corners(BOX) @ rotation[2, :3]
     low, high = np.append(across.min(0)[:2], along.min()), np.append(across.max(0)[:2], along.max())
-    return viewing.orthographic_view(rotation, low, high, 1024, 8), points
+    return projection.orthographic_view(rotation, low, high, 1024, 8), points
 
 
 def clip(view: ViewMatrices, points: Floats) -> Floats:

@@ -16,7 +16,7 @@ from rendergraph.nodes.shadows._silhouettes import silhouette
 from rendergraph.nodes.shadows._volumes import bounding_spheres, touches_near_pyramid
 
 import rendergraph as rg
-from rendergraph.api import viewing
+from rendergraph.api import projection
 from rendergraph.errors import InputError
 from rendergraph.scene import shapes
 from rendergraph.scene.cameras import view_matrices
@@ -185,7 +185,7 @@ def test_rectangles_of_lights_save_most_fragments_and_change_no_pixel(
         return found.value, image
 
     within, image = counted()
-    monkeypatch.setattr(viewing, "sphere_bounds", lambda *_: (None, None))
+    monkeypatch.setattr(projection, "sphere_bounds", lambda *_: (None, None))
     everywhere, same = counted()
     assert np.array_equal(image, same)
     assert within < 0.6 * everywhere
@@ -296,7 +296,7 @@ def test_balls_that_reach_the_near_pyramid_are_found() -> None:
     """Against points drawn at random in the pyramid: one in the ball proves that it is touched."""
     random = np.random.default_rng(5)
     camera = view_matrices(_camera([0.3, 1, 4], [0, 0.5, 0]), (160, 90))
-    corners = viewing.frustum_corners(camera)[:4]
+    corners = projection.frustum_corners(camera)[:4]
     for light in (np.array([1.0, 3, 2, 1]), np.array([-2.0, 0.5, 9, 1]), np.array([0.2, 0.9, -0.3, 0])):
         weights = random.dirichlet(np.ones(4), 20000)
         along = random.random((20000, 1))
@@ -313,7 +313,7 @@ def test_balls_that_reach_the_near_pyramid_are_found() -> None:
 
 
 def _camera(eye: list[float], target: list[float]) -> Any:
-    return Camera("c", viewing.look_at(eye, target), "perspective", fov_y=0.8, near=0.5, far=40.0)
+    return Camera("c", projection.look_at(eye, target), "perspective", fov_y=0.8, near=0.5, far=40.0)
 
 
 def test_balls_around_objects_hold_their_vertices(tmp_path: Path) -> None:
