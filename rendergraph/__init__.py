@@ -8,8 +8,9 @@ frame["image"]
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rendergraph.lazy import lazy_exports
 from rendergraph.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -24,26 +25,11 @@ if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.
 
 __all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load", "sweep", "view"]
 
+_ELSEWHERE = {"RendergraphError": "errors", "sweep": "compare", "view": "viewer"}
+
 
 def __dir__() -> list[str]:
     return [*__all__, "__version__"]  # what `rg.<TAB>` offers
 
 
-def __getattr__(name: str) -> Any:
-    if name == "RendergraphError":
-        from rendergraph.errors import RendergraphError  # `rendergraph --help` needs none of it
-
-        return RendergraphError
-    if name == "sweep":
-        from rendergraph.compare import sweep  # nor of this
-
-        return sweep
-    if name == "view":
-        from rendergraph.viewer import view  # pages are another matter
-
-        return view
-    if name in __all__:
-        import rendergraph.session  # nor of this
-
-        return getattr(rendergraph.session, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = lazy_exports(__name__, dict.fromkeys(__all__, "session") | _ELSEWHERE)

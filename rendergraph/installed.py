@@ -17,6 +17,8 @@ from typing import Any
 
 from msgspec import Struct
 
+from rendergraph.errors import Problem, UsageError
+
 _ENDINGS = (".dist-info", ".egg-info")
 
 
@@ -108,6 +110,25 @@ def entry_points(*groups: str) -> Iterator[EntryPoint]:
             elif group in groups and "=" in line and line[0] not in "#;":
                 name, _, value = line.partition("=")
                 yield EntryPoint(group, name.strip(), value.strip(), package)
+
+
+def require(feature: str, extra: str, *modules: str) -> None:
+    """Check that the packages of an extra are installed.
+
+    Args:
+        feature: what needs them, for the message.
+        extra: as in `pip install 'rendergraph[extra]'`.
+        modules: the modules that they provide.
+
+    Raises:
+        UsageError: one is missing.
+    """
+    from importlib.util import find_spec  # where an extra is used alone
+
+    missing = [name.replace("_", "-") for name in modules if find_spec(name) is None]
+    if missing:
+        text = f"{feature} needs {', '.join(missing)}; pip install 'rendergraph[{extra}]'"
+        raise UsageError(Problem("RG500", text))
 
 
 def _parts(folder: str) -> tuple[str, str]:

@@ -52,7 +52,7 @@ def _entry(file: Path, command: str, pipeline: rg.Pipeline, studio: Studio, *, g
 
 
 def _svg(pipeline: rg.Pipeline) -> str:
-    from rendergraph.views import svg
+    from rendergraph.diagrams import svg
 
     # A blank line would end the block of raw HTML.
     return re.sub(r"\n\s*\n", "\n", svg(pipeline.link().graph).strip())

@@ -188,7 +188,7 @@ def _invoke(words: list[str]) -> int:
         except SystemExit as done:
             return int(done.code or 0)
     try:
-        with group.make_context("rendergraph", words) as context:
+        with group.make_context("rendergraph", words, obj=tuple(words)) as context:
             group.invoke(context)
     except click.exceptions.Exit as done:
         return int(done.exit_code)

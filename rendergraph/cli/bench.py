@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
-from rendergraph.cli.output import emit, emit_json, megabytes, say, table, warn
+from rendergraph.cli.output import emit, emit_json, say, table, warn
 from rendergraph.cli.words import click
+from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:
     from rendergraph.session import Frame, Selection
@@ -82,13 +83,14 @@ def _text(report: dict[str, Any]) -> str:
     rows.append(("frame", "", "", "", *_figures(report["frame_ms"])))
     width, height = report["size"]
     device, memory = report["device"], report["memory"]
+    allocated = format_bytes(memory["allocated_bytes"])
     heads = ("pass", "type", "GPU ms", "10–90 %", "CPU ms", "10–90 %")
     return "\n".join(
         [
             f"{report['pipeline']}, {width}×{height}, {report['frames']} frames on {device['renderer']}"
             + (" (software)" if device["software"] else ""),
             table(rows, heads, right=(2, 3, 4, 5)),
-            f"textures: {megabytes(memory['allocated_bytes'])}, {megabytes(memory['no_reuse_bytes'])} without reuse",
+            f"textures: {allocated}, {format_bytes(memory['no_reuse_bytes'])} without reuse",
         ]
     )
 

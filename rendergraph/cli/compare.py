@@ -12,9 +12,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.cli import options
-from rendergraph.cli.output import emit, emit_json, megabytes, on_terminal, say, table, warn
+from rendergraph.cli.output import emit, emit_json, on_terminal, say, table, warn
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
+from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:
     from rendergraph.compare.values import Comparison, Result
@@ -349,7 +350,7 @@ def _costs(result: Result, *, repeated: bool) -> tuple[object, ...]:
     again = (f"{among.min:.2f}–{among.max:.2f}" if among else "",) if repeated else ()
     gpu = f"{times.gpu_ms.median:.2f}" if times.gpu_ms else "–"
     spread = f"{times.gpu_ms.p10:.2f}–{times.gpu_ms.p90:.2f}" if times.gpu_ms else ""
-    size = megabytes(int(str(result.memory["allocated_bytes"])))
+    size = format_bytes(int(str(result.memory["allocated_bytes"])))
     return gpu, spread, *again, f"{times.cpu_ms.median:.2f}", result.pass_count, size
 
 

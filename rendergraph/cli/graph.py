@@ -37,15 +37,15 @@ def command(selection: Selection, format_name: str | None, output: Path | None, 
       rendergraph graph forward --format mermaid
       rendergraph graph forward-prepass -o graph.svg
     """
-    from rendergraph import views
+    from rendergraph import diagrams
 
     sketch = options.sketched(selection)
     if as_json and not output:
         missing = [problem.as_json() for problem in sketch.missing]
-        emit_json(views.graph_json(sketch.graph) | {"missing": missing})
+        emit_json(diagrams.graph_json(sketch.graph) | {"missing": missing})
         options.conclude(sketch)
         return
     chosen = format_name or (_FORMATS.get(output.suffix.lower(), "text") if output else "text")
-    text: str = getattr(views, chosen)(sketch.graph)
+    text: str = getattr(diagrams, chosen)(sketch.graph)
     options.put(text, output, as_json=as_json)
     options.conclude(sketch)

@@ -86,7 +86,7 @@ def settings(text: str) -> tuple[str, ...]:
     Raises:
         ValueError: one of them is none, or a quote is not closed.
     """
-    import shlex  # for what is set in one text alone
+    import shlex
 
     return tuple(_setting(word) for word in shlex.split(text))
 
@@ -333,6 +333,14 @@ def words(selection: Selection) -> list[str]:
     return [*found, *(word for name, most in selection.limits for word in ("--limit", f"{name}={most}"))]
 
 
+def command_line() -> str:
+    """Return the running command line as it was typed, to repeat it, without options that concern this run alone."""
+    import shlex
+
+    typed = click.get_current_context().obj
+    return shlex.join(["rendergraph", *(word for word in typed if word not in ("--json", "-q", "--quiet", "--resume"))])
+
+
 def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
     """Text to stdout; or to a file, whole or not at all, and then the file's path to stdout."""
     if output is None:
@@ -353,11 +361,7 @@ def write(text: str, output: Path) -> None:
         RenderError: writing failed.
     """
     from rendergraph.images import check_target
-    from rendergraph.images.files import failed, staged
+    from rendergraph.images.files import write_file
 
     check_target(output)
-    with staged([output]) as (part,):
-        try:
-            part.write_text(text.rstrip("\n") + "\n", encoding="utf-8", errors="backslashreplace")
-        except OSError as error:
-            raise failed(output, error.strerror or str(error)) from error
+    write_file(output, text.rstrip("\n") + "\n")

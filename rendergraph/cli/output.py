@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from typing import Any, TextIO
 
 from rendergraph.errors import Problem
-from rendergraph.jsonable import jsonable
+from rendergraph.formatting import jsonable
 
 _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
 _CONTROL = "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
@@ -214,11 +214,6 @@ def terminal_width() -> int:
 def amount(count: int, one: str, many: str = "") -> str:
     """`1 run`, `2 runs`."""
     return f"{count} {one if count == 1 else many or one + 's'}"
-
-
-def megabytes(count: float) -> str:
-    """Bytes for a person: `12.4 MiB`."""
-    return f"{count / (1 << 20):.1f} MiB"
 
 
 def _printable(text: str, stream: Any) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli.options import Target
@@ -27,6 +26,7 @@ def draw_in_parts(
     """
     from rendergraph import images
     from rendergraph.farm.frames import Shown, Wanted, chunks, drawn
+    from rendergraph.images.files import write_file
     from rendergraph.images.video import films, is_film
 
     said = expanded.linked.spec.tree.get("warm_up")
@@ -45,7 +45,7 @@ def draw_in_parts(
                     open_films[target.path].add(shown.number, made)
                     continue
                 path = images.numbered(target.path, shown.number)
-                _write(path, made)
+                write_file(path, made)
                 paths.append(str(path))
                 if not quiet:
                     progress.clear()
@@ -64,13 +64,3 @@ def draw_in_parts(
             emit(str(path))
     outputs = [path for number in sorted(written) for path in written[number]]
     return whole.as_json() | {"outputs": [*outputs, *map(str, open_films)]}
-
-
-def _write(path: Path, content: bytes) -> None:
-    from rendergraph.images.files import failed, staged
-
-    with staged([path]) as (part,):
-        try:
-            part.write_bytes(content)
-        except OSError as error:
-            raise failed(path, error.strerror or str(error)) from error

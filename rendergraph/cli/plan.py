@@ -28,13 +28,13 @@ def command(selection: Selection, as_json: bool, no_alias: bool, heap: bool, shu
       rendergraph plan forward
       rendergraph plan forward-prepass --size 1920x1080 --json
     """
-    from rendergraph import views
+    from rendergraph import diagrams
     from rendergraph.session import RenderOptions, stages
 
     linked = stages.link(stages.resolve(selection))
     warn(linked.warnings)
     plan = stages.plan(stages.expand(linked, RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle))).plan
     if as_json:
-        emit_json(views.plan_json(plan))
+        emit_json(diagrams.plan_json(plan))
     else:
-        emit(views.plan_text(plan).rstrip("\n"))
+        emit(diagrams.plan_text(plan).rstrip("\n"))

@@ -271,7 +271,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     from rendergraph import images
     from rendergraph.images.saving import extension
     from rendergraph.images.video import is_film
-    from rendergraph.images.video import need as need_video
+    from rendergraph.installed import require
 
     linked, numbers = expanded.linked, expanded.options.frames
     for name, port in expanded.wanted.items():
@@ -284,7 +284,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     seen: set[str] = set()
     for target in targets:
         if is_film(target.path):
-            need_video()
+            require("an .mp4", "video", "imageio_ffmpeg")
         else:
             extension(target.path)
         place = os.path.realpath(target.path)

@@ -69,9 +69,10 @@ def command(
       rendergraph view forward --scene helmet.glb --port 8080 --no-open
       rendergraph view forward --size 320x180 --export page.html
     """
-    from rendergraph.viewer.extra import need
+    from rendergraph.installed import require
+    from rendergraph.viewer import EXTRA
 
-    need()
+    require(*EXTRA)
     from rendergraph.viewer.child import Child
     from rendergraph.viewer.desk import Desk
     from rendergraph.viewer.serve import LOOPBACK, serving

@@ -5,7 +5,9 @@ from rendergraph.compare import compare, sweep
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rendergraph.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rendergraph.compare.axes import Axis, Space
@@ -30,8 +32,10 @@ __all__ = [
     "sweep",
 ]
 
-_WHERE = {
+_MODULES = {
     "Axis": "axes",
+    "Comparison": "values",
+    "Result": "values",
     "Space": "axes",
     "compare": "pictures",
     "compare_pictures": "files",
@@ -47,10 +51,4 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def __getattr__(name: str) -> Any:
-    # Looked up on first use: reading an axis off the command line needs neither GL nor NumPy.
-    if name in __all__:
-        import importlib  # see above
-
-        return getattr(importlib.import_module(f"rendergraph.compare.{_WHERE.get(name, 'values')}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = lazy_exports(__name__, _MODULES)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,8 +18,9 @@ from rendergraph.compare.goals import OBJECTIVES, Search, front_of, values_of
 from rendergraph.compare.prepare import check_sweep
 from rendergraph.compare.product import Sweep, sweep
 from rendergraph.compare.values import Result
-from rendergraph.errors import InputError, Problem, UsageError, suggestion
+from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.farm.executors import ExecutorChoice, make_executor
+from rendergraph.installed import require
 from rendergraph.session.progress import Progress, shown
 from rendergraph.session.wanted import figures
 
@@ -100,7 +100,7 @@ def search(
         UsageError: Optuna is not installed.
         RenderError, DeviceError: as from `sweep`.
     """
-    need()
+    require("--minimise", "search", "optuna")
     space = Space.of(axes)
     check_search(base, space, reference, minimise, options.get("metric"))
     knobs = {knob.name: knob for knob in map(_Knob, space.groups)}
@@ -170,16 +170,6 @@ def _ask(
         again += 1
         _tell(study, trial, values_of(known.get(_key(run)), minimise))
     return list(found.values())
-
-
-def need() -> None:
-    """Make sure that the optimiser is installed.
-
-    Raises:
-        UsageError: it is not; how to get it.
-    """
-    if find_spec("optuna") is None:
-        raise UsageError(Problem("RG500", "--minimise needs optuna; pip install 'rendergraph[search]'"))
 
 
 def check_search(

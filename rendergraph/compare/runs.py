@@ -18,7 +18,7 @@ from rendergraph.compare.sources import sources_digest
 from rendergraph.compare.timing import NO_TIMES, Times
 from rendergraph.compare.values import Pixels, Result
 from rendergraph.errors import Place, Problem, RenderError
-from rendergraph.jsonable import jsonable
+from rendergraph.formatting import jsonable
 from rendergraph.metrics import Encoding, Metrics
 from rendergraph.session.made import at_time, described
 from rendergraph.version import __version__
@@ -134,18 +134,14 @@ def keep(
     Raises:
         RenderError: the disk does not take it.
     """
-    from rendergraph.images.files import failed, staged  # a sweep is checked without OpenImageIO
+    from rendergraph.images.files import write_file  # a sweep is checked without OpenImageIO
 
     try:
         run.folder.mkdir(exist_ok=True)
     except OSError as error:
         text = f"the folder cannot be made: {error.strerror}"
         raise RenderError(Problem("RG507", text, Place(str(run.folder)))) from error
-    with staged([run.picture]) as (part,):
-        try:
-            part.write_bytes(picture)
-        except OSError as error:
-            raise failed(run.picture, error.strerror or str(error)) from error
+    write_file(run.picture, picture)
     record = {
         "key": run.key,
         **jsonable(result.as_json()),
@@ -223,15 +219,12 @@ def give_up(run: Run, problems: Sequence[Problem], ledger: Ledger, lines: Mappin
 
 
 def _describe(run: Run, record: Mapping[str, Any]) -> None:
-    from rendergraph.images.files import staged  # a sweep is checked without OpenImageIO
+    from rendergraph.images.files import write_file  # a sweep is checked without OpenImageIO
 
     resolved = run.planned.linked.spec.to_yaml(origins=False)
     document = {**record, "resolved": resolved, "metrics": metrics.description()}
     document[CHECKSUM] = checksum(document)
-    with staged([run.folder / RUN]) as (part,):
-        part.write_text(
-            json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8", errors="backslashreplace"
-        )
+    write_file(run.folder / RUN, json.dumps(document, indent=2, ensure_ascii=False) + "\n")
 
 
 def found_again(run: Run, lines: Mapping[str, dict[str, Any]], *, pictures: bool = True) -> dict[str, Any] | None:

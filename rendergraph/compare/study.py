@@ -103,12 +103,9 @@ def check_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> None:
 
 def begin(out: Path, study: Mapping[str, Any]) -> None:
     """Write down what is studied in a folder; to be called before the first picture goes there."""
-    from rendergraph.images.files import staged  # a sweep is checked without OpenImageIO
+    from rendergraph.images.files import write_file  # a sweep is checked without OpenImageIO
 
-    with staged([out / STUDY]) as (part,):
-        part.write_text(
-            json.dumps(study, indent=2, ensure_ascii=False) + "\n", encoding="utf-8", errors="backslashreplace"
-        )
+    write_file(out / STUDY, json.dumps(study, indent=2, ensure_ascii=False) + "\n")
 
 
 def kept_runs(out: Path) -> int:

@@ -8,10 +8,10 @@ from dataclasses import asdict, replace
 from html import escape
 from typing import Any, Literal
 
+from rendergraph.diagrams import Card, Link, Mark, Sheet, draw, sheet
 from rendergraph.diff.structure import GraphDiff, PlanFigures, value_text
+from rendergraph.formatting import format_bytes
 from rendergraph.link import Graph
-from rendergraph.schedule.reasons import mebibytes
-from rendergraph.views import Card, Link, Mark, Sheet, draw, sheet
 
 # Each at least 3:1 against white and against near-black; the signs carry it for those who cannot tell them apart.
 ADDED, REMOVED, CHANGED, RENAMED = "#2c9163", "#d0453e", "#b7791f", "#3b7dd8"
@@ -82,7 +82,7 @@ def _count(change: int) -> str:
 def _bytes_row(name: str, was: int, now: int) -> tuple[str, str, str, str]:
     change = now - was
     sign = "+" if change > 0 else "−"
-    return name, mebibytes(was), mebibytes(now), f"{sign}{mebibytes(abs(change))}" if change else "="
+    return name, format_bytes(was), format_bytes(now), f"{sign}{format_bytes(abs(change))}" if change else "="
 
 
 def diff_json(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | None = None) -> dict[str, Any]:

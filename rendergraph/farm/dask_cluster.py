@@ -9,7 +9,6 @@ import queue
 import time
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeAlias
 from uuid import uuid4
@@ -28,7 +27,7 @@ from rendergraph.farm.tasks import (
     TaskRetried,
     is_retryable,
 )
-from rendergraph.installed import version
+from rendergraph.installed import require, version
 
 Client: TypeAlias = Any  # an extra, of which most is not typed
 Cluster: TypeAlias = Any
@@ -44,23 +43,13 @@ _GOING = (OSError, KeyError, ValueError)
 """What Dask's scheduler raises where a worker goes while it is sent something; it has no word for it."""
 
 
-def need() -> None:
-    """Make sure that Dask is installed.
-
-    Raises:
-        UsageError: it is not; how to get it.
-    """
-    if find_spec("distributed") is None:
-        raise UsageError(Problem("RG500", "a Dask cluster needs distributed; pip install 'rendergraph[farm]'"))
-
-
 def local(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
     """A cluster on this machine, which ends with its work.
 
     Raises:
         UsageError: Dask is not installed.
     """
-    need()
+    require("a Dask cluster", "farm", "distributed")
     distributed: Any = import_module("distributed")
     # Its workers are threads of this process, and each works in a process of its own, by its station: Dask's own way of
     # starting processes would run the caller's script once more.
@@ -77,7 +66,7 @@ def of(where: Any, device: int | None, *, timeout: float) -> Dask:
         UsageError: Dask is not installed, or this is neither.
         RenderError: nobody answers there.
     """
-    need()
+    require("a Dask cluster", "farm", "distributed")
     distributed: Any = import_module("distributed")
     if isinstance(where, distributed.Client):
         return Dask(where, (device,), timeout=timeout)

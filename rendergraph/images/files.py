@@ -32,26 +32,36 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
         One path for each, in the same folder, to be written by the caller.
 
     Raises:
-        RenderError: flushing or renaming failed.
+        RenderError: writing, flushing or renaming failed.
     """
     targets = [Path(os.path.realpath(path)) for path in paths]
     temporary = [target.with_name(f".{target.name[:100]}.{os.urandom(4).hex()}.part") for target in targets]
     try:
         yield temporary
-        try:
-            for part in temporary:
-                flush(part)
-            for part, target in zip(temporary, targets, strict=True):
-                os.replace(part, target)
-            for folder in {target.parent for target in targets}:
-                flush(folder)
-        except OSError as error:
-            shown = dict(zip(map(str, temporary), paths, strict=True)).get(str(error.filename), paths[0])
-            raise failed(shown, error.strerror or str(error)) from error
+        for part in temporary:
+            flush(part)
+        for part, target in zip(temporary, targets, strict=True):
+            os.replace(part, target)
+        for folder in {target.parent for target in targets}:
+            flush(folder)
+    except OSError as error:
+        path = dict(zip(map(str, temporary), paths, strict=True)).get(str(error.filename), paths[0])
+        raise failed(path, error.strerror or str(error)) from error
     finally:
         for part in temporary:
             with contextlib.suppress(OSError):
                 part.unlink()
+
+
+def write_file(path: Path, content: str | bytes) -> None:
+    """Write a file that appears whole or not at all.
+
+    Raises:
+        RenderError: writing failed.
+    """
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    with staged([path]) as (part,):
+        part.write_bytes(data)
 
 
 def is_text(path: str) -> bool:

@@ -6,14 +6,13 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.errors import Place, Problem, RenderError, UsageError
+from rendergraph.errors import Place, Problem, RenderError
 from rendergraph.images.files import flush
 
 ENDING = ".mp4"
@@ -22,16 +21,6 @@ ENDING = ".mp4"
 def is_film(path: Path) -> bool:
     """Whether a file holds many frames."""
     return path.suffix.lower() == ENDING
-
-
-def need() -> None:
-    """Make sure that films can be written.
-
-    Raises:
-        UsageError: imageio-ffmpeg is not installed; how to get it.
-    """
-    if find_spec("imageio_ffmpeg") is None:
-        raise UsageError(Problem("RG500", "an .mp4 needs imageio-ffmpeg; pip install 'rendergraph[video]'"))
 
 
 @contextmanager

@@ -5,17 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from heapq import heappop, heappush
 
+from rendergraph.formatting import format_bytes
 from rendergraph.schedule.dependencies import Versions
 from rendergraph.schedule.model import Model
 from rendergraph.steps import Step
-
-
-def mebibytes(count: int) -> str:
-    """Bytes for people: `8.0 MiB`, `12 KiB`."""
-    for unit, size in (("GiB", 1 << 30), ("MiB", 1 << 20), ("KiB", 1 << 10)):
-        if count >= size:
-            return f"{count / size:.1f} {unit}"
-    return f"{count} B"
 
 
 def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
@@ -58,7 +51,7 @@ def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dic
         if freed:
             largest = max(freed, key=lambda r: model.sizes[r])
             more = f" and {len(freed) - 1} more" if len(freed) > 1 else ""
-            release = f"releases {model.names[largest]}{more} ({mebibytes(sum(model.sizes[r] for r in freed))})"
+            release = f"releases {model.names[largest]}{more} ({format_bytes(sum(model.sizes[r] for r in freed))})"
         if waiting == 1:
             text = "nothing else can run yet" if number + 1 < len(order) else "everything else has run"
         elif chosen:

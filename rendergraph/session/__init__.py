@@ -5,7 +5,9 @@ Everything is looked up on first use: `check` and `plan` work without GL, and `-
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rendergraph.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from rendergraph.session.frame import Frame, OutputInfo
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Frame", "OutputInfo", "Pipeline", "RenderOptions", "Selection", "Session", "load"]
 
-_WHERE = {
+_MODULES = {
     "Frame": "frame",
     "OutputInfo": "frame",
     "Pipeline": "pipeline",
@@ -30,9 +32,4 @@ def __dir__() -> list[str]:
     return __all__
 
 
-def __getattr__(name: str) -> Any:
-    if name in _WHERE:
-        import importlib
-
-        return getattr(importlib.import_module(f"rendergraph.session.{_WHERE[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = lazy_exports(__name__, _MODULES)

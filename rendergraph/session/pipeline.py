@@ -218,6 +218,6 @@ class Pipeline:
         return drawn()
 
     def _repr_html_(self) -> str:
-        from rendergraph.views import svg
+        from rendergraph.diagrams import svg
 
         return svg(self.link().graph)

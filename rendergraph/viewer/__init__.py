@@ -9,6 +9,6 @@ one when the last is answered, so the newest state wins and nothing queues up.
 
 from __future__ import annotations
 
-from rendergraph.viewer.notebook import Viewer, view
+from rendergraph.viewer.notebook import EXTRA, Viewer, view
 
-__all__ = ["Viewer", "view"]
+__all__ = ["EXTRA", "Viewer", "view"]

@@ -6,11 +6,11 @@ from collections.abc import Sequence, Set
 from typing import Any
 
 from rendergraph.declare import Input, Parameter
+from rendergraph.diagrams import graph_json, plan_json
 from rendergraph.errors import InputError
 from rendergraph.link import Graph, GraphNode
 from rendergraph.scene.animate import moves
 from rendergraph.session.values import Linked, Planned
-from rendergraph.views import graph_json, plan_json
 
 
 def described(planned: Planned) -> dict[str, Any]:

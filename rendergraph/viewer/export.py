@@ -10,7 +10,7 @@ from html import escape
 from typing import Any
 
 from rendergraph.errors import InputError, Problem
-from rendergraph.jsonable import jsonable
+from rendergraph.formatting import jsonable
 from rendergraph.session.gpu import Gpu
 from rendergraph.viewer.desk import Desk
 from rendergraph.viewer.painter import Painter

@@ -6,10 +6,13 @@ from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
+from rendergraph.installed import require
 from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.viewer.child import Child
 from rendergraph.viewer.desk import Desk
-from rendergraph.viewer.extra import need
+
+EXTRA = ("the viewer", "view", "starlette", "uvicorn", "websockets")
+"""Arguments of `require`."""
 
 
 class Viewer:
@@ -67,7 +70,7 @@ def view(
     Raises:
         UsageError: the extra `view` is not installed, or the port is taken.
     """
-    need()
+    require(*EXTRA)
     from rendergraph.viewer.serve import serving  # an extra: whoever only draws has not installed it
 
     found = loaded(pipeline)

@@ -28,7 +28,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rendergraph.errors import Place, Problem, RendergraphError
-from rendergraph.jsonable import jsonable
+from rendergraph.formatting import jsonable
 from rendergraph.resources import folder
 from rendergraph.viewer.child import Child
 from rendergraph.viewer.desk import Desk, as_problems

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -120,9 +121,9 @@ def test_films_need_their_extra_and_odd_wishes_are_told(
     assert "draws here; leave out --executor" in cli("run", "p.yaml", "--watch", "--executor", "dask").err
     assert "drawn by one process" in cli("run", "p.yaml", "--tap-all", "in", "--executor", "processes:2").err
     assert "RG500" in cli("run", "p.yaml", "--executor", "threads").err
-    monkeypatch.setattr("rendergraph.images.video.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     told = cli("run", "p.yaml", "-o", "radiance=a.mp4")
     assert (told.code, "pip install 'rendergraph[video]'" in told.err) == (2, True)
-    monkeypatch.setattr("rendergraph.farm.dask_cluster.find_spec", lambda name: None)
     told = cli("run", "p.yaml", "-o", "a.exr", "--executor", "dask")
     assert (told.code, "pip install 'rendergraph[farm]'" in told.err) == (2, True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +168,7 @@ def test_a_search_wants_a_reference(base: rg.Pipeline) -> None:
 def test_without_the_extra_it_says_what_to_install(
     base: rg.Pipeline, least: rg.Pipeline, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(optimise, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(UsageError, match=r"RG500 --minimise needs optuna; pip install 'rendergraph\[search\]'"):
         search(base, AXES, tmp_path / "out", least, minimise=["flip"])
     assert not (tmp_path / "out").exists()

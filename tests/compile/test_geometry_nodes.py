@@ -234,7 +234,7 @@ def record(self, steps):
 
 
 def test_a_plan_tells_what_is_continued_from_what_is_read_and_says_what_a_copy_is_for(author: Any) -> None:
-    from rendergraph.views.plan import plan_text
+    from rendergraph.diagrams.plan import plan_text
 
     author.node('color = Output(Radiance, clear=0, doc="White.")')
     author.node(GLOW, "glow")

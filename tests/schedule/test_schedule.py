@@ -52,13 +52,13 @@ def expansion(*steps: Step, image: str | None = None, sizes: dict[str, int] | No
     ids = {id: None for one in steps for id in touched_ids(one)}
     shown = image or steps[-1].writes[-1].resource
     resources = {
-        id: Resource(id, mebibytes((sizes or {}).get(id, 1)), roles.get(id.replace(".", "_"), "transient"))  # type: ignore[arg-type]
+        id: Resource(id, format_bytes((sizes or {}).get(id, 1)), roles.get(id.replace(".", "_"), "transient"))  # type: ignore[arg-type]
         for id in ids
     }
     return Expansion(steps, resources, {"image": shown})
 
 
-def mebibytes(count: int) -> TextureDesc:
+def format_bytes(count: int) -> TextureDesc:
     return TextureDesc("texture2d", "rgba8", 512, 512 * count)
 
 
@@ -348,7 +348,7 @@ WRONG = {
         step("glow", (), ("light.radiance:2", "glow.mask")),
         step("compose", ("light.radiance", "glow.mask"), ("compose.color",)),
     ),
-    "RG604": Expansion((), {"show.color": Resource("show.color", mebibytes(1))}, {"image": "show.color"}),
+    "RG604": Expansion((), {"show.color": Resource("show.color", format_bytes(1))}, {"image": "show.color"}),
     "RG605": expansion(
         step("light", (), ("light.radiance",)),
         step("sky", (), ("light.radiance:2",)),

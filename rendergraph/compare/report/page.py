@@ -23,11 +23,11 @@ from rendergraph.compare.report.pictures import first, sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.timing import Times
 from rendergraph.compare.values import Comparison, Result, machine
+from rendergraph.diagrams import lifetimes_svg
 from rendergraph.diff import diff, diff_svg, diff_text
+from rendergraph.formatting import format_bytes
 from rendergraph.metrics import description
 from rendergraph.resources import folder
-from rendergraph.schedule.reasons import mebibytes
-from rendergraph.views import lifetimes_svg
 
 MOST_COLUMNS = 8
 """Variants whose passes stand side by side; more are not read, and the quickest good ones stand for them."""
@@ -214,7 +214,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
             cells += [_repeats(times)] if again else []
             cells += [milliseconds(times.cpu_ms)]
             cells += [milliseconds(times.frame_ms)] if whole else []
-            cells += [_cell(str(result.pass_count)), _cell(mebibytes(int(str(result.memory["allocated_bytes"]))))]
+            cells += [_cell(str(result.pass_count)), _cell(format_bytes(int(str(result.memory["allocated_bytes"]))))]
         rows.append(f'<tr class="{" ".join(kinds)}">{"".join(cells)}<td>{last}</td></tr>')
     reference = comparison.reference
     of = {"display": "display-referred ", "linear": "scene-linear "}.get(reference.encoding, "")
@@ -316,7 +316,7 @@ def _memory(results: Sequence[Result]) -> str:
     for result in results:
         if result.plan is None:
             continue
-        allocated = mebibytes(int(str(result.memory["allocated_bytes"])))
+        allocated = format_bytes(int(str(result.memory["allocated_bytes"])))
         svg = drawing(lifetimes_svg(result.plan), f"Lifetimes of the textures of {result.name}")
         parts.append(_folded(f"{result.name}, {allocated}", svg))
     return "\n".join(parts)

@@ -6,7 +6,7 @@ from bisect import bisect_right, insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rendergraph.views.cards import Link
+from rendergraph.diagrams.cards import Link
 
 SWEEPS = 8
 GAP = 26.0  # between boxes of a layer

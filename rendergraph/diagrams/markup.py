@@ -5,8 +5,8 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
+from rendergraph.diagrams.cards import Card, cards, info_of, link_counts, links
 from rendergraph.link import Graph
-from rendergraph.views.cards import Card, cards, info_of, link_counts, links
 
 
 def text(graph: Graph) -> str:

@@ -12,12 +12,12 @@ import pytest
 from rendergraph.allocate import ResourcePlan, allocate
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Function, InOut, Input, LightFacts, Node, Output, TextureInfo, param
+from rendergraph.diagrams import dot, graph_json, lifetimes_svg, mermaid, plan_json, plan_text, svg, text
 from rendergraph.expand import Expansion
 from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.schedule import schedule
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import Depth, DisplayColor, Radiance, ShadowLookup, ShadowMap, TextureDesc
-from rendergraph.views import dot, graph_json, lifetimes_svg, mermaid, plan_json, plan_text, svg, text
 
 
 class Sun(Node):

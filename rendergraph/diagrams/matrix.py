@@ -5,10 +5,10 @@ from __future__ import annotations
 from html import escape
 
 from rendergraph.allocate import ResourcePlan
+from rendergraph.diagrams.plan import desc_text, live_bytes, rows_by_memory, use_of
+from rendergraph.formatting import format_bytes
 from rendergraph.schedule import step_names
-from rendergraph.schedule.reasons import mebibytes
 from rendergraph.textures import TextureDesc
-from rendergraph.views.plan import desc_text, live_bytes, rows_by_memory, use_of
 
 CELL, ROW, CHARACTER, MARGIN = 22.0, 20.0, 6.65, 20.0
 GROUP_GAP = 6.0
@@ -39,13 +39,13 @@ def lifetimes_svg(plan: ResourcePlan) -> str:
     label = CHARACTER * max((len(id) for id in ids), default=8) + 10
     left = MARGIN + max(label, CHARACTER * len("live bytes") + 10)
     right = left + CELL * len(steps)
-    facts = {id: f"{_home(plan, id)} · {desc_text(plan.resources[id])} · {mebibytes(plan.bytes(id))}" for id in ids}
+    facts = {id: f"{_home(plan, id)} · {desc_text(plan.resources[id])} · {format_bytes(plan.bytes(id))}" for id in ids}
     top = MARGIN + 26 + CHARACTER * max((len(name) for name in names.values()), default=0) * 0.94 + 8
     memory = plan.memory
-    proof = "" if memory.proven else f" (bound {mebibytes(memory.lower_bound_bytes)})"
+    proof = "" if memory.proven else f" (bound {format_bytes(memory.lower_bound_bytes)})"
     caption = (
-        f"allocated {mebibytes(memory.allocated_bytes)} of {mebibytes(memory.no_reuse_bytes)} without reuse · "
-        f"least peak {mebibytes(memory.least_peak_bytes)}{proof} · shared by {memory.tier}"
+        f"allocated {format_bytes(memory.allocated_bytes)} of {format_bytes(memory.no_reuse_bytes)} without reuse · "
+        f"least peak {format_bytes(memory.least_peak_bytes)}{proof} · shared by {memory.tier}"
     )
     parts = [f'<text class="ink" x="{MARGIN}" y="{MARGIN + 8}" font-weight="600">{escape(caption)}</text>']
     for number, step in enumerate(steps):
@@ -124,14 +124,14 @@ def _chart(parts: list[str], plan: ResourcePlan, left: float, right: float, y: f
         kind = "peak" if count == max(live) else "bar"
         parts.append(
             f'<rect class="{kind}" x="{left + CELL * position + 2:.1f}" y="{base - height:.1f}" width="{CELL - 4:.1f}" '
-            f'height="{height:.1f}"><title>{mebibytes(count)}</title></rect>'
+            f'height="{height:.1f}"><title>{format_bytes(count)}</title></rect>'
         )
     bound = base - BARS * plan.memory.lower_bound_bytes / most
     parts.append(f'<text class="fact" x="{left - 8:.1f}" y="{base:.1f}" text-anchor="end">live bytes</text>')
     parts.append(f'<path class="bound" d="M{left:.1f} {bound:.1f}H{right:.1f}"/>')
     parts.append(
         f'<text class="fact" x="{right + 10:.1f}" y="{bound + 4:.1f}">lower bound '
-        f"{mebibytes(plan.memory.lower_bound_bytes)}</text>"
+        f"{format_bytes(plan.memory.lower_bound_bytes)}</text>"
     )
     return base
 

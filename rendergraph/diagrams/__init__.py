@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from rendergraph.views.cards import Card, Link
-from rendergraph.views.markup import dot, graph_json, mermaid, text
-from rendergraph.views.matrix import lifetimes_svg
-from rendergraph.views.picture import Mark, Sheet, draw, sheet, svg
-from rendergraph.views.plan import plan_json, plan_text
+from rendergraph.diagrams.cards import Card, Link
+from rendergraph.diagrams.markup import dot, graph_json, mermaid, text
+from rendergraph.diagrams.matrix import lifetimes_svg
+from rendergraph.diagrams.picture import Mark, Sheet, draw, sheet, svg
+from rendergraph.diagrams.plan import plan_json, plan_text
 
 __all__ = [
     "Card",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from rendergraph.jsonable import jsonable
+from rendergraph.formatting import jsonable
 
 
 def test_what_json_has_not_is_null_at_any_depth() -> None:

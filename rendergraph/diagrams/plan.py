@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from rendergraph.allocate import ResourcePlan
+from rendergraph.diagrams.cards import describe
+from rendergraph.formatting import format_bytes
 from rendergraph.schedule import step_names
-from rendergraph.schedule.reasons import mebibytes
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
-from rendergraph.views.cards import describe
 
 # A matrix wider than this is no longer read; lifetimes are then given as numbers.
 MOST_COLUMNS = 160
@@ -141,7 +141,7 @@ def _order_text(plan: ResourcePlan) -> str:
                 names[step.key],
                 _ids(reads),
                 _ids(writes),
-                mebibytes(live[position]),
+                format_bytes(live[position]),
                 plan.schedule.reasons.get(step.key, ""),
             )
         )
@@ -173,7 +173,7 @@ def _lifetimes_text(plan: ResourcePlan) -> str:
             span = "".join(cells)
         else:
             span = f"{life.first + 1}–{life.last + 1}"
-        rows.append((f"  {id}", span, _home(plan, id), mebibytes(plan.bytes(id)), desc_text(plan.resources[id])))
+        rows.append((f"  {id}", span, _home(plan, id), format_bytes(plan.bytes(id)), desc_text(plan.resources[id])))
     legend = "W writes, R reads, B both, P reads last frame's, ─ kept" if wide else "first and last step"
     return f"lifetimes ({legend})\n" + _table(rows, right=(3,))
 
@@ -193,18 +193,18 @@ def _sharing_text(plan: ResourcePlan) -> str:
 def _memory_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:
     memory = plan.memory
     gap = memory.least_peak_bytes - memory.lower_bound_bytes
-    proof = "no order needs less" if memory.proven else f"the least found is {mebibytes(gap)} above it"
+    proof = "no order needs less" if memory.proven else f"the least found is {format_bytes(gap)} above it"
     rows: list[tuple[str, ...]] = [
-        ("  no reuse", mebibytes(memory.no_reuse_bytes), "every resource its own"),
-        ("  allocated", mebibytes(memory.allocated_bytes), f"shared by {memory.tier}"),
-        ("  lower bound", mebibytes(memory.lower_bound_bytes), f"of the peak of live bytes: {proof}"),
+        ("  no reuse", format_bytes(memory.no_reuse_bytes), "every resource its own"),
+        ("  allocated", format_bytes(memory.allocated_bytes), f"shared by {memory.tier}"),
+        ("  lower bound", format_bytes(memory.lower_bound_bytes), f"of the peak of live bytes: {proof}"),
     ]
     if memory.peak_node is not None:
         rows.insert(
-            2, ("  peak", mebibytes(plan.schedule.peak_bytes), f"of live bytes in this order, at {memory.peak_node}")
+            2, ("  peak", format_bytes(plan.schedule.peak_bytes), f"of live bytes in this order, at {memory.peak_node}")
         )
     if memory.next_tier is not None and memory.next_tier_bytes is not None:
-        rows.append(("  next tier", mebibytes(memory.next_tier_bytes), f"shared by {memory.next_tier}"))
+        rows.append(("  next tier", format_bytes(memory.next_tier_bytes), f"shared by {memory.next_tier}"))
     return rows
 
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 
+from rendergraph.diagrams.cards import Card, Link, Socket, cards, generations, links
+from rendergraph.diagrams.layout import LANE, Box, layers_of, place, tie
 from rendergraph.link import Endpoint, Graph
-from rendergraph.views.cards import Card, Link, Socket, cards, generations, links
-from rendergraph.views.layout import LANE, Box, layers_of, place, tie
 
 ROW, HEAD, PAD, RADIUS = 20.0, 40.0, 12.0, 4.0
 CHARACTER = 6.65  # width of a character of the 11-pixel monospace, with some air
