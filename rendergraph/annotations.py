@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_a
 import msgspec
 from msgspec import Struct
 
-from rendergraph.errors import Mistake, Misuse, suggestion
+from rendergraph.errors import Misuse, Problem, suggestion
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -216,14 +216,14 @@ def quoted(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") -> Iterator[Mistake]:
+def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") -> Iterator[Problem]:
     """What is wrong with a value, or with each entry of a mapping.
 
     Args:
         what: how messages name it.
         value: any.
         annotation: what it should be.
-        subject: see `Mistake`.
+        subject: see `Problem`.
     """
     if fits(value, annotation):
         return
@@ -232,7 +232,8 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
     if table is not None and isinstance(value, Mapping):
         for key, entry in value.items():
             if not fits(key, table[0]):
-                yield Mistake(subject, f"{what} has the key {key!r}, which is not {words_for(table[0])}")
+                text = f"{what} has the key {key!r}, which is not {words_for(table[0])}"
+                yield Problem("RG490", text, subject=subject)
             yield from mistakes_in(f"{what}[{key!r}]", entry, table[1], subject)
         return
     if get_origin(annotation) is tuple and Ellipsis in get_args(annotation) and isinstance(value, tuple):
@@ -246,16 +247,16 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
     if not hint:
         whole = int in parts and float not in parts and any(isinstance(entry, float) for entry in _entries(value))
         hint = f", not {words_for(annotation)}" + ("; divide with //" if whole else "")
-    yield Mistake(subject, f"{what} is {quoted(value)}{hint}")
+    yield Problem("RG490", f"{what} is {quoted(value)}{hint}", subject=subject)
 
 
-def mistakes_of(thing: DataclassInstance | Struct, who: str, subject: str = "") -> Iterator[Mistake]:
+def mistakes_of(thing: DataclassInstance | Struct, who: str, subject: str = "") -> Iterator[Problem]:
     """What is wrong with the fields of a dataclass or struct.
 
     Args:
         thing: an instance.
         who: how messages name it, if at all.
-        subject: see `Mistake`; the field by default.
+        subject: see `Problem`; the field by default.
     """
     kind: Any = type(thing)
     for name, default, hint, _ in _given(kind):

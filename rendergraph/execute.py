@@ -387,9 +387,9 @@ def _blamed(node: GraphNode, method: str) -> Iterator[None]:
         if is_interruption(error):
             raise
         code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
-        mistake = happened(error, type(node.node), node.type.file)
+        problem = happened(error, type(node.node), node.type.file)
         doing = f"{node_named(node.id, node.type.name)} failed in {method}"
-        raise InputError(mistake.problem(code, doing, node.place)) from error
+        raise InputError(problem.relocate(node.place, code=code, context=doing)) from error
 
 
 def median_times(frames: Sequence[FrameTimes]) -> list[StepTime]:

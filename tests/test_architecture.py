@@ -52,14 +52,19 @@ _SEARCHES = {"match", "search", "fullmatch", "findall", "finditer", "sub"}
 
 
 def _is_message(node: ast.expr) -> bool:
-    """`problem.text`, `mistake.text`, `detail["msg"]`, `str(problem)`: what is said, where the value beside it knows."""
+    """`problem.text`, `problem.message`, `place.file`, `detail["msg"]`, `str(problem)`: text beside a typed value."""
     if isinstance(node, ast.Call):
         named = isinstance(node.func, ast.Name) and node.func.id == "str" and bool(node.args)
-        return named and isinstance(node.args[0], ast.Name) and node.args[0].id in ("problem", "mistake")
+        return named and getattr(node.args[0], "id", "") in ("problem", "mistake", "place", "origin")
     if isinstance(node, ast.Subscript):
         return isinstance(node.slice, ast.Constant) and node.slice.value == "msg"
-    holder = node.value if isinstance(node, ast.Attribute) and node.attr in ("text", "message") else None
-    return isinstance(holder, ast.Name) and holder.id in ("problem", "mistake", "error")
+    return isinstance(node, ast.Attribute) and node.attr in ("text", "message", "file") and _is_problem(node.value)
+
+
+def _is_problem(node: ast.expr) -> bool:
+    """A problem, its place or its origin, by the names they have everywhere."""
+    name = node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+    return name in ("problem", "mistake", "error", "warning", "place", "origin")
 
 
 def messages_read(source: str) -> list[int]:
@@ -83,5 +88,32 @@ def messages_read(source: str) -> list[int]:
 def test_no_code_reads_a_message() -> None:
     """Whoever wants to know what a mistake is about asks its subject, its kind, its place or its code."""
     assert messages_read('if "x" in problem.text: pass\nre.match("a", mistake.text)\nstr(problem).split()') == [1, 2, 3]
+    assert messages_read('error.place.file.startswith("--set ")\nplace.file == "patch"') == [1]
     files = {str(file): messages_read(file.read_text()) for file in (ROOT / "rendergraph").rglob("*.py")}
     assert {file: lines for file, lines in files.items() if lines} == {}
+
+
+def problems_edited(source: str) -> list[int]:
+    """The lines of a module that make a message of another, or replace fields of a problem."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        parts: list[ast.expr] = []
+        if isinstance(node, ast.JoinedStr):
+            parts = [part.value for part in node.values if isinstance(part, ast.FormattedValue)]
+        elif isinstance(node, ast.BinOp):
+            parts = [node.left, node.right]
+        elif isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            parts = node.args if name in ("Problem", "problem") else []
+            if name == "replace" and node.args and getattr(node.args[0], "id", "") in ("problem", "mistake", "warning"):
+                found.append(node.lineno)
+        found += [part.lineno for part in parts if _is_message(part) and getattr(part, "attr", "") != "file"]
+    return found
+
+
+def test_a_problem_is_relocated_and_never_edited_on_its_way_up() -> None:
+    """`Problem.relocate` gives it another place, a context and a hint."""
+    assert problems_edited('f"in x: {problem.text}"\nproblem.message + "; or"\nreplace(problem, place=p)') == [1, 2, 3]
+    files = [file for file in (ROOT / "rendergraph").rglob("*.py") if file.parent.name != "errors"]
+    edited = {str(file): problems_edited(file.read_text()) for file in files}
+    assert {file: lines for file, lines in edited.items() if lines} == {}

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import to_builtins
-from msgspec.structs import replace
 
 from rendergraph.declare.blame import causes, raised_at, told
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
@@ -65,10 +64,11 @@ def main() -> None:
 
 
 def _shown(problem: Problem) -> Problem:
-    """The same with its file as messages print it, and no more than the parent wants."""
+    """The same with its file as messages print it."""
     place = problem.place
-    file = replace(place, file=shown_file(place.file)) if place is not None else None
-    return replace(problem, place=file, mistake=None)
+    if place is None or not place.file:
+        return problem
+    return problem.relocate(Place(shown_file(place.file), place.line, place.column), problem.line_text)
 
 
 def _memory(file: Path, limit: int, error: BaseException) -> Problem | None:

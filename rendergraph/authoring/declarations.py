@@ -13,19 +13,23 @@ from msgspec.structs import asdict
 from rendergraph.catalog import NodeType
 from rendergraph.catalog.types import shared_includes
 from rendergraph.declare import Function, Input, Node, Views, WrittenPort
-from rendergraph.errors import Mistake
+from rendergraph.errors import Problem
 from rendergraph.glsl import expand, read_text, strip_comments
 
 LONGEST_DOC = 160
 
 
-def docs(cls: type[Node]) -> Iterator[Mistake]:
+def _problem(subject: str, text: str) -> Problem:
+    return Problem("RG490", text, subject=subject)
+
+
+def docs(cls: type[Node]) -> Iterator[Problem]:
     """What is wrong with the docs of the class, its ports and parameters: each is one line that ends in a stop."""
     first = (cls.__doc__ or "").strip().partition("\n")[0]
     if not first:
-        yield Mistake("", "has no docs")
+        yield _problem("", "has no docs")
     elif not first.endswith("."):
-        yield Mistake("", "the first line of its docs is no sentence that ends in '.'")
+        yield _problem("", "the first line of its docs is no sentence that ends in '.'")
     found = {
         name: port.doc
         for name, port in cls.ports().items()
@@ -35,12 +39,12 @@ def docs(cls: type[Node]) -> Iterator[Mistake]:
     found |= {name: parameter.doc for name, parameter in cls.parameters().items()}
     for name, doc in found.items():
         if not doc:
-            yield Mistake(name, f"'{name}' has no doc")
+            yield _problem(name, f"'{name}' has no doc")
         elif not doc.endswith("."):
-            yield Mistake(name, f"the doc of '{name}' is no sentence that ends in '.'")
+            yield _problem(name, f"the doc of '{name}' is no sentence that ends in '.'")
         elif len(doc) >= LONGEST_DOC:
             text = f"the doc of '{name}' has {len(doc)} letters; one line takes less than {LONGEST_DOC}"
-            yield Mistake(name, text)
+            yield _problem(name, text)
 
 
 def ranges(cls: type[Node]) -> Iterator[str]:

@@ -79,7 +79,7 @@ def _declared(node: NodeType) -> list[Problem]:
     found = list(node.warnings)
     for mistake in declarations.docs(node.cls) if not node.is_shader else ():
         place = declared_by(node.cls, node.file, mistake.subject)
-        found.append(mistake.problem("RG490", f"node type '{node.name}'", place))
+        found.append(mistake.relocate(place, context=f"node type '{node.name}'"))
     for name in declarations.ranges(node.cls) if not node.is_shader else ():
         text = f"parameter '{name}' does not say between which values it lies (min, max)"
         found.append(Problem("RG460", text, declared_by(node.cls, node.file, name), severity="warning"))

@@ -24,6 +24,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
+from msgspec import ValidationError, convert
+
 from rendergraph.authoring.report import Report
 from rendergraph.catalog.types import SHADERS
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, shown_file
@@ -228,6 +230,6 @@ def _event(line: bytes) -> object:
 def _problems(entries: Sequence[Any]) -> tuple[Problem, ...] | None:
     """What the child tells; None where somebody else has written."""
     try:
-        return tuple(Problem(**{**entry, "place": entry["place"] and Place(**entry["place"])}) for entry in entries)
-    except (TypeError, KeyError):
+        return convert(entries, tuple[Problem, ...])
+    except ValidationError:
         return None

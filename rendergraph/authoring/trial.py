@@ -18,7 +18,7 @@ from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import Draw
 from rendergraph.declare import Node
 from rendergraph.declare.blame import causes, declared_by, declared_in, raised_at
-from rendergraph.errors import InputError, Mistake, Place, Problem, RendergraphError, shown_file
+from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
 from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device, open_device
 from rendergraph.gl.programs import outputs_of
@@ -109,8 +109,8 @@ class Trial:
             for problem in error.problems:
                 here = self._own(problem, error)
                 if unfit is not None:
-                    text = f"{here.text}; tried without '{unfit}', which is inherited"
-                    here = structs.replace(here, text=text, severity="warning")
+                    hint = f"; tried without '{unfit}', which is inherited"
+                    here = here.relocate(here.place, here.line_text, hint=hint).as_warning()
                 self.say(here)
             self.avoided |= set() if unfit is None else {unfit}
         else:
@@ -134,7 +134,7 @@ class Trial:
 
     def _is_missing(self, output: str, error: RendergraphError) -> bool:
         """Whether an error says that the node did not write an output in this variant."""
-        of = [problem.mistake.subject for problem in error.problems if problem.code == "RG604" and problem.mistake]
+        of = [problem.subject for problem in error.problems if problem.code == "RG604"]
         return f"{self.type.name}.{output}" in of
 
     def check_scene(self) -> None:
@@ -297,11 +297,10 @@ class Trial:
         """The same at a place in the author's files instead of one in the surroundings'."""
         if problem.place is not None and not Path(problem.place.file).resolve().is_relative_to(self.folder.resolve()):
             return problem
-        mistake = problem.mistake or Mistake("", problem.text)
-        place = mistake.place or (raised_at(error, self.type.file) if error is not None else None)
-        if place is None and error is not None:
-            place = self.port_place(mistake.subject.rpartition(".")[2])
-        return structs.replace(problem, text=mistake.text, place=place, line_text="")
+        place = None
+        if error is not None:
+            place = raised_at(error, self.type.file) or self.port_place(problem.subject.rpartition(".")[2])
+        return problem.at_cause(place)
 
     def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:
         met = list(dict.fromkeys(names))
@@ -309,7 +308,8 @@ class Trial:
             return problem
         more = f" and {len(met) - 3} more" if len(met) > 3 else ""
         word = "" if met[0].startswith("without ") else "with "
-        return structs.replace(problem, text=f"{problem.text} ({word}{', '.join(met[:3])}{more})")
+        hint = f" ({word}{', '.join(met[:3])}{more})"
+        return problem.relocate(problem.place, problem.line_text, hint=hint)
 
 
 def _is_beyond(error: RendergraphError) -> bool:

@@ -73,7 +73,7 @@ class Catalog:
             except InputError as error:
                 if not plugin.where or plugin.path.exists():
                     raise
-                notes += [replace(problem, severity="warning") for problem in error.problems]
+                notes += [problem.as_warning() for problem in error.problems]
         folders = [(find.package_of(path), path) for path in named if path.is_dir()]
         added = extensions(folders, [entry for entry in offered if entry.group == EXTENSIONS])
         return cls(listed, extensions=added, notes=tuple(notes))

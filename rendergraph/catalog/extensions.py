@@ -75,5 +75,5 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     defined = sys.modules.get(value.partition(":")[0])
     file = file if file.name else Path(getattr(defined, "__file__", None) or "")
     mistakes = extension_mistakes(found, file.parent)
-    problems = tuple(mistake.problem("RG495", f"plugin '{plugin}'", place) for mistake in mistakes)
-    return Source(plugin, file, None if mistakes else found, problems)
+    problems = tuple(one.relocate(place, code="RG495", context=f"plugin '{plugin}'") for one in mistakes)
+    return Source(plugin, file, None if problems else found, problems)

@@ -37,13 +37,9 @@ def load(name: str, listed: Listed) -> NodeType:
         text = f"the module of node type '{name}' must define one Node class, it has {names}"
         raise InputError(Problem("RG492", text, place))
     (cls,) = classes
-    if mistakes := declaration_mistakes(cls):
-        raise InputError(
-            [
-                mistake.problem("RG490", f"node type '{name}'", declared_by(cls, listed.file, mistake.subject))
-                for mistake in mistakes
-            ]
-        )
+    if problems := declaration_mistakes(cls):
+        who = f"node type '{name}'"
+        raise InputError([p.relocate(declared_by(cls, listed.file, p.subject), context=who) for p in problems])
     return NodeType(
         name, listed.family, cls, listed.file, listed.shaders, listed.plugin, inherited=_inherited(cls, listed)
     )

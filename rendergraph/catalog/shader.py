@@ -79,10 +79,9 @@ def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, 
     parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record}
     cls = type(words, (Node,), {**parts, **entries.ports, **entries.parameters})
     # Docs may be missing, which a warning says; and other tools' shaders have names with capitals.
-    mistakes = [mistake for mistake in declaration_mistakes(cls) if mistake.kind not in ("doc", "case")]
-    if mistakes:
-        where = f"shader '{file.name}'"
-        raise InputError([mistake.problem("RG490", where, entries.place_of(mistake.subject)) for mistake in mistakes])
+    if problems := declaration_mistakes(cls, lenient=True):
+        who = f"shader '{file.name}'"
+        raise InputError([one.relocate(entries.place_of(one.subject), context=who) for one in problems])
     lines = [line.rstrip() for line in source.lines if line.strip()]
     text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", raw, re.DOTALL | re.MULTILINE)[:1], *lines])
     return _ShaderType(cls, tuple(entries.warnings(cls)), text)

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from rendergraph.cli import options
 from rendergraph.cli.output import emit, emit_json, on_terminal, say, table, warn
 from rendergraph.cli.words import click
-from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
+from rendergraph.errors import InputError, Option, Place, Problem, UsageError, suggestion
 from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:
@@ -239,16 +239,17 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
     except InputError as error:
         if error.problems[0].code == "RG510":
             way = f"; to measure pipelines against it: --reference {name}"
-            raise InputError([replace(problem, text=problem.text + way) for problem in error.problems]) from None
+            raise error.relocated(lambda problem: problem.relocate(problem.place, hint=way)) from None
         others = [other for other in names if other != name]
         if not others:
             raise
-        way = f"-s holds for all pipelines; for one alone: rendergraph compare {others[0]} --reference {name} -s …"
-        raise InputError(
-            [
-                replace(problem, text=f"in {name}: {problem.text}; {way}") if _of_setting(problem) else problem
-                for problem in error.problems
-            ]
+        way = f"; -s holds for all pipelines; for one alone: rendergraph compare {others[0]} --reference {name} -s …"
+        raise error.relocated(
+            lambda problem: (
+                problem.relocate(problem.place, context=f"in {name}", hint=way)
+                if problem.place and problem.place.option("--set")
+                else problem
+            )
         ) from None
 
 
@@ -261,16 +262,13 @@ def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
     try:
         return options.linked(replace(selection, sets=(*selection.sets, *settings)))
     except InputError as error:
-        raise InputError([_of_with(problem, settings) for problem in error.problems]) from None
+        raise error.relocated(lambda problem: _of_with(problem, settings)) from None
 
 
 def _of_with(problem: Problem, settings: Sequence[str]) -> Problem:
-    where = problem.place.file.removeprefix("--set ") if problem.place else ""
-    return replace(problem, place=Place(f"--with '{where}'")) if where in settings else problem
-
-
-def _of_setting(problem: Problem) -> bool:
-    return problem.place is not None and problem.place.file.startswith("--set ")
+    setting = problem.place.option("--set") if problem.place else None
+    typed = setting is not None and setting.text in settings
+    return problem.relocate(Place(Option("--with", f"'{setting.text}'"))) if setting and typed else problem
 
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, redirect_stdout
 from contextvars import ContextVar
 from typing import Any, TextIO
 
-from rendergraph.errors import Problem
+from rendergraph.errors import Place, Problem
 from rendergraph.formatting import jsonable
 
 _RED, _YELLOW, _BOLD, _PLAIN = "\x1b[1;31m", "\x1b[1;33m", "\x1b[1m", "\x1b[0m"
@@ -108,13 +108,13 @@ class Warnings:
     """Says each warning once, however often it comes up; of several values of one setting, of the first."""
 
     def __init__(self) -> None:
-        self._said: set[tuple[str, str, str]] = set()
+        self._said: set[tuple[str, str, str | Place | None]] = set()
 
     def say(self, problems: Sequence[Problem]) -> None:
         """Those that have not been said."""
         for problem in problems:
-            where = str(problem.place or "")
-            said = problem.code, problem.text, where.partition("=")[0] if where.startswith("--set ") else where
+            setting = problem.place.option("--set") if problem.place else None
+            said = problem.code, problem.message, setting.path if setting else problem.place
             if said not in self._said:
                 self._said.add(said)
                 tell(problem)

@@ -59,7 +59,7 @@ def _main() -> None:
         try:
             print(json.dumps(context(int(sys.argv[1]))))
         except RendergraphError as error:
-            print(json.dumps({"problem": "; ".join(problem.text for problem in error.problems)}))
+            print(json.dumps({"problem": "; ".join(problem.message for problem in error.problems)}))
         except Exception as error:  # the doctor reports whatever it meets
             print(json.dumps({"problem": f"{type(error).__name__}: {error}"}))
         return

@@ -6,8 +6,6 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgspec.structs import replace
-
 from rendergraph.cli import options
 from rendergraph.cli.output import warn
 from rendergraph.cli.words import click
@@ -73,6 +71,6 @@ def _of_pipelines(what: str, plugins: tuple[Path, ...]) -> Schema:
         bases |= base_of(Path(what), spec)
         catalog = spec.catalog or catalog  # with the shader files it names
     found = schema(catalog, bases)
-    warn([replace(problem, severity="warning") for problem in catalog.usable()[1]])
+    warn([problem.as_warning() for problem in catalog.usable()[1]])
     warn(catalog.extensions.warnings)
     return found

@@ -11,12 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from msgspec import structs
-
 from rendergraph.compare.ranges import MOST_VALUES, Span, parse_range
 from rendergraph.compare.sampling import Sampling, places
 from rendergraph.document import parse
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
@@ -148,7 +146,7 @@ class Space:
                 if axis.span is not None:
                     ways = f"write {axis.span.text}:{'COUNT' if axis.span.log else 'STEP'}, or take --samples of it"
                     text = f"axis '{axis.path}' is all numbers in {axis.span.text}, not some of them: {ways}"
-                    problems.append(Problem("RG524", text, Place(f"-x {axis.path}={axis.text}")))
+                    problems.append(Problem("RG524", text, Place(Option("-x", f"{axis.path}={axis.text}"))))
         if not problems and (count := self.count()) > MOST_RUNS:
             text = f"the axes make {count} runs, more than {MOST_RUNS}; leave out values, sweep in parts, or --samples"
             problems.append(Problem("RG524", text))
@@ -282,7 +280,7 @@ def _together(axes: Sequence[Axis], zipped: Sequence[Sequence[str]]) -> list[Pro
     for path in repeated(path for group in zipped for path in group):
         group = next(group for group in zipped if path in group)
         found.append((group, f"axis '{path}' goes together with others once"))
-    return [Problem("RG524", text, Place(f"--zip {','.join(group)}")) for group, text in found]
+    return [Problem("RG524", text, Place(Option("--zip", ",".join(group)))) for group, text in found]
 
 
 def _pairs(group: Sequence[Axis], values: Sequence[str]) -> Iterable[tuple[str, str]]:
@@ -317,7 +315,7 @@ def pipelines(base: Pipeline, runs: Sequence[Mapping[str, str]]) -> list[Pipelin
             pipeline.check()
         except InputError as error:
             for problem in error.problems:
-                problems.setdefault((problem.code, problem.text), _of_axis(problem, run))
+                problems.setdefault((problem.code, problem.message), _of_axis(problem, run))
         found.append(pipeline)
     if problems:
         raise InputError(list(problems.values()))
@@ -326,12 +324,11 @@ def pipelines(base: Pipeline, runs: Sequence[Mapping[str, str]]) -> list[Pipelin
 
 def _of_axis(problem: Problem, run: Mapping[str, str]) -> Problem:
     """A mistake in an assignment as one of the axis that made it, or of the run."""
-    where = problem.place.file if problem.place else ""
-    for path, value in run.items():
-        if where == f"--set {path}={value}":
-            return structs.replace(problem, place=Place(f"-x {path}={value}"))
     if problem.place is None:
-        return structs.replace(problem, place=Place(", ".join(f"{path}={value}" for path, value in run.items())))
+        return problem.relocate(Place(", ".join(f"{path}={value}" for path, value in run.items())))
+    setting = problem.place.option("--set")
+    if setting is not None and setting.text == f"{setting.path}={run.get(setting.path)}":
+        return problem.relocate(Place(Option("-x", setting.text)))
     return problem
 
 

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from msgspec.structs import replace
 
 from rendergraph.compare.values import Pixels
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.metrics import Encoding, check_sizes
 from rendergraph.session.made import is_picture
 from rendergraph.session.pipeline import Pipeline, load
@@ -61,25 +60,24 @@ def measured_at(pipeline: Pipeline, metric: str | None) -> Pipeline:
     """
     if metric is None:
         return pipeline
-    found = pipeline.patch({"outputs": {METRIC: metric}})
+    found, place = pipeline.patch({"outputs": {METRIC: metric}}), Place(Option("--metric", metric))
     try:
         graph = found.link().graph
     except InputError as error:
-        place = Place(f"--metric {metric}")
-        raise InputError(
-            [
-                replace(one, place=place, text=f"in {found.selection.source}: {one.text}")
-                if one.place and one.place.file == "patch"
-                else one
-                for one in error.problems
-            ]
+        name = found.selection.source
+        raise error.relocated(
+            lambda problem: (
+                problem.relocate(place, context=f"in {name}")
+                if problem.place and problem.place.option("patch")
+                else problem
+            )
         ) from None
     desc = graph.textures[graph.outputs[METRIC]].desc
     if desc is None or desc.kind != "texture2d" or desc.samples > 1 or desc.format in WHOLE:
         what = "a buffer" if desc is None else f"{desc.kind} {desc.format}"
         needed = "what is measured is a picture: one layer, one sample, no whole numbers"
         text = f"'{metric}' of pipeline '{graph.name}' is {what}; {needed}"
-        raise InputError(Problem("RG523", text, Place(f"--metric {metric}")))
+        raise InputError(Problem("RG523", text, place))
     return found
 
 

@@ -110,13 +110,12 @@ class SweepFile:
 
     def placed(self, error: InputError) -> InputError:
         """Mistakes in what the file says of paths, at its own lines; others as they are."""
-        return InputError([self._placed(problem) for problem in error.problems])
+        return error.relocated(self._placed)
 
     def _placed(self, problem: Problem) -> Problem:
-        where = problem.place.file if problem.place else ""
-        option, _, rest = where.partition(" ")
-        value = self.places.get(rest.partition("=")[0]) if option in ("-x", "--set", "--zip") else None
-        return problem if value is None else value.problem(problem.code, problem.text, key=option != "--zip")
+        option = problem.place.option("-x", "--set", "--zip") if problem.place else None
+        value = self.places.get(option.path) if option else None
+        return value.relocate(problem, key=option.name != "--zip") if option and value else problem
 
 
 def is_sweep(path: Path) -> bool:

@@ -7,8 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import product
 from typing import Any
 
-from msgspec.structs import replace
-
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, outputs_of
 from rendergraph.program import Texts, named_reads, unfit_sampler
@@ -175,7 +173,7 @@ def _placed(problem: Problem, name: str, texts: Texts) -> Problem:
     for mentions, text in product((False, True), texts().values()):
         found = declared_at(text.source, [name], mentions=mentions)
         if found is not None:
-            return replace(problem, place=found[0], line_text=found[1])
+            return problem.relocate(*found)
     return problem
 
 

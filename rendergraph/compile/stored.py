@@ -67,7 +67,7 @@ def check_stored(
 
 def _problem(step: Step, code: str, text: str, place: Place | None, line: str) -> Problem:
     problem = step.problem(code, text)
-    return Problem(code, problem.text, place, line) if place is not None else problem
+    return problem.relocate(place, line) if place is not None else problem
 
 
 def _at(source: SourceText, at: int) -> tuple[Place | None, str, str]:

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any
 
 from rendergraph.declare.node import Node
-from rendergraph.errors import Mistake, Misuse, Place, is_framework, is_interruption, nearest, shown_file, suggestion
+from rendergraph.errors import Misuse, Place, Problem, is_framework, is_interruption, nearest, shown_file, suggestion
 
 
 def raised_at(error: BaseException, *own: Path | str) -> Place | None:
@@ -132,19 +132,22 @@ def _called(error: BaseException) -> str:
     return f"{called[0]}(): " if called else ""
 
 
-def happened(error: BaseException, cls: type, file: Path | None = None) -> Mistake:
+def happened(error: BaseException, cls: type, file: Path | None = None, subject: str = "") -> Problem:
     """`KeyError: 'x'` with the author's line, without the exception's name where the framework refused a call.
+
+    The caller relocates it to a place of the pipeline, with a code of its own.
 
     Args:
         error: what a node's own code raised.
         cls: the node's class.
         file: the place where the exception never met the author's code.
+        subject: see `Problem`.
     """
     place = raised_at(error, cls.__module__)
     if place is None and file is not None and file.name:
         place = Place(shown_file(file))
     text = str(error) if isinstance(error, Misuse) else f"{told(error)}{_meant(error)}"
-    return Mistake("", text, place=place)
+    return Problem("RG420", text, subject=subject, cause=place)
 
 
 def _meant(error: BaseException) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 from msgspec import Struct
 
 from rendergraph.annotations import Matching, mistakes_of
-from rendergraph.errors import Mistake
+from rendergraph.errors import Problem
 from rendergraph.textures import Semantic
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
 _OWN_METRICS = ("flip", "rmse", "psnr", "ssim", "radiance_rmse")
 
 
-def extension_mistakes(extension: Extension, folder: Path) -> list[Mistake]:
+def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
     """What is wrong with an extension; each mistake's subject is a field of it.
 
     Args:
@@ -102,12 +102,13 @@ def extension_mistakes(extension: Extension, folder: Path) -> list[Mistake]:
         for name, include in choices.items():
             if not (folder / include).is_file():
                 text = f"choices['{parameter}']['{name}']: there is no file '{include}' beside the extension"
-                mistakes.append(Mistake("choices", text))
+                mistakes.append(Problem("RG495", text, subject="choices"))
     for kind, loaders, own in (("meshes", extension.meshes, _READ_MESHES), ("images", extension.images, READ_IMAGES)):
         taken = [ending for ending in loaders if ending in own]
-        mistakes += [Mistake(kind, f"{kind} has '{ending}', which rendergraph reads itself") for ending in taken]
+        texts = [f"{kind} has '{ending}', which rendergraph reads itself" for ending in taken]
+        mistakes += [Problem("RG495", text, subject=kind) for text in texts]
     for name in extension.metrics:
         if name in _OWN_METRICS:
             text = f"metric '{name}' is one of rendergraph's own; choose another name"
-            mistakes.append(Mistake("metrics", text))
+            mistakes.append(Problem("RG495", text, subject="metrics"))
     return mistakes

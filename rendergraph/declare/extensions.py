@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from rendergraph.declare.blame import raised_at, told
 from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
@@ -99,7 +98,7 @@ class Extensions:
     @property
     def warnings(self) -> tuple[Problem, ...]:
         """The same for whoever lists everything: what is broken is left out."""
-        return tuple(replace(problem, severity="warning") for problem in self.problems)
+        return tuple(problem.as_warning() for problem in self.problems)
 
     # By name; two plugins that bring one name are an error for whoever asks for it ------------------------------------
 

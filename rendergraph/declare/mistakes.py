@@ -14,7 +14,7 @@ from rendergraph.declare.blame import told
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
-from rendergraph.errors import Mistake, is_interruption, suggestion
+from rendergraph.errors import Problem, is_interruption, suggestion
 from rendergraph.ports import History, Internal
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
@@ -58,11 +58,15 @@ _SOUND: WeakSet[type[Node]] = WeakSet()
 """Classes that nothing is wrong with: every pipeline that is read asks, and an edited class is another one."""
 
 
-def declaration_mistakes(cls: type[Node]) -> list[Mistake]:
+def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Problem]:
     """What is wrong with a node's declaration; each mistake's subject is a port, a parameter, or empty for the class.
 
     Checked: names are GLSL identifiers and distinct, also as macros; docs exist; types and defaults are what a shader
     can be given and lie inside their range; formats, kinds and words exist; rules name ports of this node.
+
+    Args:
+        cls: the node's class.
+        lenient: accept names with capitals, and ports and parameters without docs, as other tools' shaders have them.
     """
     if cls in _SOUND:
         return []
@@ -70,59 +74,62 @@ def declaration_mistakes(cls: type[Node]) -> list[Mistake]:
         cls.parameters()
     except Exception as error:  # whatever evaluating an annotation raises
         named = [name for name, hint in get_annotations(cls).items() if str(getattr(error, "name", None)) in str(hint)]
-        return [Mistake(next(iter(named), ""), f"the types of its parameters cannot be worked out: {told(error)}")]
-    found = [*_names(cls), *_docs(cls), *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
-    if not found:
+        return [_problem(next(iter(named), ""), f"the types of its parameters cannot be worked out: {told(error)}")]
+    docs = [] if lenient else _docs(cls)
+    found = [*_names(cls, lenient), *docs, *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
+    if not found and not lenient:
         _SOUND.add(cls)
     return found
 
 
-def _names(cls: type[Node]) -> Iterator[Mistake]:
+def _problem(subject: str, text: str) -> Problem:
+    return Problem("RG490", text, subject=subject)
+
+
+def _names(cls: type[Node], lenient: bool) -> Iterator[Problem]:
     ports, parameters = cls.ports(), cls.parameters()
     plan = {name for name in parameters if parameters[name].role == "structural"}  # these never reach a shader
     for name in [*ports, *parameters]:
-        if name.startswith("gl_") or "__" in name or not _IDENTIFIER.match(name.lower()):
-            yield Mistake(name, f"'{name}' is not a lower-case GLSL identifier")
-        elif name != name.lower():
-            yield Mistake(name, f"'{name}' is not a lower-case GLSL identifier", "case")
+        if name.startswith("gl_") or "__" in name or not _IDENTIFIER.match(name.lower() if lenient else name):
+            yield _problem(name, f"'{name}' is not a lower-case GLSL identifier")
         elif name in (_OF_THE_BASE if name in plan else RESERVED_NAMES):
             text = f"'{name}' is reserved by GLSL or by the node's base class; choose another name"
-            yield Mistake(name, text)
+            yield _problem(name, text)
     for name in sorted(set(ports) & set(parameters)):
-        yield Mistake(name, f"'{name}' is both a port and a parameter")
+        yield _problem(name, f"'{name}' is both a port and a parameter")
     given = {f"{name}_{word}": (name, word) for name in ports for word in ("views", "lights")}
     for name in [*ports, *(name for name in parameters if name not in plan)]:
         if name in given:
             port, word = given[name]
-            yield Mistake(name, f"'{name}' is what shaders are given for the {word} of port '{port}'; rename one")
+            yield _problem(name, f"'{name}' is what shaders are given for the {word} of port '{port}'; rename one")
     named = [getattr(port, "group", None) for port in ports.values()]
     for group in dict.fromkeys(group for group in named if isinstance(group, str)):
         if group in ports or group in parameters:
-            yield Mistake(group, f"group '{group}' has the name of a port or parameter")
+            yield _problem(group, f"group '{group}' has the name of a port or parameter")
     inherited = {name for base in cls.__mro__[1:] if issubclass(base, Node) for name in base.ports()}
     for name, value in vars(cls).items():
         if value is None and name != "shader" and name[0] != "_" and name not in {*inherited, *parameters}:
-            yield Mistake(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
+            yield _problem(name, f"'{name}' is None, which drops a port that a base declares; none declares '{name}'")
     shader = cls.shader
     if shader is not None and (not isinstance(shader, str) or not shader.endswith((".frag", ".comp"))):
-        yield Mistake("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")
+        yield _problem("shader", f"`shader` is {shader!r}; it is a file that ends in .frag or .comp")
 
 
-def _docs(cls: type[Node]) -> Iterator[Mistake]:
+def _docs(cls: type[Node]) -> Iterator[Problem]:
     if not (cls.__doc__ or "").strip() or cls.__doc__ == Node.__doc__:
-        yield Mistake("", "the class has no docstring")
+        yield _problem("", "the class has no docstring")
     for name, port in cls.ports().items():
         doc = getattr(port, "doc", "")
         if isinstance(doc, str) and not doc and not isinstance(port, Internal | History):
-            yield Mistake(name, f"port '{name}' has no doc", "doc")
+            yield _problem(name, f"port '{name}' has no doc")
     for name, parameter in cls.parameters().items():
         if parameter.role == "plain":
-            yield Mistake(name, f"parameter '{name}' is a plain value; declare it with {_ROLES}")
+            yield _problem(name, f"parameter '{name}' is a plain value; declare it with {_ROLES}")
         elif not parameter.doc:
-            yield Mistake(name, f"parameter '{name}' has no doc", "doc")
+            yield _problem(name, f"parameter '{name}' has no doc")
 
 
-def _macros(cls: type[Node]) -> Iterator[Mistake]:
+def _macros(cls: type[Node]) -> Iterator[Problem]:
     """Two declarations that would define one macro."""
     made: dict[str, list[tuple[str, str]]] = {}  # macro to the names that make it, each with what it is
     for name in cls.inputs():
@@ -138,35 +145,35 @@ def _macros(cls: type[Node]) -> Iterator[Mistake]:
         (name, first), words = sources[0], " and ".join(source for _, source in sources)
         if macro in _OF_THE_FRAMEWORK:
             text = f"{first} would define the macro {macro}, which is rendergraph's own; choose another name"
-            yield Mistake(name, text)
+            yield _problem(name, text)
         if len(sources) > 1:
-            yield Mistake(name, f"{words} would define one macro, {macro}; rename one")
+            yield _problem(name, f"{words} would define one macro, {macro}; rename one")
 
 
-def _parameters(cls: type[Node]) -> Iterator[Mistake]:
+def _parameters(cls: type[Node]) -> Iterator[Problem]:
     sound = True
     for name, parameter in cls.parameters().items():
         if parameter.type is None:
-            yield Mistake(name, f"parameter '{name}' has no type; write it as in `{name}: float = param(…)`")
+            yield _problem(name, f"parameter '{name}' has no type; write it as in `{name}: float = param(…)`")
             sound = False
             continue
         if parameter.open_name and str not in get_args(parameter.type):
-            yield Mistake(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
+            yield _problem(name, f"plugins add choices to '{name}', so its type is a Literal of its own `| str`")
         if parameter.role in ("param", "define") and (wrong := _not_for_a_shader(parameter)):
-            yield Mistake(name, f"parameter '{name}' is {wrong}")
+            yield _problem(name, f"parameter '{name}' is {wrong}")
         if parameter.unless and not any(parameter.unless in vars(base) for base in cls.__mro__):  # it may be dropped
             hint = suggestion(parameter.unless, cls.inputs())
-            yield Mistake(name, f"parameter '{name}' has unless='{parameter.unless}', which is no input{hint}")
+            yield _problem(name, f"parameter '{name}' has unless='{parameter.unless}', which is no input{hint}")
         wrong_limits = list(_limits(parameter))
         yield from wrong_limits
         sound = sound and not wrong_limits
         if parameter.glsl and not re.fullmatch(r"(float|int|uint|bool|[biu]?vec[234]|mat[234])", str(parameter.glsl)):
-            yield Mistake(name, f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type")
+            yield _problem(name, f"parameter '{name}' has glsl={parameter.glsl!r}, which is no GLSL type")
     if sound:
         yield from _defaults(cls)
 
 
-def _limits(parameter: Parameter) -> Iterator[Mistake]:
+def _limits(parameter: Parameter) -> Iterator[Problem]:
     name, limits = parameter.name, parameter.limits
     wrong = [
         mistake
@@ -175,10 +182,10 @@ def _limits(parameter: Parameter) -> Iterator[Mistake]:
     ]
     yield from wrong
     if not wrong and limits.empty:
-        yield Mistake(name, f"parameter '{name}' goes{limits}, which is nothing")
+        yield _problem(name, f"parameter '{name}' goes{limits}, which is nothing")
 
 
-def _defaults(cls: type[Node]) -> Iterator[Mistake]:
+def _defaults(cls: type[Node]) -> Iterator[Problem]:
     """Defaults go the way of values in a file."""
     sound = True
     for name, parameter in cls.parameters().items():
@@ -193,7 +200,7 @@ def _defaults(cls: type[Node]) -> Iterator[Mistake]:
             except (TypeError, ValueError) as error:
                 wrong = f"wrong: it {error}"
         if wrong and parameter.role != "plain":
-            yield Mistake(name, f"the default of '{name}', {quoted(parameter.default)}, is {wrong}")
+            yield _problem(name, f"the default of '{name}', {quoted(parameter.default)}, is {wrong}")
         sound = sound and not wrong
     try:
         if sound:
@@ -201,7 +208,7 @@ def _defaults(cls: type[Node]) -> Iterator[Mistake]:
     except BaseException as error:  # what the author's own check raises
         if is_interruption(error):
             raise
-        yield Mistake("", f"it cannot be made with its defaults: {told(error)}")
+        yield _problem("", f"it cannot be made with its defaults: {told(error)}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:

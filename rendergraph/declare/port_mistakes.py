@@ -6,17 +6,18 @@ from collections.abc import Iterator, Mapping
 
 from rendergraph.annotations import mistakes_of, quoted
 from rendergraph.declare.node import Node
-from rendergraph.errors import Mistake, suggestion
+from rendergraph.errors import Problem, suggestion
 from rendergraph.ports import Function, History, InOut, Input, Internal, Output, Port, Views, WrittenPort
 from rendergraph.textures import Semantic, Signature
 
 
-def port_mistakes(cls: type[Node]) -> Iterator[Mistake]:
+def port_mistakes(cls: type[Node]) -> Iterator[Problem]:
     """What is wrong with a node's ports: first each field by itself, then what fields say of each other."""
     ports = cls.ports()
     for name, port in ports.items():
         wrong = list(mistakes_of(port, f"port '{name}'", name))
-        yield from wrong or (Mistake(name, text) for text in (*_alone(name, port), *_named(name, port, ports)))
+        texts = (*_alone(name, port), *_named(name, port, ports))
+        yield from wrong or (Problem("RG490", text, subject=name) for text in texts)
 
 
 def _alone(name: str, port: Port) -> Iterator[str]:

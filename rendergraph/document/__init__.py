@@ -12,7 +12,7 @@ from pathlib import Path
 from rendergraph.document.events import YamlLimits, build, over_limit
 from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.stamps import look
 
 
@@ -53,7 +53,7 @@ def read_text(path: Path, limits: YamlLimits, name: str) -> str:
 
 def parse(
     text: str,
-    file: str = "<text>",
+    origin: str | Option = "<text>",
     *,
     path: Path | None = None,
     limits: YamlLimits = YamlLimits(),
@@ -63,7 +63,7 @@ def parse(
 
     Args:
         text: the text.
-        file: how messages name it.
+        origin: how messages name it.
         path: the file it comes from, to which its relative paths are relative.
         limits: budgets.
         keep_going: put mistakes that do not stop the reading into `Document.problems`.
@@ -72,7 +72,7 @@ def parse(
         InputError: it is no YAML of ours; with all mistakes.
     """
     text = text.removeprefix("\ufeff")
-    return build(text, Source(file, path, text), limits, keep_going)
+    return build(text, Source(origin, path, text), limits, keep_going)
 
 
 def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:

@@ -163,7 +163,7 @@ def build(text: str, source: Source, limits: YamlLimits, keep_going: bool) -> Do
     import yaml  # loaded with the first file
 
     if len(text) > limits.bytes or len(text.encode("utf-8", "surrogatepass")) > limits.bytes:
-        raise InputError(Problem("RG007", over_limit("bytes", limits.bytes), Place(source.name)))
+        raise InputError(Problem("RG007", over_limit("bytes", limits.bytes), Place(source.origin)))
     # To compile a set of so many signs takes as long as to read a pipeline, and files are mostly text in lines.
     in_lines = text.replace("\n", "").replace("\r", "").replace("\t", "").isprintable()
     illegal = None if in_lines else re.search(_ILLEGAL, text)

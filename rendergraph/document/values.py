@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 from msgspec import Struct
 
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem, printable
 
 Scalar: TypeAlias = "str | int | float | bool | None"
 Index: TypeAlias = "str | int | float"
@@ -25,12 +25,12 @@ class Source(Struct, eq=False, dict=True):
     """Where values come from: a file, or an option of the command line.
 
     Attributes:
-        name: how messages name it.
+        origin: a file as messages name it, or an option.
         path: the file, None where there is none.
         text: its text, to show the line of a mistake.
     """
 
-    name: str
+    origin: str | Option
     path: Path | None = None
     text: str = ""
 
@@ -53,7 +53,7 @@ class Source(Struct, eq=False, dict=True):
 
     def problem(self, code: str, text: str, line: int = 0, column: int = 0) -> Problem:
         """A mistake in this source."""
-        return Problem(code, text, Place(self.name, line, column), self.line(line))
+        return Problem(code, text, Place(self.origin, line, column), self.line(line))
 
 
 class Broken:
@@ -98,12 +98,12 @@ class Value:
     @property
     def place(self) -> Place:
         """Where the value starts."""
-        return Place(self.source.name, self.line, self.column)
+        return Place(self.source.origin, self.line, self.column)
 
     @property
     def key_place(self) -> Place:
         """Where its key starts."""
-        return Place(self.source.name, self.key_line, self.key_column)
+        return Place(self.source.origin, self.key_line, self.key_column)
 
     @property
     def kind(self) -> str:
@@ -118,6 +118,11 @@ class Value:
         """A mistake at this value, or at its key."""
         line, column = (self.key_line, self.key_column) if key else (self.line, self.column)
         return self.source.problem(code, text, line, column)
+
+    def relocate(self, problem: Problem, *, key: bool = False, code: str = "", context: str = "") -> Problem:
+        """A problem that was found elsewhere, as one of this value, or of its key."""
+        place = self.key_place if key else self.place
+        return problem.relocate(place, self.source.line(place.line), code=code, context=context)
 
     def items(self) -> Iterator[tuple[Any, Value]]:
         """Keys and values of a mapping, nothing for anything else."""
@@ -173,7 +178,7 @@ class Document(Struct, frozen=True, eq=False, dict=True):
     @property
     def file(self) -> str:
         """How messages name the file."""
-        return self.source.name
+        return str(self.source.origin)
 
     @property
     def path(self) -> Path | None:
@@ -258,4 +263,4 @@ def shown(text: object, most: int = 60) -> str:
     word = str(text)
     if len(word) > most:
         word = word[: most - 1] + "…"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in word)
+    return printable(word)

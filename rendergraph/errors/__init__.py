@@ -7,68 +7,78 @@ docs and `rendergraph explain RG103` read it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 _WIDEST = 200
 """Characters of a file's line that a message shows, those around the place."""
+_LONGEST_OPTION = 80
 
 
-class Place(Struct, frozen=True, order=True):
-    """A place in a file; line and column start at 1, 0 where a file has none (a mesh, a command-line option)."""
+class Option(Struct, frozen=True):
+    """A command-line option as the origin of a mistake, or the argument of the Python API that stands for it.
 
-    file: str
+    Attributes:
+        name: `--set`, or `patch` for a patch given in Python.
+        text: what was given, as typed; empty where only the option matters.
+    """
+
+    name: str
+    text: str = ""
+
+    def __str__(self) -> str:
+        text = self.text if len(self.text) <= _LONGEST_OPTION else self.text[: _LONGEST_OPTION - 1] + "…"
+        return f"{self.name} {printable(text)}" if text else self.name
+
+    @property
+    def path(self) -> str:
+        """The path that `PATH=VALUE` sets."""
+        return self.text.partition("=")[0]
+
+
+class Place(Struct, frozen=True):
+    """A place in a file, or an option; line and column start at 1, 0 where the origin has no lines (a mesh, an option).
+
+    Attributes:
+        origin: a file as messages name it, or what the user typed.
+    """
+
+    origin: str | Option
     line: int = 0
     column: int = 0
 
-    def __str__(self) -> str:
-        if self.line:
-            return f"{self.file}:{self.line}:{self.column}"
-        return self.file
+    @property
+    def file(self) -> str:
+        """The file, empty for an option."""
+        return self.origin if isinstance(self.origin, str) else ""
 
-
-class Mistake(Struct, frozen=True):
-    """What is wrong with one thing, as a value: a problem is made of it by whoever knows the file and the code.
-
-    Code that must tell one mistake from another, or find its place, asks these fields and never the text.
-
-    Attributes:
-        subject: the name of what is wrong: of a port, a parameter, an argument, a resource; empty for the whole.
-        text: one sentence without its end.
-        kind: `doc` where only a doc is missing, `case` where only a capital letter is wrong in a name, else `wrong`.
-        place: the author's line, where it is known.
-    """
-
-    subject: str
-    text: str
-    kind: Literal["doc", "case", "wrong"] = "wrong"
-    place: Place | None = None
+    def option(self, *names: str) -> Option | None:
+        """The option that this is a place in, where it has one of the names."""
+        return self.origin if isinstance(self.origin, Option) and self.origin.name in names else None
 
     def __str__(self) -> str:
-        """`file:line: text`, or the text alone."""
-        if self.place is None:
-            return self.text
-        return f"{self.place.file}:{self.place.line}: {self.text}" if self.place.line else f"{self.place}: {self.text}"
-
-    def problem(self, code: str, before: str, place: Place | None) -> Problem:
-        """`before: file:line: text`, at a place that is not the author's."""
-        return Problem(code, f"{before}: {self}", place, mistake=replace(self, text=f"{before}: {self.text}"))
+        return f"{self.origin}:{self.line}:{self.column}" if self.line else str(self.origin)
 
 
 class Problem(Struct, frozen=True, eq=False):
     """One mistake: `file:line:col: RG103 text`, with the line of the file beneath.
 
+    Code that must distinguish problems, or find their place, reads the fields and never the text.
+
     Attributes:
         code: `RG` and three digits.
-        text: where, what, and the way out, in one line.
-        place: where it stands, None where it stands nowhere.
+        text: what is wrong and the fix, in one line.
+        place: where the user can mend it; None where there is no such place.
         line_text: the line of the file, empty where unknown.
-        severity: an `error` stops, a `warning` is said and the work goes on.
-        mistake: what it was made of, for whoever looks for a place of their own; None where there was no such thing.
+        severity: an `error` stops, a `warning` is reported and the work goes on.
+        subject: the name of what is wrong: a port, a parameter, an argument, a resource; empty for the whole.
+        context: the node, the file or the option that the problem concerns, printed before the text.
+        cause: the line of a plugin author's code that it comes from, where `place` is one of the pipeline's.
+        hint: what only the caller knows, printed after the text.
     """
 
     code: str
@@ -76,7 +86,10 @@ class Problem(Struct, frozen=True, eq=False):
     place: Place | None = None
     line_text: str = ""
     severity: Literal["error", "warning"] = "error"
-    mistake: Mistake | None = None
+    subject: str = ""
+    context: str = ""
+    cause: Place | None = None
+    hint: str = ""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Problem) and self._compared == other._compared
@@ -86,28 +99,73 @@ class Problem(Struct, frozen=True, eq=False):
 
     @property
     def _compared(self) -> tuple[object, ...]:
-        """What a user reads of it: two of one text are one."""
-        return self.code, self.text, self.place, self.line_text, self.severity
+        """Two problems that read the same are one."""
+        return self.code, self.message, self.place, self.line_text, self.severity
+
+    @property
+    def message(self) -> str:
+        """The text with all that is printed around it: `context: file:line: text; hint`."""
+        cause = f"{self.cause.origin}:{self.cause.line or ''}".rstrip(":") if self.cause else ""
+        return ": ".join(filter(None, (self.context, cause, self.text))) + self.hint
 
     def __str__(self) -> str:
         head = f"{self.place}: " if self.place else ""
         word = "warning: " if self.severity == "warning" else ""
-        text = f"{head}{word}{self.code} {self.text}"
+        text = f"{head}{word}{self.code} {self.message}"
         if self.line_text and self.place and self.place.line:
             start = max(0, self.place.column - _WIDEST // 2) if len(self.line_text) > _WIDEST else 0
             shown = self.line_text.expandtabs(1)[start : start + _WIDEST]
             text += f"\n    {shown}\n    {' ' * (self.place.column - 1 - start)}^"
         return text
 
+    def relocate(
+        self,
+        place: Place | None,
+        line_text: str = "",
+        *,
+        code: str = "",
+        context: str = "",
+        cause: Place | None = None,
+        hint: str = "",
+    ) -> Problem:
+        """Return the same problem at another place, where its reader can mend it.
+
+        Args:
+            place: the new place.
+            line_text: the line of the file there.
+            code: the new code, where the same mistake has another one there.
+            context: printed before everything else.
+            cause: the plugin author's line, where the problem has none yet.
+            hint: printed after everything else, with its own punctuation.
+        """
+        context = ": ".join(filter(None, (context, self.context)))
+        return replace(
+            self,
+            code=code or self.code,
+            place=place,
+            line_text=line_text,
+            context=context,
+            cause=self.cause or cause,
+            hint=self.hint + hint,
+        )
+
+    def at_cause(self, place: Place | None) -> Problem:
+        """Return the same problem for the plugin author: at their line, or else at another place of theirs."""
+        return replace(self, place=self.cause or place, line_text="", cause=None)
+
+    def as_warning(self) -> Problem:
+        """Return the same as a warning."""
+        return replace(self, severity="warning")
+
     def as_json(self) -> dict[str, object]:
-        """The same as plain JSON values."""
+        """Return what messages show as plain JSON values."""
         return {
             "code": self.code,
             "severity": self.severity,
-            "file": self.place.file if self.place else None,
+            "file": str(self.place.origin) if self.place else None,
             "line": self.place.line if self.place and self.place.line else None,
             "column": self.place.column if self.place and self.place.line else None,
-            "text": self.text,
+            "text": self.message,
         }
 
 
@@ -121,7 +179,11 @@ class RendergraphError(Exception):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type[RendergraphError], tuple[tuple[Problem, ...]]]:
-        return type(self), (self.problems,)  # what it is made of, for another process
+        return type(self), (self.problems,)  # to be raised again in another process
+
+    def relocated(self, relocate: Callable[[Problem], Problem]) -> Self:
+        """Return the same error with each of its problems relocated."""
+        return type(self)([relocate(problem) for problem in self.problems])
 
 
 class InputError(RendergraphError):
@@ -186,6 +248,11 @@ class DeviceError(RendergraphError):
     """No usable GL device."""
 
     exit_code = 5
+
+
+def printable(text: str) -> str:
+    """The text with control characters escaped, so that it stays in one line of a message."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 def shown_file(file: str | Path) -> str:

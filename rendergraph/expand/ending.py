@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from msgspec.structs import replace
 
 from rendergraph.declare import WrittenPort
-from rendergraph.errors import InputError, Mistake, Problem
+from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import Expansion, Versioned, behind
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write
@@ -31,7 +31,7 @@ def ended(graph: Graph, found: Versioned, wanted: Mapping[str, Endpoint]) -> Exp
         if end not in found.at_end or end.node in found.idle:
             reason = found.idle.get(end.node, "it makes no texture")
             text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
-            raise InputError(Problem("RG204", text, graph[end.node].place, mistake=Mistake(str(end), text)))
+            raise InputError(Problem("RG204", text, graph[end.node].place, subject=str(end)))
         resource, version = found.at_end[end]
         shown[name] = resource
         if version == found.newest[resource]:

@@ -316,7 +316,7 @@ def _author_problem(node: GraphNode, error: BaseException) -> Problem:
     who = node_named(node.id, node.type.name)
     if isinstance(error, SceneError):
         return Problem("RG209", f"{who}: {shown(error, 200)}", node.place)
-    mistake = happened(error, type(node.node), node.type.file)
+    problem = happened(error, type(node.node), node.type.file)
     if isinstance(error, Misuse):
-        return mistake.problem(error.code, who, node.place)
-    return mistake.problem("RG420", f"{who} failed while recording", node.place)
+        return problem.relocate(node.place, code=error.code, context=who)
+    return problem.relocate(node.place, context=f"{who} failed while recording")

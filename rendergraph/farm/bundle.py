@@ -200,8 +200,9 @@ def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphE
 
     def homed(problem: Problem) -> Problem:
         place = problem.place
-        if place is not None:
-            place = Place(place.file.replace(str(root), ""), place.line, place.column)
-        return replace(problem, text=problem.text.replace(str(root), ""), place=place)
+        if place is None or not Path(place.file).is_relative_to(root):
+            return problem
+        home = Place(f"/{Path(place.file).relative_to(root)}", place.line, place.column)
+        return problem.relocate(home, problem.line_text)
 
-    return type(error)([homed(problem) for problem in error.problems])
+    return error.relocated(homed)

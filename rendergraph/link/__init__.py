@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from msgspec.structs import replace
-
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Facts, LightFacts, TextureInfo
-from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.errors import InputError, Option, Problem, suggestion
 from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
@@ -16,7 +14,7 @@ from rendergraph.link.connect import Connector
 from rendergraph.link.disabled import lost, mark_unlit, past, take_out
 from rendergraph.link.graph import Endpoint, Graph, GraphNode, upstream_first
 from rendergraph.link.infer import Infer, made_ports
-from rendergraph.link.names import Draft, Link, References, Wrong, line_of
+from rendergraph.link.names import Draft, Link, References, line_of
 from rendergraph.link.order import cycles, needs, sources, versions
 from rendergraph.link.params import choice_files, instance
 from rendergraph.resolve import NodeSpec, PipelineSpec
@@ -219,9 +217,9 @@ class _Linker:
         for name, value in self.spec.outputs.items():
             try:
                 followed = references.follow("", value, name)
-            except Wrong as wrong:
-                if wrong.problem is not None:
-                    self._say(wrong.problem)
+            except InputError as error:
+                for problem in error.problems:
+                    self._say(problem)
                 continue
             if followed is None:
                 continue
@@ -282,7 +280,7 @@ class _Linker:
                         "output 'image' is scene-linear light as it is; send it through an output transform "
                         "('rendergraph nodes display' lists them), or call the output 'radiance'"
                     )
-                    self.warnings.append(replace(found.value.problem("RG154", text), severity="warning"))
+                    self.warnings.append(found.value.problem("RG154", text).as_warning())
 
     def _idle(self, nodes: Mapping[str, Draft]) -> None:
         """What was typed to see it, and is not to be seen: a file's may be for other scenes."""
@@ -293,7 +291,7 @@ class _Linker:
                     continue
                 path, place = f"{draft.spec.id}.{name}", f"{draft.spec.id}.{parameter.unless}"
                 text = f"'{path}' changes nothing: '{place}' takes its place; -s {place}=null disconnects that"
-                self.warnings.append(replace(value.problem("RG155", text), severity="warning"))
+                self.warnings.append(value.problem("RG155", text).as_warning())
 
     def _aliases(self, references: References, written: Mapping[str, Draft]) -> dict[str, Endpoint]:
         found: dict[str, Link] = {}
@@ -322,13 +320,12 @@ def _member(draft: Draft, infer: Infer) -> GraphNode:
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:
     """Each once, by file as first met and by line."""
-    files: dict[str, int] = {}
+    origins: dict[str | Option | None, int] = {}
     for problem in problems:
-        files.setdefault(problem.place.file if problem.place else "", len(files))
-    unique = dict.fromkeys(problems)
+        origins.setdefault(problem.place.origin if problem.place else None, len(origins))
     return sorted(
-        unique,
-        key=lambda p: (files[p.place.file], p.place.line, p.place.column) if p.place else (files[""], 0, 0),
+        dict.fromkeys(problems),
+        key=lambda p: (origins[p.place.origin], p.place.line, p.place.column) if p.place else (origins[None], 0, 0),
     )
 
 

@@ -9,7 +9,7 @@ from rendergraph.declare import InOut, Input
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
 from rendergraph.link.disabled import lost
-from rendergraph.link.names import Draft, References, Wrong
+from rendergraph.link.names import Draft, References
 from rendergraph.resolve import PipelineSpec
 from rendergraph.textures import Signature
 
@@ -78,10 +78,10 @@ class Connector:
     def _follow(self, draft: Draft, name: str, value: Value, wanted: str) -> None:
         try:
             found = self.references.follow(draft.spec.scope, value, wanted)
-        except Wrong as wrong:
+        except InputError as error:
             draft.failed.add(name)
-            if wrong.problem is not None:
-                self.say(wrong.problem)
+            for problem in error.problems:
+                self.say(problem)
         else:
             if found is not None:
                 draft.links[name].append(found)

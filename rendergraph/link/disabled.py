@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from msgspec.structs import replace
 
 from rendergraph.declare import Function, InOut, Input, Port, WrittenPort
-from rendergraph.errors import Problem
-from rendergraph.link.names import Draft, Link, References, Wrong, line_of
+from rendergraph.errors import InputError, Problem
+from rendergraph.link.names import Draft, Link, References, line_of
 from rendergraph.read import word
 
 
@@ -92,7 +92,7 @@ def _into(draft: Draft, port: str, references: References) -> Iterator[Link]:
             if meaning is not None and word(declared, "semantic") == meaning.name:
                 try:
                     link = references.follow(scope, declared.with_data(f"inputs.{name}"), name)
-                except Wrong:  # said at the node
+                except InputError:  # reported at the node
                     continue
                 yield from [link] if link is not None else []
         scope = found.parent

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, NoReturn, Optional, overload
 
 import msgspec
-from msgspec.structs import replace
 
 from rendergraph import textures
 from rendergraph.annotations import fits, quoted, words_for
@@ -29,7 +28,7 @@ from rendergraph.declare import (
 )
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
-from rendergraph.errors import Mistake, Place, Problem, SceneError, is_interruption, node_named
+from rendergraph.errors import Problem, SceneError, is_interruption, node_named
 from rendergraph.link.graph import Endpoint
 from rendergraph.link.names import Draft
 from rendergraph.ports import Count, FormatName, Positive, Samples, Sides
@@ -180,10 +179,13 @@ class Infer:
             self._stop(end, code, f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}")
         return value
 
-    def _say(self, end: Endpoint, code: str, text: str, place: Place | None = None) -> None:
+    def _say(self, end: Endpoint, code: str, text: str) -> None:
+        self._report(end, Problem(code, text, subject=end.port))
+
+    def _report(self, end: Endpoint, problem: Problem, code: str = "", doing: str = "") -> None:
         draft = self.nodes[end.node]
-        problem = draft.spec.value.problem(code, f"'{end}' ({draft.type.name}): {text}", key=True)
-        self.problems.append(replace(problem, mistake=Mistake(end.port, problem.text, place=place)))
+        context = f"'{end}' ({draft.type.name}){doing}"
+        self.problems.append(draft.spec.value.relocate(problem, key=True, code=code, context=context))
 
     def _stop(self, end: Endpoint, code: str, text: str) -> NoReturn:
         self._say(end, code, text)
@@ -237,8 +239,8 @@ class Infer:
             elif isinstance(error, SceneError):
                 self._refused(draft, error)
             else:
-                said = happened(error, draft.type.cls)
-                self._say(end, "RG209", f"the rule for its {what} fails: {said}", said.place)
+                problem = happened(error, draft.type.cls, subject=end.port)
+                self._report(end, problem, "RG209", f": the rule for its {what} fails")
             raise _Unknown from None
 
     def _refused(self, draft: Draft, error: SceneError) -> None:

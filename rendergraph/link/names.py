@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from rendergraph.catalog import NodeType
 from rendergraph.declare import InOut, Input, Node, Port
 from rendergraph.document import Value, shown
-from rendergraph.errors import Place, Problem, suggestion
+from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
 from rendergraph.read import NAME, word
 from rendergraph.resolve import NodeSpec, PipelineSpec
@@ -82,14 +82,6 @@ class Draft(Struct, eq=False):
         return self.unlit or self.spec.disabled is not None
 
 
-class Wrong(Exception):
-    """A link that leads nowhere; carries None where that has been said before."""
-
-    def __init__(self, problem: Problem | None) -> None:
-        self.problem = problem
-        super().__init__(problem)
-
-
 class References:
     """Follows references through sub-pipelines to ports."""
 
@@ -109,13 +101,13 @@ class References:
             None where it leads to an optional input of a sub-pipeline that is not connected.
 
         Raises:
-            Wrong: it leads nowhere.
+            InputError: it leads nowhere; without problems where the reason has been reported.
         """
         text = str(value.data)
         match = _LINK.match(text)
         if match is None:
             text = f"'{shown(text)}' is no link; write node.port, or a node's id for its port '{wanted}'"
-            raise Wrong(value.problem("RG113", text))
+            raise InputError(value.problem("RG113", text))
         found = self._follow(scope, match[1], match[2], wanted, value, 0)
         if found is None:
             return None
@@ -149,27 +141,28 @@ class References:
 
     def _follow(self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
         if depth > 100:
-            raise Wrong(value.problem("RG117", f"'{shown(value.data)}' leads back to itself; link it to a node's port"))
+            text = f"'{shown(value.data)}' leads back to itself; link it to a node's port"
+            raise InputError(value.problem("RG117", text))
         if name == "inputs" and scope:
             return self._outside(scope, port or wanted, value, depth)
         if name == "inputs" and (declared := self.spec.tree.get("inputs", port or wanted)):
             optional = declared.get("optional")
             if optional is not None and optional.data:
                 return None
-            raise Wrong(None)  # a sub-pipeline run on its own
+            raise InputError(())  # a sub-pipeline run on its own
         inner = self.spec.scopes.get(f"{scope}{name}/")
         if inner is not None:
             return self._inside(f"{scope}{name}/", port, wanted, value, depth)
         node = self.spec.nodes.get(f"{scope}{name}")
         if node is None and (("nodes", name) in self.spec.dropped or not self.spec.nodes):
-            raise Wrong(None)
+            raise InputError(())
         if node is None:
-            raise Wrong(self.no_node(scope, name, value))
+            raise InputError(self.no_node(scope, name, value))
         node_type = self.types.get(node.id)
         if node_type is None:
-            raise Wrong(None)
+            raise InputError(())
         if (port or wanted) not in node_type.cls.outputs():
-            raise Wrong(value.problem("RG112", self._no_output(node, node_type, port, wanted, value)))
+            raise InputError(value.problem("RG112", self._no_output(node, node_type, port, wanted, value)))
         return Link(Endpoint(node.id, port or wanted), value)
 
     def _outside(self, scope: str, port: str, value: Value, depth: int) -> Link | None:
@@ -177,17 +170,17 @@ class References:
         found = self.spec.scopes[scope]
         if port not in found.inputs:
             text = f"the sub-pipeline has no input '{port}'{suggestion(port, found.inputs)}"
-            raise Wrong(value.problem("RG111", text))
+            raise InputError(value.problem("RG111", text))
         given = found.links.get(port)
         if given is None or given.data is None:
             optional = found.inputs[port].get("optional")
             if optional is not None and optional.data:
                 return None
-            raise Wrong(None)  # said at the node
+            raise InputError(())  # said at the node
         match = _LINK.match(given.data) if isinstance(given.data, str) else None
         if match is None:
             kind = "takes one link" if isinstance(given.data, list) else "takes a link as in node.port"
-            raise Wrong(given.problem("RG113", f"input '{port}' of sub-pipeline '{scope[:-1]}' {kind}"))
+            raise InputError(given.problem("RG113", f"input '{port}' of sub-pipeline '{scope[:-1]}' {kind}"))
         link = self._follow(found.parent, match[1], match[2], port, given, depth + 1)
         if link is None:
             return None
@@ -202,11 +195,11 @@ class References:
         if inner is None:
             name = shown(scope[:-1])
             text = f"sub-pipeline '{name}' has no output '{port or wanted}'{suggestion(port or wanted, outputs)}"
-            raise Wrong(value.problem("RG112", text))
+            raise InputError(value.problem("RG112", text))
         match = _LINK.match(str(inner.data))
         if match is None:
             text = f"'{shown(inner.data)}' is no link; write node.port, or a node's id for its port '{port or wanted}'"
-            raise Wrong(inner.problem("RG113", text))
+            raise InputError(inner.problem("RG113", text))
         link = self._follow(scope, match[1], match[2], port or wanted, inner, depth + 1)
         if link is None:
             return None
@@ -231,5 +224,5 @@ def _last(source: Endpoint) -> Endpoint:
 def line_of(place: Place, here: Place) -> str:
     """A place for a message that already names a file: its line, with the file where that is another one."""
     if not place.line:
-        return place.file
-    return f"line {place.line}" if place.file == here.file else f"{place.file}:{place.line}"
+        return str(place.origin)
+    return f"line {place.line}" if place.origin == here.origin else f"{place.origin}:{place.line}"

@@ -55,8 +55,8 @@ def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], err
     """What a node's own check says; at the value without which it would say nothing, where there is one such."""
     who = node_named(spec.id, node_type.name)
     if not isinstance(error, ValueError):
-        text = f"{who}: its own checks fail: {happened(error, node_type.cls)}"
-        return spec.value.problem("RG209", text, key=True)
+        problem = happened(error, node_type.cls)
+        return spec.value.relocate(problem, key=True, code="RG209", context=f"{who}: its own checks fail")
     guilty = []
     for name in values:
         try:

@@ -6,8 +6,6 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 
-from msgspec.structs import replace
-
 from rendergraph.catalog import NodeType
 from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
@@ -242,4 +240,4 @@ def _placed(problem: Problem, text: StageText, names: Sequence[str]) -> Problem:
     from rendergraph.program.messages import declared_at, mentioned_at  # where something is wrong alone
 
     found = declared_at(text.source, names) or mentioned_at(text.source, names)
-    return replace(problem, place=found[0], line_text=found[1]) if found is not None else problem
+    return problem.relocate(*found) if found is not None else problem

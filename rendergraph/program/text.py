@@ -114,7 +114,7 @@ def stage_texts(
             try:
                 texts[stage] = _stage(stage, shaders[stage], *args)
             except InputError as error:  # a file that is not there stands nowhere but in the call that names it
-                raise InputError([p if p.place else step.problem(p.code, p.text) for p in error.problems]) from error
+                raise InputError([p if p.place else step.relocate(p) for p in error.problems]) from error
     return texts
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, Value, YamlLimits, from_plain
-from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
+from rendergraph.errors import InputError, Option, Place, Problem, shown_file, suggestion
 from rendergraph.keys import Walk, plain
 from rendergraph.read import CODES, SIZE, checked, entries, read, word
 from rendergraph.resolve.files import Files
@@ -65,9 +65,9 @@ def resolve(
         tree = files.patched(tree, _patch(patch, files, limits))
     overrides: dict[str, Value] = {}
     if scene is not None:
-        overrides["scene"] = Value(str(scene), Source(f"--scene {scene}", Path.cwd() / "--scene"))
+        overrides["scene"] = Value(str(scene), Source(Option("--scene", str(scene)), Path.cwd() / "--scene"))
     if size is not None:
-        overrides["size"] = from_plain(list(size), Source(f"--size {size[0]}x{size[1]}"))
+        overrides["size"] = from_plain(list(size), Source(Option("--size", f"{size[0]}x{size[1]}")))
     tree = tree.with_data({**_parts(tree), **overrides})
     settled, problems = patch_of(tree, [s for s in wanted if not s.scope], files.names_of)
     files.problems += problems
@@ -138,7 +138,7 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
 
 def _patch(patch: Path | Mapping[str, Any], files: Files, limits: YamlLimits) -> Value:
     if isinstance(patch, Mapping):
-        document = Document(from_plain(patch, source := Source("patch")), source)
+        document = Document(from_plain(patch, source := Source(Option("patch"))), source)
         document = checked(document, keep_going=True, patch=True)
     else:
         document = read(Path(patch), None, limits, keep_going=True, patch=True)

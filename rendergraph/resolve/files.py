@@ -147,7 +147,7 @@ class Files:
         try:
             document = read(path, None, self.limits, keep_going=True)
         except InputError as error:
-            problems = [p if p.place else value.problem(p.code, p.text) for p in error.problems]
+            problems = [p if p.place else value.relocate(p) for p in error.problems]
             raise InputError([*self.problems, *problems]) from None
         self.own(document, roots)
         return document

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from msgspec.structs import replace
-
 from rendergraph.annotations import Range, fits, words_for
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
@@ -64,7 +62,7 @@ class Flattener:
         return tree.with_data(top)
 
     def _warn(self, problem: Problem) -> None:
-        self.files.notes.append(replace(problem, severity="warning"))
+        self.files.notes.append(problem.as_warning())
 
     def _node(
         self,

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Set
 from typing import Any
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from rendergraph.document import Value
 from rendergraph.errors import Problem
@@ -133,7 +132,7 @@ def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNam
 
 
 def _note(new_type: Value, text: str) -> Problem:
-    return replace(new_type.problem("RG150", text), severity="warning")
+    return new_type.problem("RG150", text).as_warning()
 
 
 def _unlinked(

@@ -10,8 +10,6 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from rendergraph.catalog import SHADERS, Catalog, find
 from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, shown_file
@@ -121,7 +119,7 @@ class Plugins:
             named = shlex.quote(shown_file(folder))
             self.unrun |= dict.fromkeys((file.stem for file in strange), named)
             problem = value.problem("RG152", words + f"where you trust it, say --plugin {named}")
-            self.notes.append(replace(problem, severity="warning"))
+            self.notes.append(problem.as_warning())
 
 
 def is_shader(text: object) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from msgspec import Struct
 
 from rendergraph.document import Source, Value, from_plain, parse, shown
-from rendergraph.errors import InputError, Problem, UsageError, nearest, suggestion
+from rendergraph.errors import InputError, Option, Place, Problem, UsageError, nearest, suggestion
 from rendergraph.read import entries
 from rendergraph.resolve.merge import NamesOf, TypeNames
 
@@ -49,7 +49,7 @@ def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
     given = sets.items() if isinstance(sets, Mapping) else (_split(text) for text in sets)
     for path, raw in given:
         is_text = not isinstance(sets, Mapping)
-        source = Source(f"--set {shown(f'{path}={raw}' if is_text and raw is not None else path, 80)}")
+        source = Source(Option("--set", f"{path}={raw}" if is_text and raw is not None else path))
         match = re.match(_PATH, path)
         if raw is None and is_text:
             problems.append(source.problem("RG120", "a setting is written PATH=VALUE, as in light.ambient=0.1"))
@@ -60,7 +60,7 @@ def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
             try:
                 value = _value(str(raw), source) if is_text else from_plain(raw, source)
             except InputError as error:
-                problems += [source.problem("RG120", problem.text) for problem in error.problems]
+                problems += [problem.relocate(Place(source.origin), code="RG120") for problem in error.problems]
             else:
                 scope = tuple(match[1].split("/")[:-1])
                 found.append(Setting(scope, match[2], match[3], value, path))
@@ -77,7 +77,7 @@ def _split(text: str) -> tuple[str, str | None]:
 def _value(text: str, source: Source) -> Value:
     if text.lstrip().startswith("#"):
         return Value(text, source)  # a colour, most likely; YAML would see a comment
-    return _moved(parse(text, source.name).root, source)
+    return _moved(parse(text, source.origin).root, source)
 
 
 def _moved(value: Value, source: Source) -> Value:

@@ -79,4 +79,4 @@ def _short(source: Source) -> str:
     shipped = folder("rendergraph.pipelines")
     if source.path is not None and source.path.is_relative_to(shipped):
         return source.path.stem
-    return source.name
+    return str(source.origin)

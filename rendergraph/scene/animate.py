@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from rendergraph.errors import InputError, Place, Problem, suggestion
+from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.projection import unit
 from rendergraph.scene import scene_build
 from rendergraph.scene.environments import shipped
@@ -52,7 +52,7 @@ def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE)
     if camera_name is not None:
         if camera_name not in cameras:
             text = f"the scene has no camera '{camera_name}'{suggestion(camera_name, cameras)}"
-            raise InputError(Problem("RG322", text, Place(f"--camera {camera_name}")))
+            raise InputError(Problem("RG322", text, Place(Option("--camera", camera_name))))
         cameras = {camera_name: cameras[camera_name], **cameras}
     first = next(iter(cameras.values()))
     scene = replace(scene, cameras=cameras)

@@ -112,7 +112,7 @@ class Reading(Struct):
     def add_warnings(self, problems: Iterable[Problem]) -> None:
         """Take over what another file's reader warned of."""
         for problem in problems:
-            self._warnings.setdefault((problem.code, problem.text, str(problem.place)), problem)
+            self._warnings.setdefault((problem.code, problem.message, str(problem.place)), problem)
 
     def named(self, path: Path) -> str:
         """A path for messages: relative to this file's folder where it lies below."""

@@ -49,8 +49,13 @@ def read_scene(path: Path, reading: Reading) -> Scene:
     reader = _Reader(path, reading, Walk(scene_keys.CODES, document.problems))
     scene = reader.read(document.root)
     if reader.walk.problems:
-        raise InputError(sorted(reader.walk.problems, key=lambda problem: (problem.place is None, problem.place)))
+        raise InputError(sorted(reader.walk.problems, key=_by_place))
     return scene
+
+
+def _by_place(problem: Problem) -> tuple[bool, str, int, int]:
+    place = problem.place
+    return (False, place.file, place.line, place.column) if place else (True, "", 0, 0)
 
 
 class _File(Struct):
@@ -153,7 +158,7 @@ class _Reader:
         """Keep problems of a named file; those without a place of their own get the name's."""
         for found in problem.problems:
             if found.place is None or found.place.file == str(self.path):
-                found = place.problem(found.code, found.text)
+                found = place.relocate(found)
             self.walk.problems.append(found)
 
     def _light(self, name: str, entry: Value) -> None:
@@ -331,7 +336,7 @@ class _Reader:
             raise self._over(entry, f"{len(self.made.objects):,} objects", "objects")
 
     def _over(self, entry: Value, what: str, limit: str) -> InputError:
-        return InputError(entry.problem("RG307", self.reading.over(what, limit).problems[0].text))
+        return self.reading.over(what, limit).relocated(entry.relocate)
 
     # Keyframes --------------------------------------------------------------------------------------------------------
 

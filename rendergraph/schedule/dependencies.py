@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from rendergraph.errors import InputError, Mistake, Problem
+from rendergraph.errors import InputError, Problem
 from rendergraph.link.graph import upstream_first
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
@@ -123,7 +123,7 @@ def contributing(
             text = f"output '{name}' shows '{id}', but no step writes it; write it in the node's `record`"
             maker = next((step for step in steps if step.node == id.rpartition(".")[0]), None)
             place = maker.where.place if maker is not None else None
-            problems.append(Problem("RG604", text, place, mistake=Mistake(id, text)))
+            problems.append(Problem("RG604", text, place, subject=id))
     while stack:
         step = stack.pop()
         if step.key in kept:
@@ -150,7 +150,7 @@ def contributing(
             elif isinstance(resource.desc, TextureDesc) and (write.load == "load" or step.kind == "mipmaps"):
                 problems.append(_loads_nothing(step, write.resource))
     if problems:
-        raise InputError(sorted(set(problems), key=lambda problem: (problem.code, problem.text)))
+        raise InputError(sorted(set(problems), key=lambda problem: (problem.code, problem.message)))
     return [step for step in steps if step.key in kept]
 
 
@@ -283,7 +283,7 @@ def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str,
         return Problem("RG607", text, step.where.place)
     if maker != step.node and not versions.writers.get(resource):
         text = f"node '{step.node}' reads '{resource}', but no step of '{maker}' writes it; write it in its `record`"
-        return Problem("RG604", text, step.where.place, mistake=Mistake(resource, text))
+        return Problem("RG604", text, step.where.place, subject=resource)
     text = (
         f"it reads '{resource}', but no step has written it by then; "
         "write it in an earlier step, or declare it `History` to read last frame's value"

@@ -21,7 +21,7 @@ import rendergraph.resolve
 import rendergraph.schedule
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.scene.animate import complete
 from rendergraph.scene.cameras import environment_facts, light_facts
 from rendergraph.scene.model import Scene
@@ -53,7 +53,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     for folder in selection.asset_roots:
         if not folder.is_dir():
             text = f"'{folder}' is a file, a folder is needed" if folder.exists() else f"there is no folder '{folder}'"
-            raise InputError(Problem("RG011", text, Place("--asset-root")))
+            raise InputError(Problem("RG011", text, Place(Option("--asset-root"))))
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))
     source: str | Document = selection.source
@@ -78,7 +78,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     )
     if spec.tree.get("rendergraph") is None:
         text = "the file does not say which version of the format it is written in; begin it with rendergraph: 1"
-        note = replace(spec.tree.problem("RG016", text), severity="warning")
+        note = spec.tree.problem("RG016", text).as_warning()
         spec = replace(spec, notes=(*spec.notes, note))
     return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps)
 
@@ -87,8 +87,7 @@ def _environment(selection: Selection, picture: Made) -> Path | None:
     """The environment that a picture names: whoever draws it again has not typed that."""
     path = picture.environment
     if path is not None:
-        place = Place(f"{selection.source}: environment")
-        Roots.around(Path("x"), selection.asset_roots).check(path, place)
+        Roots.around(Path("x"), selection.asset_roots).check(path, Place(str(selection.source)))
     return path
 
 

@@ -29,7 +29,7 @@ def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
         try:
             wanted[tap] = _tapped(graph, tap)
         except InputError as error:
-            problems += [Problem("RG206", f"--tap {tap}: {problem.text}") for problem in error.problems]
+            problems += [p.relocate(None, code="RG206", context=f"--tap {tap}") for p in error.problems]
             continue
         end = wanted[tap].end
         node = graph[end.node]

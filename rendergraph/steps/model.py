@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from rendergraph.errors import Mistake, Place, Problem, node_named, shown_file
+from rendergraph.errors import Place, Problem, node_named, shown_file
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, Sampler, TextureDesc
 
@@ -184,9 +184,13 @@ class Step(Struct, frozen=True, gc=False):
 
     def problem(self, code: str, text: str, subject: str = "") -> Problem:
         """What is wrong with the step, as `node 'id' (type): file:line: …`, at the node's place in the pipeline."""
+        return self.relocate(Problem(code, text, subject=subject))
+
+    def relocate(self, problem: Problem) -> Problem:
+        """A problem that was found without knowing the step, as one of the step."""
         caller = self.where.caller
         line = Place(shown_file(caller[0]), caller[1], 1) if caller is not None else None
-        return Mistake(subject, text, place=line).problem(code, node_named(self.node, self.type), self.where.place)
+        return problem.relocate(self.where.place, context=node_named(self.node, self.type), cause=line)
 
     @property
     def key(self) -> tuple[str, int]:

@@ -285,8 +285,8 @@ class Painter:
 
     def _node_at(self, place: Place) -> str | None:
         """The node that stands at a place, is set there, or is made of that file."""
-        if place.file.startswith(_SET):
-            return place.file.removeprefix(_SET).partition("=")[0].partition(".")[0]
+        if (setting := place.option("--set")) is not None:
+            return setting.path.partition(".")[0]
         if self._planned is None:
             return None
         if (id := self._sources.get(place.file)) is not None:
@@ -296,9 +296,6 @@ class Painter:
             (n.place.line, n.id) for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line
         ]
         return max(above)[1] if above else None
-
-
-_SET = "--set "
 
 
 def _sources(planned: Planned) -> dict[str, str]:

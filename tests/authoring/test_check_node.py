@@ -621,7 +621,7 @@ class Glow(base.ForwardLighting):
 '''
     (problem,) = check_node(written(tmp_path, text)).problems
     assert (problem.code, problem.severity) == ("RG425", "warning")
-    assert problem.text.endswith("; tried without 'depth', which is inherited")
+    assert problem.message.endswith("; tried without 'depth', which is inherited")
     one_of_them = text.replace("Radiance, clear=0.0, samples=lambda node, facts: 4", "Radiance, clear=0.0")
     broken = check_node(written(tmp_path, one_of_them))
     assert any(problem.severity == "error" for problem in broken.problems)

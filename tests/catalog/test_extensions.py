@@ -158,8 +158,8 @@ def test_mistakes_name_the_plugin_and_its_file(write: Write, wrong: str, said: s
     (problem,) = found(home).extensions.problems
     assert problem.place is not None
     assert problem.place.file == str(home / "extension.py")
-    assert "'sketch'" in problem.text
-    assert re.search(said, problem.text), problem.text
+    assert "'sketch'" in problem.message
+    assert re.search(said, problem.message), problem.message
 
 
 def test_what_a_choice_needs_must_be_on_offer(write: Write) -> None:

@@ -67,7 +67,7 @@ def problems_of(file: Path, **options: Any) -> list[Problem]:
 
 
 def messages(file: Path, **options: Any) -> list[str]:
-    return [f"{p.place}: {p.code} {p.text}".removeprefix(f"{file}:") for p in problems_of(file, **options)]
+    return [f"{p.place}: {p.code} {p.message}".removeprefix(f"{file}:") for p in problems_of(file, **options)]
 
 
 # --- by path ---------------------------------------------------------------------------------------------------------
@@ -141,7 +141,7 @@ def test_a_path_on_the_command_line_is_the_users_own(
     sets = [f"effect.type={os.path.relpath(folder / 'times.frag')}", "effect.color=display.color", "effect.gain=3"]
     spec = spec_of(folder / "p.yaml", sets=sets)
     assert dict(link(spec, Catalog.discover())["effect"].node) == {"gain": 3.0}
-    assert [note.text for note in spec.notes] == [
+    assert [note.message for note in spec.notes] == [
         f"node 'effect' is now '{os.path.relpath(folder / 'times.frag')}', which has no input 'radiance' of 'tonemap'; "
         "dropped"
     ]
@@ -236,7 +236,7 @@ def test_two_of_one_name_are_both_named(write: Write) -> None:
     )
     (problem,) = problems_of(folder / "p.yaml")
     assert problem.code == "RG493"
-    assert problem.text == (
+    assert problem.message == (
         f"node type 'glow' comes from 'one' ({folder}/one/glow.frag) and 'two' ({folder}/two/deep/glow.comp); rename one"
     )
 
@@ -248,7 +248,7 @@ def test_of_two_of_one_name_it_is_said_who_names_them(write: Write, monkeypatch:
     monkeypatch.setenv("RENDERGRAPH_PATH", "b")
     with pytest.raises(InputError) as caught:
         Catalog.discover([Path("c")]).get("glow")
-    assert caught.value.problems[0].text == (
+    assert caught.value.problems[0].message == (
         "node type 'glow' comes from 'a' (a/glow.frag, which rendergraph.toml names) and 'b' (b/glow.frag, which "
         "RENDERGRAPH_PATH names) and 'c' (c/glow.frag, given as a plugin); rename one"
     )

@@ -115,7 +115,7 @@ def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError) as caught:
         read_sweep(path)
-    told = [f"{p.place.line if p.place else 0} {p.text}" for p in caught.value.problems]
+    told = [f"{p.place.line if p.place else 0} {p.message}" for p in caught.value.problems]
     assert told == [
         "1 'sweep' takes 1, the version of the format that this program reads, as in sweep: 1, this is 2",
         "2 a sweep has no key 'axis'; did you mean 'axes'?",

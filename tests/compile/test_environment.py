@@ -201,7 +201,7 @@ def test_light_that_cannot_be_is_replaced_and_said(gl: rg.Session, plugins: Path
     frame = gl.render(pipeline(plugins, SEEN_NODES, SEEN_OUTPUTS, scene=lit(tmp_path, "environment: {file: e.exr}")))
     found = frame["copied"][..., 0]
     np.testing.assert_array_equal(found, [[0, 0, 1, 1], [1, 1, 65504, 1]])
-    said = " ".join(problem.text for problem in frame.warnings)
+    said = " ".join(problem.message for problem in frame.warnings)
     assert "1 pixel is NaN" in said
     assert "1 pixel is negative" in said
     assert "1 pixel is infinite or beyond 65504" in said

@@ -223,7 +223,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     except InputError as error:
         for problem in error.problems:
             assert problem.code.startswith("RG0")
-            assert problem.text.isprintable()
+            assert problem.message.isprintable()
             assert str(problem).encode()
     else:
         walk(document, (), document.value)

@@ -32,7 +32,7 @@ def problems_of(path: Path, sets: list[str], catalog: Catalog) -> tuple[Problem,
 
 def message(problem: Problem, path: Path) -> str:
     place = f"{problem.place}: " if problem.place else ""
-    text = f"{place}{problem.code} {problem.text}".removeprefix(f"{path}:")
+    text = f"{place}{problem.code} {problem.message}".removeprefix(f"{path}:")
     return re.sub(r"[^\s:]*toys\.py:\d+", "toys.py:LINE", text.replace(f"{FOLDER}/", ""))
 
 
@@ -43,7 +43,7 @@ def test_wrong_file_gets_its_messages(path: Path, toy_catalog: Catalog) -> None:
     sets = [word for line in lines if line.startswith("# -s ") for word in shlex.split(line[2:]) if word != "-s"]
     found = problems_of(path, sets, toy_catalog)
     assert [message(problem, path) for problem in found] == expected
-    assert all("\n" not in problem.text for problem in found)
+    assert all("\n" not in problem.message for problem in found)
 
 
 def test_there_are_many() -> None:

@@ -181,7 +181,7 @@ def message_of(error: InputError) -> str:
     """A problem as its page has it: without the file, and without the line of text."""
     (found,) = error.problems
     place = f"{found.place.line}:{found.place.column}: " if found.place and found.place.line else ""
-    return f"{place}{found.code} {found.text}"
+    return f"{place}{found.code} {found.message}"
 
 
 @pytest.mark.parametrize("code", ["RG401", "RG402", "RG404", "RG405", "RG406"])

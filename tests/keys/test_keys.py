@@ -74,7 +74,7 @@ def walked(text: str) -> tuple[Value | None, Walk]:
 
 
 def told(text: str) -> list[str]:
-    return [f"{p.place.line}:{p.place.column} {p.code} {p.text}" for p in walked(text)[1].problems if p.place]
+    return [f"{p.place.line}:{p.place.column} {p.code} {p.message}" for p in walked(text)[1].problems if p.place]
 
 
 def test_what_is_right_stays_and_means_something() -> None:

@@ -234,7 +234,7 @@ def test_every_node_goes_or_is_named(name: str) -> None:
                 if name == "terms" and problem.code == "RG209":  # one picture fewer than there are labels
                     continue
                 assert problem.code == "RG132"
-                assert f"'{node}' is disabled (--set {node}.enabled=false)" in problem.text
+                assert f"'{node}' is disabled (--set {node}.enabled=false)" in problem.message
         else:
             assert graph.disabled == (node,)
             assert [*graph.members] == [other for other in nodes if other != node]

@@ -43,7 +43,7 @@ def linked(text: str, catalog: Catalog, lights: Sequence[LightFacts] = (SUN,), s
 def problems(text: str, catalog: Catalog, lights: Sequence[LightFacts] = (SUN,)) -> list[str]:
     with pytest.raises(InputError) as caught:
         linked(text, catalog, lights)
-    return [f"{problem.code} {problem.text}" for problem in caught.value.problems]
+    return [f"{problem.code} {problem.message}" for problem in caught.value.problems]
 
 
 def info(graph: Graph, text: str) -> Any:
@@ -87,8 +87,8 @@ def test_a_node_that_a_file_takes_away_is_named_with_the_line_that_does(toy_cata
         link(resolve(tmp_path / "mine.yaml", catalog=toy_catalog), toy_catalog, (SUN,))
     assert {problem.code for problem in caught.value.problems} == {"RG109"}
     for problem in caught.value.problems:
-        assert "there is no node 'prepass', " in problem.text
-        assert "mine.yaml:3 removes it; link to another node here, or to null" in problem.text
+        assert "there is no node 'prepass', " in problem.message
+        assert "mine.yaml:3 removes it; link to another node here, or to null" in problem.message
 
 
 def test_an_image_that_is_light_is_warned_about(toy_catalog: Catalog) -> None:

@@ -295,8 +295,8 @@ def test_messages_about_generated_lines_say_so() -> None:
 def test_warnings_are_left_out_where_there_are_errors(folder: Path) -> None:
     text = fragment(folder, step())
     found = compile_problems("0:1(1): warning: w\n0:1(1): error: e\n0:1(1): error: e", text)
-    assert [(p.severity, "e" in p.text) for p in found] == [("error", True)]
-    assert compile_problems("out of memory", text)[0].text == "node 'light': fragment shader: out of memory"
+    assert [(p.severity, "e" in p.message) for p in found] == [("error", True)]
+    assert compile_problems("out of memory", text)[0].message == "node 'light': fragment shader: out of memory"
 
 
 def test_link_messages_name_the_stages(folder: Path) -> None:
@@ -313,4 +313,4 @@ def test_a_function_that_its_file_does_not_define(folder: Path) -> None:
         fragment(folder, step("lamp"))
     (found,) = error.value.problems
     assert found.place is not None
-    assert f"{found.place.line}:{found.place.column}: {found.code} {found.text}" == page["message"]
+    assert f"{found.place.line}:{found.place.column}: {found.code} {found.message}" == page["message"]

@@ -257,7 +257,7 @@ def test_retyping_to_a_sub_pipeline(folder: Path, toy_catalog: Catalog) -> None:
     spec = resolve(folder / "again.yaml", catalog=toy_catalog)
     assert nodes_of(spec)["glow/blur"]["params"] == {"radius": 7}
     (note,) = spec.notes
-    assert "has no input 'source' of 'blur'; dropped" in note.text
+    assert "has no input 'source' of 'blur'; dropped" in note.message
 
 
 def test_null_disconnects_one_member_of_a_group(toy_catalog: Catalog) -> None:
@@ -351,7 +351,7 @@ def test_settings_inside(folder: Path, toy_catalog: Catalog) -> None:
     assert nodes["glow/again"]["params"] == {"radius": 9}
     assert nodes["glow/blur"] == {"type": "resolve", "inputs": {"source": "inputs.radiance"}, "params": {}}
     assert codes(spec) == []
-    assert "which has no param 'radius' of 'blur'" in spec.notes[0].text
+    assert "which has no param 'radius' of 'blur'" in spec.notes[0].message
 
 
 def test_sub_pipelines_in_sub_pipelines(folder: Path, toy_catalog: Catalog) -> None:

@@ -441,7 +441,7 @@ def test_a_texture_without_its_coordinates_is_said(tmp_path: Path) -> None:
         )
         warnings = read(tmp_path, top).warnings
         assert [problem.code for problem in warnings] == ["RG333"] * said
-        assert all("has no coordinates for its base_color texture" in problem.text for problem in warnings)
+        assert all("has no coordinates for its base_color texture" in problem.message for problem in warnings)
 
 
 def test_zero_normals_are_computed_and_said(tmp_path: Path) -> None:

@@ -425,7 +425,7 @@ def test_what_is_missing_under_the_root_rule_of_a_run_is_said(
     (tmp_path / "a.yaml").write_text("scene: 1\nobjects: {o: {file: a.obj}}\n")
     (warning,) = rg.load("forward", scene=tmp_path / scene).link().warnings
     assert (warning.code, warning.severity) == ("RG330", "warning")
-    assert says in warning.text
+    assert says in warning.message
     (tmp_path / "a.obj").write_text("mtllib ../../secret.mtl\n" + TRIANGLE + "f 1 2 3\n")
     with pytest.raises(InputError, match="RG012"):
         rg.load("forward", scene=tmp_path / scene).link()

@@ -214,9 +214,9 @@ def test_nothing_is_a_traceback(pipeline: rg.Pipeline, gl: rg.Session, method: s
         except InputError as error:
             refused += 1
             (problem,) = error.problems
-            assert "node 'a' (odd)" in problem.text, (value, problem.text)
-            assert "Error: " not in problem.text, (value, problem.text)
-            assert "test_odd_arguments.py:" in problem.text, (value, problem.text)
+            assert "node 'a' (odd)" in problem.message, (value, problem.message)
+            assert "Error: " not in problem.message, (value, problem.message)
+            assert "test_odd_arguments.py:" in problem.message, (value, problem.message)
             continue
         try:  # what may be recorded may be drawn, or the shader or the device does not fit
             gl.render(pipeline, warm_up=False)
