@@ -5,6 +5,7 @@ WORKERS ?= 2
 
 # Mesa compiles each shader once and keeps it here, for all workers and for later runs: compiling takes most of the tests' time.
 export MESA_SHADER_CACHE_DIR ?= $(CURDIR)/.cache/mesa
+$(shell mkdir -p $(MESA_SHADER_CACHE_DIR))
 
 .PHONY: check nightly format lint types imports docs pages pictures test quick clean
 

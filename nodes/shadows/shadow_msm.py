@@ -10,11 +10,11 @@ from ._filtered_map import FilteredMap, filtered_lookup
 
 
 class ShadowMSM(FilteredMap):
-    """Shadows from the means of four powers of depth (Peters and Klein 2015).
+    """Bound the shadow by four moments of depth (Peters and Klein 2015).
 
-    Two moments of `shadow_vsm` bound what lies before a receiver, and bleed light where casters lie over one another;
-    four bound it more closely. The bound is the least that any distribution with these means has there, so surfaces
-    are never darker than right, and never shadow themselves.
+    The two moments of `shadow_vsm` bound the shadow only loosely, so light bleeds where the shadows of several casters
+    overlap. Four moments give a tighter bound. It is a lower bound of the shadow: surfaces are never too dark and never
+    shadow themselves.
     """
 
     down: ClassVar[str] = "shadow_msm_down.frag"
@@ -23,10 +23,10 @@ class ShadowMSM(FilteredMap):
     lookup = filtered_lookup("shadow_msm.glsl")
 
     moment_bias: float = param(
-        default=3e-5,
+        default=1e-6,
         min=1e-7,
         max=0.1,
-        doc="How far the means are moved from those of one surface, which float cannot hold.",
+        doc="How far the moments are moved towards those of a spread-out distribution, against rounding errors.",
     )
     light_bleeding: float = param(
         default=0.02,

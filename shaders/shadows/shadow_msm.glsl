@@ -2,15 +2,16 @@
 #include "filtered_map.glsl"
 #include "range_fraction.glsl"
 
-uniform sampler2DArray filtered;  // means of z to z^4 over the filter, 0 where nothing is
+uniform sampler2DArray filtered;  // moments of z (-1 to 1) to z^4 over the filter, 0 where the map is empty
 uniform float moment_bias;
 uniform float light_bleeding;
 
-// The least that can lie before t of something with these means: of all that has them, one thing at t and two elsewhere
-// has least there. The other two are the zeros of the polynomial that is orthogonal to those below it under the means.
+// Lower bound of the fraction of a distribution with moments b that lies before t. Of all distributions with these
+// moments, the one with the least mass before t has three points: t and the two roots of an orthogonal polynomial.
 float share_before(vec4 b, float t) {
-    b = mix(b, vec4(0.5), moment_bias);
-    // Solve the matrix of means (1 b1 b2; b1 b2 b3; b2 b3 b4) for (1, t, t^2), by Cholesky's way.
+    // Towards the moments of a spread-out distribution, away from the limit of what is possible (Peters and Klein 2015).
+    b = mix(b, vec4(0.0, 0.375, 0.0, 0.375), moment_bias);
+    // Solve the Hankel matrix (1 b1 b2; b1 b2 b3; b2 b3 b4) for (1, t, t^2) by a Cholesky decomposition.
     float variance = b.y - b.x * b.x;
     float skew = b.z - b.x * b.y;
     float rest = (b.w - b.y * b.y) * variance - skew * skew;
@@ -29,10 +30,10 @@ float share_before(vec4 b, float t) {
 }
 
 float map_visibility(int layer, vec3 place) {
-    float t = range_fraction(MAP_VIEWS[layer], place);
+    float t = 2.0 * range_fraction(MAP_VIEWS[layer], place) - 1.0;
     vec3 at = vec3(place.xy, float(layer));
     float t2 = t * t;
-    // Where nothing is drawn lies the receiver itself.
+    // An uncovered texel counts as lying at the receiver.
     vec4 b = textureLod(filtered, at, 0.0) + (1.0 - textureLod(covered, at, 0.0).r) * vec4(t, t2, t2 * t, t2 * t2);
     return clamp(1.0 - share_before(b, t) / (1.0 - light_bleeding), 0.0, 1.0);
 }

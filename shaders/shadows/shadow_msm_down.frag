@@ -1,5 +1,5 @@
-// Moments of the depth z in one layer of a shadow map, averaged along columns: z to z^4, and the share of texels where
-// something is.
+// The first four moments of depth in one layer of a shadow map, averaged along columns, and the share of covered texels.
+// Depth is mapped to z from -1 to 1: there the moments are far better conditioned in float32 than from 0 to 1.
 #include "range_fraction.glsl"
 
 uniform sampler2D shadow_map;
@@ -18,7 +18,7 @@ void main() {
         ivec2 other = ivec2(texel.x, clamp(texel.y + i, 0, last));
         float depth = texelFetch(shadow_map, other, 0).r;
         if (is_nothing(depth)) continue;
-        float z = range_fraction(view, vec3((vec2(other) + 0.5) * view.viewport.zw, depth));
+        float z = 2.0 * range_fraction(view, vec3((vec2(other) + 0.5) * view.viewport.zw, depth)) - 1.0;
         sum += vec4(z, z * z, z * z * z, z * z * z * z);
         covered += 1.0;
     }

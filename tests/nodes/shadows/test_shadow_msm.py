@@ -64,3 +64,18 @@ def test_it_bleeds_less_than_variance(look: Any, boxed: Any, bilinear: Any) -> N
         errors[kind] = float(np.quantile((seen.visibility - tests)[dark], 0.99))
     assert errors["shadow_vsm"] > 0.05
     assert errors["shadow_msm"] < 0.7 * errors["shadow_vsm"]
+
+
+@pytest.mark.slow
+def test_over_a_long_range_shadows_stay_dark_and_lit_floors_clean(look: Any, bilinear: Any) -> None:
+    """Moments of depths from 0 to 1 leave half of the shadow of this 300 metre road too bright."""
+    seen = look("shadow-vsm", "shadows.type=shadow_msm", scene="avenue", size=(192, 108), resolution=2048)
+    floor = seen.seen & (np.abs(seen.position[..., 1]) < 1e-3)
+    u, v, t = seen.places[..., 0], seen.places[..., 1], np.minimum(seen.places[..., 2], 1)
+    offsets = np.arange(-3, 4) / 2048
+    tests = np.mean([bilinear(seen.depth, u + x, v + y, t) for x in offsets for y in offsets], axis=0)
+    dark, lit = seen.seen & (tests == 0), floor & (tests == 1)
+    assert dark.sum() > 20
+    assert lit.sum() > 500
+    assert (seen.visibility[dark] > 0.1).mean() < 0.05
+    assert np.quantile(seen.visibility[lit], 0.002) > 0.95
