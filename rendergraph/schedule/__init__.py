@@ -1,16 +1,14 @@
-"""Steps to Schedule: what runs, in which order, and why.
+"""Steps to Schedule: which steps run, in which order, and why.
 
-What is minimised is what is allocated: the bytes of a pool of textures shared within a texel class, then the peak of
-live bytes. The least peak over all orders is found on its own and reported beside it (`lower_bound_bytes`, `proven`),
-as what a heap of bytes could reach. So an order above that peak is taken only where it allocates less.
+The order minimises what is allocated: the bytes of a pool of textures shared within a texel class, then the peak of
+live bytes. The least peak over all orders is searched for separately and reported beside it (`lower_bound_bytes`,
+`proven`), as what a heap of bytes could reach. So an order above that peak is taken only where it allocates less.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
-from itertools import combinations
-from typing import TYPE_CHECKING
 
 from msgspec import Struct, field
 from msgspec.structs import replace
@@ -18,31 +16,25 @@ from msgspec.structs import replace
 from rendergraph.errors import InputError, Problem
 from rendergraph.expand import Expansion
 from rendergraph.schedule.dependencies import (
+    ReadFirst,
     StepKey,
-    Turns,
     Versions,
     Waits,
     contributing,
     dependencies,
     history_copies,
-    in_turn,
-    readers_first,
+    read_first,
+    read_first_choices,
 )
 from rendergraph.schedule.model import Cost, Model, alive_all_frame
 from rendergraph.schedule.reasons import culled_reasons, order_reasons, step_names
 from rendergraph.schedule.seeds import program_order, random_order, seeds
 from rendergraph.steps import MOST_STEPS, Resource, Step
 
-if TYPE_CHECKING:
-    import networkx as nx
-
-# What a second of budget buys. Counts, so that a slow machine comes to the same schedule as a fast one, only later.
-MOVES_PER_SECOND = 150_000
-TOUCHES_PER_SECOND = 100_000
+# What a second of budget buys: resources looked at, so that a slow machine comes to the same schedule as a fast one.
+LOOKS_PER_SECOND = 1_000_000
 # Sets of steps are bit masks: beyond this the search would copy more than it decides.
 MOST_SEARCHED = 1_000
-MOST_IN_TURN = 4
-"""Histories of which each set is tried as those that take a second texture: 16 sets. Of more none or all do."""
 
 
 class Schedule(Struct, frozen=True, dict=True):
@@ -101,20 +93,9 @@ class Schedule(Struct, frozen=True, dict=True):
         """How many textures each history takes: one where it is read for the last time before it is written."""
         return history_copies(self.steps, self.resources)
 
-    @cached_property
-    def dependencies(self) -> nx.DiGraph[StepKey]:
-        """The same as a networkx graph: an edge from what must run earlier, with `resource` and `why`."""
-        import networkx as nx  # takes longer than scheduling
-
-        dag: nx.DiGraph[StepKey] = nx.DiGraph()
-        dag.add_nodes_from(self.waits)
-        for step, found in self.waits.items():
-            dag.add_edges_from((earlier, step, {"resource": r, "why": why}) for earlier, (r, why) in found.items())
-        return dag
-
 
 def schedule(
-    expansion: Expansion, *, budget_s: float = 1.0, shuffle: int | None = None, keep_order: bool = False
+    expansion: Expansion, *, budget_s: float = 0.5, shuffle: int | None = None, keep_order: bool = False
 ) -> Schedule:
     """Cull the steps nothing wanted needs and put the rest in the order that allocates least.
 
@@ -122,8 +103,8 @@ def schedule(
 
     Args:
         expansion: what the nodes recorded.
-        budget_s: how long to search, in seconds of an ordinary machine; counted in steps tried, not by a clock. Once
-            for each set of histories that could take a second texture, where that is not decided without.
+        budget_s: how long to search at most, in seconds of an ordinary machine; counted in resources looked at, not by
+            a clock.
         shuffle: seed of a random legal order instead, for tests.
         keep_order: the program's order instead, for debugging; where both are given this one counts.
 
@@ -142,35 +123,22 @@ def schedule(
     kept_versions = Versions.of(kept) if len(kept) < len(expansion.steps) else versions
     waits = dependencies(kept, kept_versions)
     sinks = _sinks(expansion, kept, versions)
-    whole_frame = {id: resources[id].bytes for id in alive_all_frame(resources, kept_versions)}
-
-    models: dict[Hashable, tuple[Waits, Model]] = {}  # with what is waited for, so that nothing else gets its id
-
-    def model_of(waits: Waits, copies: Mapping[str, int]) -> Model:
-        key = id(waits), frozenset(copies.items())
-        if key not in models:
-            alive = whole_frame | {id: resources[id].desc.bytes * number for id, number in copies.items()}
-            models[key] = waits, Model.of(waits, kept, resources, alive, shown, sinks)
-        return models[key][1]
-
-    each = [_least(model_of, waits, turns, resources, budget_s) for turns in readers_first(waits, kept, kept_versions)]
-    found = min(each, key=lambda found: (found.cost.pool, found.cost.peak))
-    found = replace(found, least=min(one.least for one in each), bound=min(one.bound for one in each))
-    order, chosen = found.order, None
+    whole_frame = frozenset(alive_all_frame(resources, kept_versions))
+    problem = _Problem(kept, waits, resources, shown, whole_frame, sinks)
+    found = _least(problem, read_first_choices(waits, kept, kept_versions, resources), budget_s)
+    model, order, chosen = found.model, found.order, None
     if keep_order or shuffle is not None:
-        model = model_of(waits, {})
+        model = problem.model(waits)
         if shuffle is None or keep_order:
             rank = {step.key: number for number, step in enumerate(expansion.steps)}
-            numbers, chosen = program_order(model, [rank[step.key] for step in model.steps]), "in the program's order"
+            order, chosen = program_order(model, [rank[step.key] for step in model.steps]), "in the program's order"
         else:
-            numbers, chosen = random_order(model, shuffle), f"drawn by seed {shuffle}"
-        order = tuple(model.steps[number] for number in numbers)
-    model = model_of(found.waits if chosen is None else waits, history_copies(order, resources))
-    number_of = {step.key: number for number, step in enumerate(model.steps)}
-    numbers = [number_of[step.key] for step in order]
-    peak, peak_step = model.peak(numbers)
+            order, chosen = random_order(model, shuffle), f"drawn by seed {shuffle}"
+    steps = tuple(model.steps[number] for number in order)
+    model = problem.with_copies(model, history_copies(steps, resources))
+    peak, peak_step = model.peak(order)
     return Schedule(
-        steps=order,
+        steps=steps,
         resources=resources,
         wanted=dict(expansion.wanted),
         culled={**culled_reasons(expansion.steps, kept, versions), **expansion.idle},
@@ -178,7 +146,7 @@ def schedule(
         peak_node=None if peak_step is None else model.steps[peak_step].node,
         least_peak_bytes=found.least,
         lower_bound_bytes=found.bound,
-        whole_frame=frozenset(whole_frame),
+        whole_frame=whole_frame,
         waits=waits,
         model=model,
         chosen=chosen,
@@ -193,76 +161,85 @@ def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> li
     return [step for step in finals if step is not None]
 
 
-class _Found(Struct, frozen=True):
-    """An order that allocates little, what it waited for, the least peak found, and one that no order is below."""
+class _Problem(Struct, frozen=True):
+    """What is scheduled, whatever the order: the steps, what they must wait for, and what they touch."""
 
-    cost: Cost
-    order: tuple[Step, ...]
+    kept: Sequence[Step]
     waits: Waits
+    resources: Mapping[str, Resource]
+    shown: set[str]
+    whole_frame: frozenset[str]
+    sinks: Sequence[Step]
+
+    def model(self, waits: Waits) -> Model:
+        """Return the steps as numbers, where they wait for what `waits` says."""
+        return Model.of(waits, self.kept, self.resources, self.whole_frame, self.shown, self.sinks)
+
+    def with_copies(self, model: Model, copies: Mapping[str, int]) -> Model:
+        """Return a model in which each history takes so many textures."""
+        whole = [self.resources[id] for id in self.whole_frame]
+        sizes = [one.desc.bytes * copies[one.id] if one.role == "history" else one.bytes for one in whole]
+        return replace(model, constant=sum(sizes))
+
+
+class _Found(Struct, frozen=True):
+    """An order that allocates little, what it costs, the least peak found, and one that no order is below."""
+
+    model: Model
+    order: Sequence[int]
+    cost: Cost
     least: int
     bound: int
 
 
-def _least(
-    model_of: Callable[[Waits, Mapping[str, int]], Model],
-    waits: Waits,
-    turns: Turns,
-    resources: Mapping[str, Resource],
-    budget_s: float,
-) -> _Found:
-    """The best order: one in which histories are read before they are written, or one where some take a second texture.
+def _least(problem: _Problem, first: ReadFirst, budget_s: float) -> _Found:
+    """Return the best order over all choices of histories that are read before they are written.
 
-    Args:
-        model_of: the steps with these waits, and so many textures of each history.
-        waits: what the steps wait for.
-        turns: the histories that can be read before they are written.
-        resources: what the steps touch.
-        budget_s: see `schedule`.
+    The other histories take a second texture. A choice is skipped where not even the least that its textures need
+    could be better than what was found.
     """
-    early = in_turn(waits, turns)
-    single = history_copies(model_of(early, {}).steps, resources)
-    first = _optimise(model_of(early, single), early, budget_s)
-    if not turns:
-        return first
-    # Every other order takes a second texture of one of them at least, of which only the smallest is sure.
-    more = {id: resources[id].desc.bytes for id in turns}
-    pool, peak = [bound + min(more.values()) for bound in model_of(waits, single).bounds()]
-    if first.cost.pool <= pool and first.least <= peak:
-        return first
-    every = len(turns) <= MOST_IN_TURN
-    found = [first]
-    for count in range(1, len(turns) + 1) if every else (len(turns),):
-        for twice in combinations(turns, count):
-            some = in_turn(waits, {id: turn for id, turn in turns.items() if id not in twice})
-            found.append(_optimise(model_of(some, single | dict.fromkeys(twice, 2)), some, budget_s))
-    best = min(found, key=lambda one: (one.cost.pool, one.cost.peak))
-    unsure = 0 if every else sum(more.values()) - min(more.values())
-    bound = min(first.bound, *[one.bound - unsure for one in found[1:]])
-    return replace(best, least=min(one.least for one in found), bound=bound)
+    base = problem.model(problem.waits)
+    single = history_copies(base.steps, problem.resources) | dict.fromkeys(first.turns, 1)
+    sizes = {id: problem.resources[id].desc.bytes for id in first.turns}
+    pool_floor, peak_floor = problem.with_copies(base, single).bounds() if len(first.choices) > 1 else (0, 0)
+    found: list[_Found] = []
+    for early in first.choices:
+        late = [id for id in first.turns if id not in early]
+        extra = sum(sizes[id] for id in late)
+        if found:
+            best, least = min(one.cost.pool for one in found), min(one.least for one in found)
+            if best <= pool_floor + extra and least <= peak_floor + extra:
+                continue
+        model = problem.model(read_first(problem.waits, {id: first.turns[id] for id in early})) if early else base
+        model = problem.with_copies(model, single | dict.fromkeys(late, 2))
+        found.append(_optimise(model, budget_s / len(first.choices)))
+    bound = min(one.bound for one in found)
+    if not first.exhaustive:
+        bound = min(bound, peak_floor + min(sizes.values()))
+    best_found = min(found, key=lambda one: (one.cost.pool, one.cost.peak))
+    return replace(best_found, least=min(one.least for one in found), bound=bound)
 
 
-def _optimise(model: Model, waits: Waits, budget_s: float) -> _Found:
-    """An order that allocates little, the least peak found, and a peak that no order is below."""
+_MOST_ORDERS = 256
+_orders: dict[Hashable, tuple[Sequence[int], Cost, int, int]] = {}
+"""What was found for a model before: most changes of a pipeline leave the order what it was."""
+
+
+def _optimise(model: Model, budget_s: float) -> _Found:
     key = model.content, budget_s
     if key not in _orders:
         if len(_orders) >= _MOST_ORDERS:
             _orders.clear()
-        _orders[key] = _ordered(model, budget_s)
-    cost, order, least, bound = _orders[key]
-    return _Found(cost, tuple(model.steps[step] for step in order), waits, least, bound)
+        _orders[key] = _ordered(model, int(budget_s * LOOKS_PER_SECOND))
+    return _Found(model, *_orders[key])
 
 
-_MOST_ORDERS = 256
-_orders: dict[Hashable, tuple[Cost, Sequence[int], int, int]] = {}
-"""What was found for a model before: most changes of a pipeline leave the order what it was."""
-
-
-def _ordered(model: Model, budget_s: float) -> tuple[Cost, Sequence[int], int, int]:
-    """Cost, numbers of the steps, the least peak found, the bound."""
+def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
+    """Numbers of the steps, cost, the least peak found, the bound."""
     if not len(model):
-        return Cost(model.constant, model.constant, 0), (), model.constant, model.constant
+        return (), Cost(model.constant, model.constant, 0), model.constant, model.constant
     pool_bound, bound = model.bounds()
-    orders = []
+    orders: list[tuple[Cost, Sequence[int]]] = []
     for order in seeds(model):
         orders.append((model.cost(order), order))
         if (orders[-1][0].pool, orders[-1][0].peak) == (pool_bound, bound):
@@ -271,21 +248,20 @@ def _ordered(model: Model, budget_s: float) -> tuple[Cost, Sequence[int], int, i
     if least > bound and len(model) <= MOST_SEARCHED:
         from rendergraph.schedule.search import search  # most pipelines are decided by now
 
-        found = search(model, below=least, bound=bound, budget=int(budget_s * MOVES_PER_SECOND))
-        bound = found.bound
-        if found.order is not None:
-            orders.append((model.cost(found.order), found.order))
+        better, bound = search(model, below=least, bound=bound, budget=budget)
+        if better is not None:
+            orders.append((model.cost(better), better))
             least = orders[-1][0].peak
     # Equal costs go to the order found first: the reading order wherever nothing is better.
     cost, best = min(orders, key=lambda pair: (pair[0].pool, pair[0].peak))
     if cost.pool > pool_bound and len(model) <= MOST_SEARCHED:
-        from rendergraph.schedule.improve import improve  # as above
+        from rendergraph.schedule.search import improve  # as above
 
-        better, improved = improve(model, best, pool_bound=pool_bound, budget=int(budget_s * TOUCHES_PER_SECOND))
+        better, improved = improve(model, best, pool_bound=pool_bound, budget=budget // 5)
         least = min(least, improved.peak)
         if (improved.pool, improved.peak) < (cost.pool, cost.peak):
             cost, best = improved, better
-    return cost, best, least, bound
+    return best, cost, least, bound
 
 
 __all__ = ["Schedule", "schedule", "step_names"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import islice, pairwise, permutations
+from itertools import combinations, pairwise
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -15,8 +15,8 @@ from rendergraph.link.graph import upstream_first
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
 
-MOST_TURNS = 720
-"""Orders in which histories are tried to be read before they are written: all of six."""
+MOST_TURNS = 4
+"""Histories of which each set is tried as those that are read before they are written: 16 sets."""
 
 StepKey: TypeAlias = tuple[str, int]
 """A step's `key`: node id and number."""
@@ -212,59 +212,69 @@ def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> 
     return copies
 
 
-def readers_first(waits: Waits, kept: Sequence[Step], versions: Versions) -> list[Turns]:
-    """The histories whose last value can be read before the next is written, where not every order is so by itself.
+class ReadFirst(Struct, frozen=True):
+    """Histories whose last value can be read before the next is written, where not every order does so by itself.
 
-    Returns:
-        As many as can be so together. One such set, but where one history's readers stand in the way of another's: each
-        that they can make.
+    Attributes:
+        turns: the histories.
+        choices: sets of them that can be read first together; the largest first, the empty one last.
+        exhaustive: whether these are all such sets.
     """
+
+    turns: Turns
+    choices: Sequence[Sequence[str]]
+    exhaustive: bool
+
+
+def read_first_choices(
+    waits: Waits, kept: Sequence[Step], versions: Versions, resources: Mapping[str, Resource]
+) -> ReadFirst:
+    """Return which histories can be read before they are written; of many, one large set that can be so together."""
     readers: dict[str, set[StepKey]] = defaultdict(set)
     for step in kept:
         for read in step.all_reads:
             if read.previous and versions.writers.get(read.resource):
                 readers[read.resource].add(step.key)
-    ids = sorted(readers)
+    turns: dict[str, tuple[StepKey, Sequence[StepKey]]] = {}
+    for id in sorted(readers):
+        writer = next(iter(versions.writers[id].values())).key
+        earlier, later = _reachable(waits, writer), {key for key in readers[id] if writer in _reachable(waits, key)}
+        loose = sorted(readers[id] - earlier)
+        if loose and not later:
+            turns[id] = writer, loose
 
-    def together(order: Sequence[str]) -> Turns:
-        more, turns = waits, {}
-        for id in order:
-            writers = versions.writers[id]
-            writer = writers[next(iter(writers))].key
-            loose = sorted(reader for reader in readers[id] if not _follows(waits, writer, reader))
-            if loose and not any(_follows(more, reader, writer) for reader in readers[id]):
-                turns[id] = writer, loose
-                more = in_turn(more, {id: turns[id]})
-        return turns
+    def together(ids: Iterable[str]) -> list[str]:
+        more, early = waits, []
+        for id in ids:
+            writer, loose = turns[id]
+            if all(writer not in _reachable(more, reader) for reader in loose):
+                more = read_first(more, {id: turns[id]})
+                early.append(id)
+        return early
 
-    found = together(ids)
-    if all(id in found or not together([id]) for id in ids):
-        return [found]
-    tried = map(together, islice(permutations(ids), MOST_TURNS))
-    return list({frozenset(turns): turns for turns in tried}.values())
+    if len(turns) > MOST_TURNS:
+        greedy = together(sorted(turns, key=lambda id: (-resources[id].desc.bytes, id)))
+        return ReadFirst(turns, [greedy, []], exhaustive=False)
+    sets = [ids for count in range(len(turns), -1, -1) for ids in combinations(turns, count)]
+    return ReadFirst(turns, [ids for ids in sets if len(together(ids)) == len(ids)], exhaustive=True)
 
 
-def in_turn(waits: Waits, turns: Turns) -> Waits:
-    """The same with the readers of some histories ahead of those who write them."""
-    if not turns:
-        return waits
+def read_first(waits: Waits, turns: Turns) -> Waits:
+    """Return the same with the readers of some histories ahead of the steps that write them."""
     more = dict(waits)
     for id, (writer, readers) in turns.items():
         more[writer] = {**more[writer], **dict.fromkeys(readers, (id, "overwrites"))}
     return more
 
 
-def _follows(waits: Waits, step: StepKey, other: StepKey) -> bool:
-    """Whether a step is another, or must run after it."""
+def _reachable(waits: Waits, step: StepKey) -> set[StepKey]:
+    """The step and all that it waits for."""
     seen, stack = {step}, [step]
     while stack:
-        key = stack.pop()
-        if key == other:
-            return True
-        fresh = [earlier for earlier in waits[key] if earlier not in seen]
+        fresh = [earlier for earlier in waits[stack.pop()] if earlier not in seen]
         seen.update(fresh)
         stack += fresh
-    return False
+    return seen
 
 
 def _two_writers(resource: str, one: Step, other: Step) -> Problem:

@@ -76,7 +76,7 @@ class Model(Struct, frozen=True):
         waits: Waits,
         kept: Sequence[Step],
         resources: Mapping[str, Resource],
-        whole_frame: Mapping[str, int],
+        whole_frame: Collection[str],
         shown: Collection[str],
         sinks: Sequence[Step],
     ) -> Model:
@@ -86,7 +86,7 @@ class Model(Struct, frozen=True):
             waits: step to the steps it waits for.
             kept: the steps.
             resources: what the steps touch.
-            whole_frame: ids and bytes of the resources that are alive during the whole frame.
+            whole_frame: ids of the resources that are alive during the whole frame; their bytes are not counted yet.
             shown: ids of the resources that are alive at its end.
             sinks: the steps the frame is rendered for, in a fixed order.
         """
@@ -133,7 +133,7 @@ class Model(Struct, frozen=True):
             tuple(toucher_count),
             ending,
             tuple(names),
-            sum(whole_frame.values()),
+            0,
         )
 
     def __len__(self) -> int:
@@ -223,8 +223,13 @@ class Model(Struct, frozen=True):
         size_of = dict(zip(self.classes, self.sizes, strict=True))
         at_end = [self.classes[resource] for resource in self.shown]
         pool = sum(size_of[kind] * max(*numbers, at_end.count(kind)) for kind, numbers in alive.items())
-        least = self.constant + sum(self.sizes[resource] for resource in self.shown)
-        return self.constant + pool, max(least, *live)
+        # Some step that nothing waits for runs last, beside all that is shown.
+        least = sum(self.sizes[resource] for resource in self.shown) + min(
+            sum(self.sizes[resource] for resource in self.touched[step] if resource not in self.shown)
+            for step in range(count)
+            if not self.after[step]
+        )
+        return self.constant + pool, max(self.constant + least, *live)
 
     def _descendants(self) -> list[int]:
         found = [0] * len(self)

@@ -1,129 +1,116 @@
-"""The least peak: a beam and a best-first search over the sets of steps that can have run."""
+"""The least peak of live bytes: beam searches of growing width over the sets of steps that can have run."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from heapq import heappop, heappush, nsmallest
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from itertools import count, pairwise
 
-from msgspec import Struct
+from rendergraph.schedule.model import Cost, Model
 
-from rendergraph.schedule.model import Model
-
-BEAM, LAST_BEAM = 64, 256
-"""States that a beam keeps after each step, before the search and when its budget has ended."""
+FIRST_WIDTH = 4
+MOST_REFINEMENTS = 32
+"""Rounds in which steps are told apart by their neighbours; twins further apart from the rest are not looked for."""
 
 
-class Found(Struct, frozen=True):
-    """What a search came to.
+def search(model: Model, *, below: int, bound: int, budget: int) -> tuple[list[int] | None, int]:
+    """Return an order of less peak than the best one known, None if none was found, and a peak that no order is below.
 
-    Attributes:
-        order: a legal order with a lower peak than asked, None where none was found.
-        bound: no legal order has a lower peak than this, or than what was asked where that is less.
-    """
-
-    order: list[int] | None
-    bound: int
-
-
-class _State(NamedTuple):
-    """A set of steps that can have run, and the best known way there."""
-
-    peak: int
-    live: int
-    place: int
-    done: int
-    ready: tuple[int, ...]
-
-
-def search(model: Model, *, below: int, bound: int, budget: int) -> Found:
-    """A legal order of least peak, if one is below a given peak; the best that the budget finds.
-
-    States are sets of steps closed under what they wait for. A beam first follows the most promising ones to the end,
-    and what it finds is beaten from then on. Then the cheapest peak so far is expanded first, and among equals the one
-    that got furthest, so that the first complete order is a least one. When the budget ends before, the cheapest state
-    that is left is a bound, and wider beams complete it and begin anew. Three rules keep the search small, none of
-    which loses the optimum:
+    States are sets of steps closed under what they wait for. A beam extends all its states by one step at a time and
+    follows only the most promising ones; each beam is four times as wide as the one before and must beat what that one
+    found. A beam that passes over nothing has seen every order that matters, so what was found is a least one. What it
+    passes over bounds what it can have missed. Two rules keep the number of states small and lose no optimum:
 
     - A step that raises neither the peak nor the live bytes is run at once. Whatever order the rest takes, bringing
       that step forward raises nothing: what it frees now is freed in every larger set as well.
-    - For the same reason a whole run of steps after which no more is alive than at its start, found without raising
-      the peak beyond what every other way needs, is kept, and all other ways from that start are dropped.
-    - Branches that an automorphism of the graph exchanges are interchangeable: of states that differ only in that, one
-      is looked at.
+    - Branches that an automorphism of the graph exchanges run in the order of their numbers (`twin_chains`).
 
     Args:
         model: the steps.
         below: peak of the best order known; states that reach it are dropped.
         bound: a peak that no order is below; up to there everything is free.
-        budget: steps to try before giving up, where a state costs more the more of it is symmetric. A count and not
-            a time, so that the result does not depend on the machine.
+        budget: resources to look at before giving up. A count and not a time, so that the result does not depend on
+            the machine.
     """
-    moves = _Moves(model)
-    start = _State(bound, model.constant, 0, 0, moves.first)
-    order, moves.below = None, below
-    if budget:
-        order = moves.beam(start, BEAM)
-    if moves.below <= bound:
-        return Found(order, bound)
-    # peak, minus the number of steps run, live bytes, place: no two places are equal, so no states are compared
-    heap: list[tuple[int, int, int, int, int, _State]] = [(bound, 0, model.constant, 0, 0, start)]
-    reached = {0: bound}
-    base_live = model.constant
-    while heap:
-        peak, depth, live, _, key, state = heappop(heap)
-        if peak > reached[key] or peak >= moves.below:
-            continue
-        if state.done == moves.full:
-            return Found(moves.path(state.place), peak)
-        if moves.made > budget:
-            for begun in (start, state) if budget else ():
-                order = moves.beam(begun, LAST_BEAM) or order
-            return Found(order, peak)
-        if live <= base_live and state.done:
-            base_live = live
-            heap.clear()
-            reached.clear()
-        for child, key in moves.after(state):
-            if reached.get(key, moves.below) > child.peak:
-                reached[key] = child.peak
-                heappush(heap, (child.peak, depth - 1, child.live, child.place, key, child))
-    return Found(order, moves.below)
+    beams = _Beams(model, budget)
+    order = None
+    for power in count():
+        if below <= bound:
+            break
+        better, passed_over = beams.run(FIRST_WIDTH << 2 * power, below, bound)
+        if beams.budget <= 0:
+            break
+        if better is not None:
+            order, below = better
+        if passed_over >= below:
+            return order, below
+        bound = max(bound, passed_over)
+    return order, bound
 
 
-class _Moves:
-    """From one set of steps to the next.
+Path = tuple["Path | None", int]
+"""The way to a state: the way to the one before, and the step taken last."""
+
+
+class _Beams:
+    """Beams over one model.
 
     Attributes:
-        below: states whose peak reaches it are dropped.
-        made: steps tried so far.
-        full: the set of all steps.
-        first: the steps that wait for nothing.
+        budget: resources that may still be looked at.
     """
 
-    def __init__(self, model: Model) -> None:
-        count = len(model)
-        self.below, self.made, self.full = 0, 0, (1 << count) - 1
-        self._needs = [sum(1 << other for other in earlier) for earlier in model.before]
-        self.first = tuple(step for step in range(count) if not self._needs[step])
-        masks = [1 << count if resource in model.shown else 0 for resource in range(len(model.sizes))]
+    def __init__(self, model: Model, budget: int) -> None:
+        self.budget = budget
+        self._constant, self._born = model.constant, model.born
+        before, after = list(map(list, model.before)), list(map(list, model.after))
+        for one, other in twin_chains(model):
+            before[other].append(one)
+            after[one].append(other)
+        self._needs = [sum(1 << earlier for earlier in set(steps)) for steps in before]
+        self._after = after
+        end = 1 << len(model)
+        masks = [end if resource in model.shown else 0 for resource in range(len(model.sizes))]
         for step, resources in enumerate(model.touched):
             for resource in resources:
                 masks[resource] |= 1 << step
         # Per step: masks and sizes of what it touches; a resource dies with the step that completes its mask.
         self._ends = [[(masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
-        self._born, self._after = model.born, model.after
-        self._twins = twin_branches(model)
-        self._price = sum(len(branch) for group in self._twins for branch in group) // 12
-        self._parents: list[tuple[int, int]] = [(-1, -1)]
 
-    def after(self, state: _State) -> list[tuple[_State, int]]:
-        """The states one step on, each with the canonical form of its set."""
-        peak, live, done, below = state.peak, state.live, state.done, self.below
-        found: list[tuple[int, int, int, int]] = []
-        for step in state.ready:
-            self.made += 1
+    def run(self, width: int, below: int, bound: int) -> tuple[tuple[list[int], int] | None, int]:
+        """Return an order below `below` with its peak, if there is one, and the least peak of what was passed over."""
+        first = tuple(step for step, needs in enumerate(self._needs) if not needs)
+        level: list[tuple[int, int, int, tuple[int, ...], Path | None]] = [(bound, self._constant, 0, first, None)]
+        passed_over = below
+        for _ in self._needs:
+            best: dict[int, tuple[int, int, int, int, tuple[int, ...], Path | None]] = {}
+            for peak, live, done, ready, path in level:
+                for top, rest, step in self._moves(peak, live, done, ready, below):
+                    now = done | 1 << step
+                    if now not in best or top < best[now][0]:
+                        best[now] = top, rest, now, step, ready, path
+                if self.budget <= 0:
+                    return None, bound
+            ranked = sorted(best.values(), key=lambda state: state[:2])
+            if len(ranked) > width:
+                passed_over = min(passed_over, ranked[width][0])
+            level = [
+                (peak, live, now, self._ready(ready, step, now), (path, step))
+                for peak, live, now, step, ready, path in ranked[:width]
+            ]
+        if not level:
+            return None, passed_over
+        peak, _, _, _, path = level[0]
+        order = []
+        while path:
+            path, step = path
+            order.append(step)
+        return (order[::-1], peak), passed_over
+
+    def _moves(self, peak: int, live: int, done: int, ready: Sequence[int], below: int) -> list[tuple[int, int, int]]:
+        """Peak and live bytes after each step that can run, and the step."""
+        moves = []
+        for step in ready:
+            self.budget -= 1 + len(self._ends[step])
             top = live + self._born[step]
             if top >= below:
                 continue
@@ -132,145 +119,121 @@ class _Moves:
             for mask, size in self._ends[step]:
                 if not mask & ~now:
                     rest -= size
-            found.append((top if top > peak else peak, rest, step, now))
             if top <= peak and rest <= live:
-                found = found[-1:]
-                break
-        needs, result = self._needs, []
-        for top, rest, step, now in found:
-            self.made += self._price
-            following = tuple(other for other in state.ready if other != step) + tuple(
-                other for other in self._after[step] if not needs[other] & ~now
-            )
-            self._parents.append((state.place, step))
-            child = _State(top, rest, len(self._parents) - 1, now, following)
-            result.append((child, canonical(now, self._twins) if self._twins else now))
-        return result
+                return [(peak, rest, step)]
+            moves.append((max(peak, top), rest, step))
+        return moves
 
-    def beam(self, start: _State, width: int) -> list[int] | None:
-        """An order below `below`, which falls to its peak: at each step only so many states are followed further.
-
-        They are those of least peak, and then of least alive. None where all of them come to nothing.
-        """
-        states = [start]
-        while states and states[0].done != self.full:
-            best: dict[int, _State] = {}
-            for state in states:
-                for child, key in self.after(state):
-                    known = best.get(key)
-                    if known is None or child.peak < known.peak:
-                        best[key] = child
-            states = nsmallest(width, best.values(), key=lambda state: (state.peak, state.live, state.place))
-        if not states:
-            return None
-        self.below = states[0].peak
-        return self.path(states[0].place)
-
-    def path(self, place: int) -> list[int]:
-        """The steps on the way to a state."""
-        order: list[int] = []
-        while place:
-            place, step = self._parents[place]
-            order.append(step)
-        return order[::-1]
+    def _ready(self, ready: Sequence[int], step: int, done: int) -> tuple[int, ...]:
+        following = [other for other in self._after[step] if not self._needs[other] & ~done]
+        return (*[other for other in ready if other != step], *following)
 
 
-# --- symmetry --------------------------------------------------------------------------------------------------------
+def improve(model: Model, order: Sequence[int], *, pool_bound: int, budget: int) -> tuple[list[int], Cost]:
+    """Move single steps to other legal places while that makes the order cheaper.
 
-Twins = list[list[list[int]]]
-"""Groups of interchangeable branches; each branch the numbers of its steps, in corresponding order."""
-
-
-def canonical(done: int, twins: Twins) -> int:
-    """The same number for sets that only exchange twin branches."""
-    for group in twins:
-        states = []
-        for branch in group:
-            state = 0
-            for place, step in enumerate(branch):
-                if done >> step & 1:
-                    state |= 1 << place
-                    done ^= 1 << step
-            states.append(state)
-        states.sort(reverse=True)
-        for branch, state in zip(group, states, strict=True):
-            for place, step in enumerate(branch):
-                if state >> place & 1:
-                    done |= 1 << step
-    return done
-
-
-def twin_branches(model: Model) -> Twins:
-    """Branches that can be exchanged without changing anything an order's peak depends on.
-
-    Steps are coloured by what they and their neighbours look like until nothing changes; a step whose colour nobody
-    shares is fixed. What hangs together among the others is a branch, and two branches of one colouring are twins if
-    exchanging them maps steps to steps and resources to resources, which is checked.
+    Args:
+        model: the steps.
+        order: where to start.
+        pool_bound: stop where the pool is that small; no order is better.
+        budget: touches to count before giving up, so that the result does not depend on the machine.
     """
-    count = len(model)
-    touchers: list[list[int]] = [[] for _ in model.sizes]
-    for step, resources in enumerate(model.touched):
-        for resource in resources:
-            touchers[resource].append(step)
+    best, cost = list(order), model.cost(order)
+    price = max(1, sum(model.toucher_count))
+    improved = True
+    while improved and budget > 0 and cost.pool > pool_bound:
+        improved = False
+        for step in list(best):
+            place = best.index(step)
+            early, late = _window(model, best, place)
+            for target in (*range(place - 1, early - 1, -1), *range(place + 1, late + 1)):
+                other = best.copy()
+                del other[place]
+                other.insert(target, step)
+                budget -= price
+                found = model.cost(other)
+                if found.key < cost.key:
+                    best, cost, improved = other, found, True
+                    break
+                if budget <= 0:
+                    return best, cost
+            if cost.pool <= pool_bound:
+                break
+    return best, cost
+
+
+def _window(model: Model, order: Sequence[int], place: int) -> tuple[int, int]:
+    """First and last place a step may move to while the others keep their order."""
+    step = order[place]
+    early = place
+    waits = set(model.before[step])
+    while early > 0 and order[early - 1] not in waits:
+        early -= 1
+    late = place
+    waiting = set(model.after[step])
+    while late + 1 < len(order) and order[late + 1] not in waiting:
+        late += 1
+    return early, late
+
+
+def twin_chains(model: Model) -> Iterator[tuple[int, int]]:
+    """Pairs of steps of which the first may run first without loss: corresponding steps of interchangeable chains.
+
+    Steps are coloured by what they and their neighbours look like; a step whose colour no other has is fixed. Connected
+    steps among the others are a branch, and two branches are twins if exchanging them maps steps to steps and resources
+    to resources, which is checked. Where the branches are chains, any order becomes one in which the n-th step of a
+    branch runs before the n-th of the next, by letting the first branch that has got as far take each step.
+    """
     colours = _colours(model)
     shared: dict[int, int] = defaultdict(int)
     for colour in colours:
         shared[colour] += 1
-    loose = [shared[colour] > 1 for colour in colours]
-    if not any(loose):
-        return []
-    branches: dict[tuple[int, ...], list[list[int]]] = defaultdict(list)
-    placed = bytearray(count)
-    for start in range(count):
-        if not loose[start] or placed[start]:
+    placed = [shared[colour] == 1 for colour in colours]
+    last: dict[tuple[int, ...], list[int]] = {}
+    touchers: list[list[int]] = [[] for _ in model.sizes]
+    for step, resources in enumerate(model.touched):
+        for resource in resources:
+            touchers[resource].append(step)
+    for start in range(len(model)):
+        if placed[start]:
             continue
         branch, stack = [], [start]
-        placed[start] = 1
+        placed[start] = True
         while stack:
             step = stack.pop()
             branch.append(step)
             for other in (*model.before[step], *model.after[step]):
-                if loose[other] and not placed[other]:
-                    placed[other] = 1
+                if not placed[other]:
+                    placed[other] = True
                     stack.append(other)
-        branch.sort(key=lambda step: (colours[step], step))
-        branches[tuple(colours[step] for step in branch)].append(branch)
-    found: Twins = []
-    for alike in branches.values():
-        group = [alike[0]]
-        for branch in alike[1:]:
-            if _exchangeable(model, touchers, group[-1], branch):
-                group.append(branch)
-            else:
-                if len(group) > 1:
-                    found.append(group)
-                group = [branch]
-        if len(group) > 1:
-            found.append(group)
-    return found
+        branch.sort()
+        if all(one in model.before[other] for one, other in pairwise(branch)):
+            look = tuple(colours[step] for step in branch)
+            if look in last and _exchangeable(model, touchers, last[look], branch):
+                yield from zip(last[look], branch, strict=True)
+            last[look] = branch
 
 
 def _colours(model: Model) -> list[int]:
-    count = len(model)
     signature: list[object] = [
         (model.born[step], tuple(sorted((model.sizes[r], model.toucher_count[r]) for r in model.touched[step])))
-        for step in range(count)
+        for step in range(len(model))
     ]
-    colours, classes = _numbered(signature), 0
-    while True:
-        found = len(set(colours))
-        if found in (classes, count):
-            return colours
-        classes = found
+    colours = _numbered(signature)
+    for _ in range(MOST_REFINEMENTS):
         signature = [
             (
                 colours[step],
                 tuple(sorted(colours[other] for other in model.before[step])),
                 tuple(sorted(colours[other] for other in model.after[step])),
             )
-            for step in range(count)
+            for step in range(len(model))
         ]
-        colours = _numbered(signature)
+        finer = _numbered(signature)
+        if max(finer, default=0) == max(colours, default=0):
+            break
+        colours = finer
+    return colours
 
 
 def _numbered(signatures: Sequence[object]) -> list[int]:
@@ -280,12 +243,10 @@ def _numbered(signatures: Sequence[object]) -> list[int]:
 
 def _exchangeable(model: Model, touchers: Sequence[Sequence[int]], one: Sequence[int], other: Sequence[int]) -> bool:
     swap = dict(zip(one, other, strict=True)) | dict(zip(other, one, strict=True))
-    for step in swap:
-        image = swap[step]
-        if {swap.get(s, s) for s in model.after[step]} != set(model.after[image]):
-            return False
-        if {swap.get(s, s) for s in model.before[step]} != set(model.before[image]):
-            return False
+    for step, image in swap.items():
+        for neighbours in (model.before, model.after):
+            if {swap.get(s, s) for s in neighbours[step]} != set(neighbours[image]):
+                return False
     near = sorted({resource for step in swap for resource in model.touched[step]})
     looks = {r: (model.sizes[r], model.toucher_count[r]) for r in near}
     before = sorted((looks[r], tuple(sorted(touchers[r]))) for r in near)
