@@ -113,7 +113,7 @@ SAID: list[tuple[object, Any, str]] = [
     (0, Factor, "it is 0, not a number above 0"),
     (300, Annotated[int, Range(0, 255)], "it is 300, not a whole number from 0 to 255"),
     ("lef", Side, "it is 'lef'; did you mean 'left'?"),
-    (3, Side, "it is 3; there is left, right"),
+    (3, Side, "it is 3; available: left, right"),
     ("lef", Side | Callable[[], Side], "it is 'lef'; did you mean 'left'?"),
     (3, Side | Callable[[], Side], "it is 3, not one of left, right or a function"),
     ("rgb8", PerhapsFormat, "it is 'rgb8'; did you mean 'rgba8'?"),

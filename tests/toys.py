@@ -48,7 +48,7 @@ def _cast(node: LightDepth, facts: Facts) -> tuple[int, ...]:
     if node.light == "auto":
         return (0,) if names else ()
     if node.light not in names:
-        raise SceneError(f"the scene has no light '{node.light}'; there is {', '.join(names)}", node.light)
+        raise SceneError(f"the scene has no light '{node.light}'; available: {', '.join(names)}", node.light)
     return (names.index(node.light),)
 
 

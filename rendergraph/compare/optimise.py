@@ -189,7 +189,9 @@ def check_search(
     known += figures(base.link().graph)
     for name in minimise:
         if name not in known:
-            text = f"there is nothing called '{name}' to minimise{suggestion(name, known)}; there is {', '.join(known)}"
+            text = (
+                f"there is nothing called '{name}' to minimise{suggestion(name, known)}; available: {', '.join(known)}"
+            )
             problems.append(Problem("RG524", text))
     if problems:
         raise InputError(problems)

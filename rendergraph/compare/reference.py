@@ -139,5 +139,5 @@ def compared_output(
             return output, "display" if output == "image" else "linear"
     lacking = next(graph for p in pipelines if wanted[0] not in (graph := p.link().graph).outputs)
     known = ", ".join(lacking.outputs)
-    text = f"pipeline '{lacking.name}' has no output '{wanted[0]}' to compare; there is {known}"
+    text = f"pipeline '{lacking.name}' has no output '{wanted[0]}' to compare; available: {known}"
     raise InputError(Problem("RG522", text))

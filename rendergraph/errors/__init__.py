@@ -297,7 +297,7 @@ def node_named(node: str, node_type: str) -> str:
 
 
 def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
-    """`; did you mean 'x'?`, or those that begin with the word, or the whole list where it is short, or nothing."""
+    """Return `; did you mean 'x'?`, or the names that begin with the word, or a short list of all, or nothing."""
     known = sorted(set(words))
     family = [name for name in known if name.lower().replace("-", "_").partition("_")[0] == word.lower()]
     if len(family) > 1:
@@ -307,5 +307,5 @@ def suggestion(word: str, words: Iterable[str], *, most: int = 12) -> str:
     if near is not None:
         return f"; did you mean '{near}'?"
     if 0 < len(known) <= most:
-        return f"; there is {', '.join(known)}"
+        return f"; available: {', '.join(known)}"
     return ""

@@ -81,7 +81,7 @@ def _made(
     if isinstance(where, str):
         found = re.fullmatch(r"(processes|dask)(?::([0-9]{1,4}))?|(dask://[^\s/]+:[0-9]{1,5})", where)
         if found is None or not 1 <= int(found[2] or 1) <= _MOST:
-            raise UsageError(Problem("RG641", f"there is no executor '{where}'; there is {WORDS}"))
+            raise UsageError(Problem("RG641", f"there is no executor '{where}'; available: {WORDS}"))
         if found[1] == "processes":
             count, shared = _machine(device, devices)
             return Processes(int(found[2] or count), shared, timeout=timeout)
@@ -102,7 +102,7 @@ def check_executor_name(text: str) -> str:
         ValueError: it does not.
     """
     if not re.fullmatch(r"serial|(?:processes|dask)(?::[1-9][0-9]{0,3})?|dask://[^\s/]+:[0-9]{1,5}", text):
-        raise ValueError(f"there is no executor '{text}'; there is {WORDS}")
+        raise ValueError(f"there is no executor '{text}'; available: {WORDS}")
     return text
 
 

@@ -166,7 +166,7 @@ def output_for(path: Path, outputs: Collection[str]) -> str:
     if not known:
         raise InputError(Problem("RG505", f"'{path}' takes the output '{wanted[0]}', but the pipeline has no outputs"))
     text = f"'{path}' takes the output '{wanted[0]}', which the pipeline lacks; name one: -o {known[0]}={path}"
-    text += f" (there is {', '.join(known)})" if len(known) > 1 else ""
+    text += f" (available: {', '.join(known)})" if len(known) > 1 else ""
     raise InputError(Problem("RG505", text))
 
 

@@ -106,7 +106,7 @@ def _with_candidates(found: Sequence[Said]) -> Iterator[Said]:
         if call and listed:
             types = call["types"]
             near = sorted(listed, key=lambda one: _distance(types, one))[:_MOST_CANDIDATES]
-            which = "there is" if len(near) == len(listed) else f"the nearest of {len(listed)} are"
+            which = "available:" if len(near) == len(listed) else f"the nearest of {len(listed)} are"
             text = f"{call['before'].strip()}; {which} {'; '.join(near)}"
         yield replace(said, text=text)
 

@@ -443,7 +443,7 @@ def test_what_is_not_there() -> None:
 def test_a_scene_of_ones_own(tmp_path: Path) -> None:
     new_node("edges", "geometry", where=tmp_path)
     assert check_node(tmp_path / "edges.py", scene="shadow_study").problems == ()
-    with pytest.raises(InputError, match=r"\ARG015 there is no shipped scene 'nowhere'; there is [\w, ]+\Z"):
+    with pytest.raises(InputError, match=r"\ARG015 there is no shipped scene 'nowhere'; available: [\w, ]+\Z"):
         check_node(tmp_path / "edges.py", scene="nowhere")
 
 

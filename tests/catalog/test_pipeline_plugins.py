@@ -428,7 +428,7 @@ def test_check_says_what_to_install_and_finds_the_rest(write: Write) -> None:
         "2:11: RG130 the pipeline needs the plugin 'rendergraph-outline', which is not installed: "
         "pip install rendergraph-outline",
         "4:16: RG102 there is no node type 'outline'; it may come with what is not installed: rendergraph-outline",
-        "5:59: RG111 node type 'tonemap' has no input 'depht'; there is gain, radiance",
+        "5:59: RG111 node type 'tonemap' has no input 'depht'; available: gain, radiance",
     ]
 
 

@@ -246,7 +246,7 @@ def headed(text: str) -> str:
             "params: {mode: {choices: [a, b]}}",
             [
                 "2:10: RG444 the header has parameter 'mode', but the shader has neither 'uniform float mode;' nor "
-                "MODE, as which it would be compiled in; there is strength"
+                "MODE, as which it would be compiled in; available: strength"
             ],
         ),
         (

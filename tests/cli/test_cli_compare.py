@@ -118,7 +118,7 @@ def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> N
         (
             ("compare", "forward", "deferred", "-s", "gbuffer.oct_bits=8"),
             3,
-            "--set gbuffer.oct_bits=8: RG109 in forward: there is no node 'gbuffer'; there is display, environment, light, shadows, sun; "
+            "--set gbuffer.oct_bits=8: RG109 in forward: there is no node 'gbuffer'; available: display, environment, light, shadows, sun; "
             "-s holds for all pipelines; for one alone: rendergraph compare deferred --reference forward -s …",
         ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),

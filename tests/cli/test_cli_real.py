@@ -162,7 +162,7 @@ def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path
         (["check", "forward", "-s", "light.ambient=x"], "light.ambient"),
         (["check", "forward", "--scene", "none.glb"], "none.glb"),
         (["check", "forward", "--environment", "none.hdr"], "RG350 environment 'none.hdr' does not exist"),
-        (["check", "forward", "--camera", "none"], "the scene has no camera 'none'; there is main"),
+        (["check", "forward", "--camera", "none"], "the scene has no camera 'none'; available: main"),
         (["check", "forward", "--size", "16385x1"], "RG207 "),
         (["check", "forward", "-p", "none.yaml"], "none.yaml"),
         (["plan", "none.yaml"], "RG011 there is no file 'none.yaml'"),

@@ -69,7 +69,7 @@ def test_shaders_are_hinted_at(cli: Any, tmp_path: Path, monkeypatch: pytest.Mon
     (tmp_path / "part.glsl").write_text("")
     (tmp_path / "film.frag").write_text("out vec4 made;\nvoid main() { made = vec4(1.0); }\n")
     assert "RG511 nothing is called 'film'; did you mean './film.frag'?" in cli("explain", "film").err
-    assert "RG400 there is no shader 'nothere.frag'; there is film.frag\n" in cli("explain", "./nothere.frag").err
+    assert "RG400 there is no shader 'nothere.frag'; available: film.frag\n" in cli("explain", "./nothere.frag").err
     assert cli("explain", "./film.frag").out.startswith("./film.frag\n")
 
 

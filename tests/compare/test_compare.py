@@ -124,7 +124,7 @@ def test_a_picture_of_another_size_is_refused_and_both_are_named(gl: rg.Session,
 def test_pipelines_without_the_picture_are_refused(make: Any, gl: rg.Session, tmp_path: Path) -> None:
     write(tmp_path / "truth.png", np.zeros((8, 8, 3), np.uint8))
     pipeline = make({"p": {"type": "pattern"}}, "p.color")
-    with pytest.raises(InputError, match=r"RG522 pipeline 'v1' has no output 'image' to compare; there is radiance"):
+    with pytest.raises(InputError, match=r"RG522 pipeline 'v1' has no output 'image' to compare; available: radiance"):
         compare([pipeline], tmp_path / "truth.png", frames=1, session=gl)
     assert compare([pipeline, pipeline], frames=1, session=gl).reference.output == "radiance"
 

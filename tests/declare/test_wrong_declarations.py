@@ -31,10 +31,10 @@ DECLARATIONS = {
     'more = Output(doc="D.")  # here': "port 'more' has neither a semantic nor `like`",
     'more = Input(Radiance, kind="texture", doc="D.")  # here': "port 'more': kind is 'texture'; did you mean 'texture2d'?",
     'more = Input(Radiance, filter="bilinear", doc="D.")  # here': "port 'more': filter is 'bilinear'; did you mean 'linear'?",
-    'more = Input(Radiance, wrap="clamp_to_edge", doc="D.")  # here': "port 'more': wrap is 'clamp_to_edge'; there is border, clamp, mirror, repeat",
-    'more = Input(Radiance, size="half", doc="D.")  # here': "port 'more': size is 'half'; there is any, same",
-    'more = Input(Radiance, samples=4, doc="D.")  # here': "port 'more': samples is 4; there is any, multi, single",
-    'more = Input(Radiance, use="load", doc="D.")  # here': "port 'more': use is 'load'; there is depth_test, image, sample",
+    'more = Input(Radiance, wrap="clamp_to_edge", doc="D.")  # here': "port 'more': wrap is 'clamp_to_edge'; available: border, clamp, mirror, repeat",
+    'more = Input(Radiance, size="half", doc="D.")  # here': "port 'more': size is 'half'; available: any, same",
+    'more = Input(Radiance, samples=4, doc="D.")  # here': "port 'more': samples is 4; available: any, multi, single",
+    'more = Input(Radiance, use="load", doc="D.")  # here': "port 'more': use is 'load'; available: depth_test, image, sample",
     'more = Input(Radiance, anisotropy=0, doc="D.")  # here': "port 'more': anisotropy is 0, not a whole number from 1 up",
     'more = Output(Radiance, kept=2, doc="D.")  # here': "port 'more': kept is 2, not True or False",
     'more = Input(Radiance, optional="yes", doc="D.")  # here': "port 'more': optional is 'yes', not True or False",
@@ -109,7 +109,7 @@ CLASSES = {
     "import nonsense_module  # here": "RG491 node type 'wrong' cannot be imported: ModuleNotFoundError",
     "raise SystemExit  # here": "RG491 node type 'wrong' cannot be imported: SystemExit",
     'more = Output(Radiance, docs="D.")  # here': "RG491 node type 'wrong' cannot be imported: TypeError: Output\\(\\): Unexpected keyword argument 'docs'",
-    'state = State(cull="both")  # here': "RG491 node type 'wrong' cannot be imported: Misuse: State: cull is 'both'; there is",
+    'state = State(cull="both")  # here': "RG491 node type 'wrong' cannot be imported: Misuse: State: cull is 'both'; available:",
 }
 
 

@@ -20,7 +20,7 @@ MANY = ["ssao-disc", "ssao-gtao", "ssao_hemisphere", "bloom", "kernel_size", *(f
         ("kernel", MANY, "; did you mean 'kernel_size'?"),
         ("--env", ["--environment", "--scene", "--size"], "; did you mean '--environment'?"),
         ("xyz", MANY, ""),
-        ("xyz", ["b", "a"], "; there is a, b"),
+        ("xyz", ["b", "a"], "; available: a, b"),
         ("a", [f"a_{n}" for n in range(5)], "; did you mean one of a_0, a_1, a_2, a_3, a_4?"),
         ("a", [f"a_{n}" for n in range(6)], "; did you mean one of a_0, a_1, a_2, a_3 or 2 more?"),
         ("a", [], ""),

@@ -16,7 +16,7 @@ COLOR = 'color = Output(Radiance, doc="Colour.")\n'
 RULES = {
     # what fails, by the rule's name
     'more = Output(Radiance, size=lambda node, facts: node.side(), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: AttributeError: 'Wrong' object has no attribute "
-    "'side'; there is color, more",
+    "'side'; available: color, more",
     'more = Output(Radiance, size=lambda node, facts: "large", doc="D.")': "'a.more' (wrong): the rule for its size gives 'large', not width and height in whole texels",
     'more = Output(Radiance, size=lambda node, facts: 64, doc="D.")': "'a.more' (wrong): the rule for its size gives 64, not width and height in whole texels",
     'more = Output(Radiance, format=lambda node, facts: facts.input("nothing").desc.format, doc="D.")  # here': "'a.more' (wrong): the rule for its format fails: wrong.py:{line}: KeyError: 'nothing'",
@@ -33,7 +33,7 @@ RULES = {
     'more = Output(Radiance, samples=lambda node, facts: 4.0, doc="D.")': "'a.more' (wrong): the rule for its samples gives 4.0, not one of 1, 2, 4, 8, 16 or None",
     'more = Output(Radiance, kind="buffer", bytes=lambda node, facts: 0, doc="D.")': "'a.more' (wrong): the rule for its bytes gives 0, not a whole number from 1 up",
     'color = Output(Radiance, clear=lambda node, facts: node.dark, doc="D.")  # here': "'a.color' (wrong): the rule for its clear fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
-    "attribute 'dark'; there is color",
+    "attribute 'dark'; available: color",
     'color = Output(Radiance, clear=lambda node, facts: "black", doc="D.")': "'a.color' (wrong): the rule for its clear gives 'black', not a number, up to four of them or None",
     'more = Output(Radiance, lights=lambda node, facts: 3, doc="D.")': "'a.more' (wrong): the rule for its lights gives 3, not the indices of lights",
     'more = Views(count=lambda node, facts: "all", doc="D.")': "'a.more' (wrong): the rule for its count gives 'all', not a whole number from 0 up or None",
@@ -41,7 +41,7 @@ RULES = {
     "attribute 'lamps'",
     'more = Views(lights=lambda node, facts: facts.lights[9], doc="D.")  # here': "'a.more' (wrong): the rule for its lights fails: wrong.py:{line}: IndexError: tuple index out of range",
     'last = Input(AnyTexel, filter=lambda node, facts: node.smooth, optional=True, doc="D.")  # here': "'a.last' (wrong): the rule for its filter fails: wrong.py:{line}: AttributeError: 'Wrong' object has no "
-    "attribute 'smooth'; there is color, last",
+    "attribute 'smooth'; available: color, last",
     'last = Input(AnyTexel, filter=lambda node, facts: "bicubic", optional=True, doc="D.")': "'a.last' (wrong): the rule for its filter gives 'bicubic', not one of nearest, linear, trilinear",
     'more = Output(Radiance, size=lambda node, facts: int("x"), doc="D.")  # here': "'a.more' (wrong): the rule for its size fails: wrong.py:{line}: ValueError: invalid literal for int() with base "
     "10: 'x'",
@@ -135,7 +135,7 @@ def test_a_record_that_gives_something_back(author: Any, head: str, body: str, k
 def test_a_record_that_refuses_the_scene(author: Any) -> None:
     author.node(f"{COLOR}def record(self, steps):\n    steps.facts.casting('moon')")
     (said,) = author.said(author.pipeline(scene="objects: {box: {shape: box}}\nlights: {sun: {type: point}}\n").check)
-    assert said.endswith("RG209 node 'a' (wrong): the scene has no light 'moon'; there is sun")
+    assert said.endswith("RG209 node 'a' (wrong): the scene has no light 'moon'; available: sun")
 
 
 UPDATES = {

@@ -119,7 +119,7 @@ WRONG = {
     "lamps: {a: {kind: long, size: [1, 2]}}": "1:31 WRONG 'size' takes one number or 3 numbers, this is [1, 2]",
     "boxes: {a: {}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
     "boxes: {a: {shape: cube, file: x}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
-    "boxes: {a: {shape: cube, radius: 1}}": "1:26 UNKNOWN box 'a' has no key 'radius'; there is at, file, shape, side",
+    "boxes: {a: {shape: cube, radius: 1}}": "1:26 UNKNOWN box 'a' has no key 'radius'; available: at, file, shape, side",
     "boxes: {self: {shape: cube}}": "1:9 NAME a box cannot be called 'self'",
     "boxes: {a: {shape: cube, at: [1, .nan, 1]}}": "1:30 WRONG 'at' takes 3 numbers, this is [1, nan, 1]",
     "tags: []": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is []",

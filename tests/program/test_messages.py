@@ -376,7 +376,7 @@ CASES = {
         COLOR + 'def record(self, steps):\n    steps.geometry("wrong.frag", objects=["boks"])',
         {},
         r"test\.yaml:5:3: RG431 node 'a' \(wrong\): wrong\.py:18: it draws object 'boks', which the scene does not have; "
-        r"there is box",
+        r"available: box",
     ),
     "a buffer's attribute misspelt": (
         COLOR + 'numbers = Internal(kind="buffer", bytes=64)\n\n'
