@@ -18,7 +18,7 @@ from rendergraph.document import Source, from_plain, read_bytes, shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.keys import Codes, Form, Key, Table, Walk, plain
 from rendergraph.keys.forms import TEXT, listed
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 FILE_NAME = "rendergraph.toml"
 _PATH = Form(
@@ -69,7 +69,7 @@ def nearest(folder: Path) -> Settings | None:
     """
     for candidate in (folder, *folder.parents):
         file = candidate / FILE_NAME
-        look(file)
+        record_read(file)
         if os.path.isfile(file):
             return load(file)
     return None
@@ -153,7 +153,7 @@ class Roots(Struct, frozen=True):
             folder: a folder is meant.
         """
         name = shown(written or path, 120)
-        look(path)
+        record_read(path)
         if "://" in (written or str(path)):
             return "RG012", f"'{name}' is an address; only files are read"
         try:

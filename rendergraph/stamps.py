@@ -1,34 +1,36 @@
-"""Which files a piece of work looked at, and whether they are still as they were.
+"""Which files a piece of work read, whether they have changed since, and a cache of results that depend on files.
 
-Whoever opens a file, or finds none where it looked, says so with `look`. Whoever keeps the result of such work collects
-what was looked at meanwhile (`looking`), and does the work again when something of it has changed (`changed`). A result
-that is taken from where it was kept says what it was made from (`again`), so that the collection is always complete.
+Code that opens a file, or looks for one in vain, calls `record_read` first. Code that keeps the result of such work
+collects the reads with `track_reads` and repeats the work when `modified` names a file. Taking a kept result replays
+its reads (`unchanged`, `replay_reads`), so that an outer collection is always complete. `FileCache` does all of that.
 
-Files are told apart by modification time, size and inode: a `stat` each, the same on every system, and no file is read.
+A file's state is its modification time, size and inode: one `stat` each, the same on every system; no file is read.
 """
 
 from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TypeAlias
+from typing import Generic, TypeAlias, TypeVar
+
+T = TypeVar("T")
 
 Stamp: TypeAlias = "tuple[object, ...] | None"
-"""What tells one state of a file from the next; the names in a folder; None where there is nothing."""
+"""The state of a file; of a folder the names in it; None where nothing exists."""
 
 Stamps: TypeAlias = "Mapping[str, Stamp]"
-"""Absolute paths, in the order they were looked at."""
+"""Absolute paths and their states, in the order they were read."""
 
 _SOURCES = (".py", ".frag", ".vert", ".geom", ".comp", ".glsl", ".yaml", ".yml", ".toml", "")
-_LOOKED: ContextVar[dict[str, Stamp] | None] = ContextVar("looked", default=None)
+_READ: ContextVar[dict[str, Stamp] | None] = ContextVar("read", default=None)
 
 
 def stamp(path: Path | str) -> Stamp:
-    """The state of a file or folder; of a folder only what may be source text: pictures written into it are none."""
+    """The state of a file or folder; of a folder only what may be source text, as pictures may be written into it."""
     try:
         status = os.stat(path)
         if stat.S_ISDIR(status.st_mode):
@@ -38,41 +40,68 @@ def stamp(path: Path | str) -> Stamp:
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
-def look(path: Path | str) -> None:
-    """Note a file or folder, before it is opened; the first look counts."""
-    looked = _LOOKED.get()
-    if looked is not None and os.fspath(path) not in looked:
+def record_read(path: Path | str) -> None:
+    """Note a file or folder, before it is opened; the first read counts."""
+    read = _READ.get()
+    if read is not None and os.fspath(path) not in read:
         name = os.path.abspath(path)
-        if name not in looked:
-            looked[name] = stamp(name)
+        if name not in read:
+            read[name] = stamp(name)
 
 
-def again(stamps: Stamps) -> None:
-    """Note what a kept result was made from."""
-    looked = _LOOKED.get()
-    if looked is not None:
-        for path, found in stamps.items():
-            looked.setdefault(path, found)
+def replay_reads(stamps: Stamps) -> None:
+    """Note the files that a kept result was made from."""
+    read = _READ.get()
+    if read is not None:
+        for path, state in stamps.items():
+            read.setdefault(path, state)
 
 
 @contextmanager
-def looking() -> Iterator[dict[str, Stamp]]:
-    """Collect what is looked at in the block, also where it fails; a collection around it is given the same."""
-    outer = _LOOKED.get()
-    looked: dict[str, Stamp] = {}
-    token = _LOOKED.set(looked)
+def track_reads() -> Iterator[dict[str, Stamp]]:
+    """Collect the reads in the block, also where it fails; a collection around it gets the same."""
+    outer = _READ.get()
+    read: dict[str, Stamp] = {}
+    token = _READ.set(read)
     try:
-        yield looked
+        yield read
     finally:
-        _LOOKED.reset(token)
+        _READ.reset(token)
         if outer is not None:
-            for path, found in looked.items():
-                outer.setdefault(path, found)
+            for path, state in read.items():
+                outer.setdefault(path, state)
 
 
-def changed(stamps: Stamps) -> list[Path]:
-    """What is no longer as it was, in the order it was looked at."""
-    return [Path(path) for path, found in stamps.items() if stamp(path) != found]
+def modified(stamps: Stamps) -> list[Path]:
+    """The files that have changed, in the order they were read."""
+    return [Path(path) for path, state in stamps.items() if stamp(path) != state]
+
+
+def unchanged(stamps: Stamps) -> bool:
+    """Whether a result made from these files is still valid; taking it counts as reading them."""
+    if modified(stamps):
+        return False
+    replay_reads(stamps)
+    return True
+
+
+class FileCache(Generic[T]):
+    """Results by key, each valid as long as the files it was made from; the least recently used goes first."""
+
+    def __init__(self, most: int = 2048) -> None:
+        self._most = most
+        self._entries: dict[Hashable, tuple[T, Stamps]] = {}
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the result for a key; a `make` that raises is called again next time."""
+        entry = self._entries.pop(key, None)
+        if entry is None or not unchanged(entry[1]):
+            with track_reads() as files:
+                entry = make(), files
+            while len(self._entries) >= self._most:
+                del self._entries[next(iter(self._entries))]
+        self._entries[key] = entry
+        return entry[0]
 
 
 def _is_source(name: str) -> bool:

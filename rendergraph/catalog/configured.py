@@ -11,7 +11,7 @@ from msgspec import Struct
 from rendergraph.errors import Place, shown_file
 from rendergraph.installed import plain
 from rendergraph.settings import at_home, nearest
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 OWN = "rendergraph"
 """The distribution that nobody stands in for."""
@@ -64,7 +64,7 @@ def projects(folders: Iterable[Path]) -> frozenset[str]:
 def _project(folder: Path) -> str:
     """The name that the `pyproject.toml` of a folder gives; nothing where there is none to read."""
     file = folder / "pyproject.toml"
-    look(file)
+    record_read(file)
     if not file.is_file():
         return ""
     import tomllib  # most folders lie in no project

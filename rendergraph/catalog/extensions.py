@@ -13,7 +13,7 @@ from rendergraph.declare import Extension, Extensions, Source, extension_mistake
 from rendergraph.declare.blame import raised_at, told
 from rendergraph.errors import Place, Problem, is_interruption, shown_file
 from rendergraph.installed import EntryPoint
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 GROUP = "rendergraph.extensions"
 """The entry point group; an entry's value is `package.module:NAME`."""
@@ -38,7 +38,7 @@ def _sources(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint])
         yield _source(entry.package.name, _file(entry), entry.load, entry.value)
     for package, folder in folders:
         file = folder / f"{MODULE}.py"
-        look(file)
+        record_read(file)
         if file.is_file():
             yield _source(folder.name, file, _loader(f"{package}.{MODULE}"), f"{MODULE}.py:{NAME}")
 
@@ -59,7 +59,7 @@ def _file(entry: EntryPoint) -> Path:
 
 
 def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Source:
-    look(file)
+    record_read(file)
     place = Place(shown_file(file)) if file.name else None
     try:
         found = load()

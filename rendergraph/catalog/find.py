@@ -20,7 +20,7 @@ from rendergraph.catalog.extensions import MODULE
 from rendergraph.catalog.reload import PREFIX, fresh_package
 from rendergraph.catalog.types import SHADERS, Listed
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 MOST_FILES = 10_000
 """Files of a folder that a pipeline file names; a plugin has a few dozen."""
@@ -93,7 +93,7 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
     """
     seen, top = 0, os.fspath(folder)
     for where, subfolders, files in os.walk(top):
-        look(where)
+        record_read(where)
         seen += len(files) + len(subfolders)
         if seen > most:
             raise ValueError(f"it has more than {most:,} files; name the folder of the effects itself")
@@ -153,7 +153,7 @@ def loose(path: Path, place: Place | None = None, where: str = "") -> Iterator[t
         place: where it is named.
         where: the same in words, for a place that is no file.
     """
-    look(path)
+    record_read(path)
     if not path.exists():
         raise InputError(Problem("RG011", f"there is no plugin '{path}'{where}", place))
     path = path.resolve()

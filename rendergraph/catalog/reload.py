@@ -12,7 +12,7 @@ from importlib.machinery import FileFinder, ModuleSpec, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from rendergraph.stamps import Stamp, again, changed, look, looking
+from rendergraph.stamps import Stamp, modified, record_read, replay_reads, track_reads
 
 PREFIX = "rendergraph_plugin_"
 """What the packages of folders are called, before a number that tells them apart."""
@@ -26,8 +26,8 @@ class _Loader(SourceFileLoader):
 
     def get_code(self, fullname: str) -> CodeType:
         """The module's code; its file is noted."""
-        with looking() as files:
-            look(Path(self.path))
+        with track_reads() as files:
+            record_read(Path(self.path))
         _READ.setdefault(fullname.partition(".")[0], {}).update(files)
         return self.source_to_code(self.get_data(self.path), self.path)
 
@@ -52,7 +52,7 @@ def fresh_package(name: str, folder: Path) -> None:
     """Make a folder importable as the package `name`; what has been imported from it is dropped if it has changed."""
     if _FINDER not in sys.meta_path:
         sys.meta_path.insert(0, _FINDER)
-    if name in sys.modules and changed(_READ.get(name, {})):
+    if name in sys.modules and modified(_READ.get(name, {})):
         for module in [module for module in sys.modules if module == name or module.startswith(f"{name}.")]:
             del sys.modules[module]
         del _READ[name]
@@ -60,4 +60,4 @@ def fresh_package(name: str, folder: Path) -> None:
         package = ModuleType(name)
         package.__path__ = [str(folder)]
         sys.modules[name] = package
-    again(_READ.get(name, {}))
+    replay_reads(_READ.get(name, {}))

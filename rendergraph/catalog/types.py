@@ -12,7 +12,7 @@ from msgspec import Struct
 from rendergraph.declare import Input, Node, Views, WrittenPort
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import folder
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 SHADERS = (".frag", ".comp")
 """Endings of shader files that are nodes by themselves: full-screen and compute."""
@@ -106,7 +106,7 @@ def shared_includes() -> Path:
 
 
 def _is_there(file: Path) -> bool:
-    look(file)
+    record_read(file)
     return file.is_file()
 
 

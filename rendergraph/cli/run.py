@@ -15,7 +15,7 @@ from rendergraph.cli.options import Target
 from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say_summary
 from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Place, Problem, UsageError
-from rendergraph.stamps import looking
+from rendergraph.stamps import track_reads
 
 if TYPE_CHECKING:
     from rendergraph.images import Saved
@@ -113,7 +113,7 @@ def command(
 
         keep_drawing(lambda gpu: draw(*read(), gpu), device, as_json=as_json)
         return
-    with looking() as files:
+    with track_reads() as files:
         expanded, targets = read()
     if executor in (None, "serial"):
         with Gpu(devices[0] if devices and device is None else device) as gpu:
@@ -148,7 +148,7 @@ def _read(
     from rendergraph.session import stages
     from rendergraph.session.wanted import every_port, figures
 
-    with looking() as files:
+    with track_reads() as files:
         linked = stages.link(stages.resolve(selection))
     warnings.say(linked.warnings)
     modes = modes_of(linked)

@@ -29,7 +29,7 @@ from rendergraph.link import Graph
 from rendergraph.session import stages
 from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.session.progress import Progress, shown
-from rendergraph.stamps import looking
+from rendergraph.stamps import track_reads
 
 if TYPE_CHECKING:
     from rendergraph.execute import FrameTimes
@@ -98,7 +98,7 @@ def compare(
         raise UsageError(Problem("RG500", "there is no pipeline to compare"))
     loaded_ones, reference = [loaded(each) for each in pipelines], named_reference(reference)
     own = [] if reference is None or isinstance(reference, Path) else [reference]
-    with looking() as files:
+    with track_reads() as files:
         staged, notes = on_one_stage([measured_at(pipeline, metric) for pipeline in [*loaded_ones, *own]])
         planned = [stages.plan(pipeline.expand()) for pipeline in staged]
     first_one = planned[0].linked

@@ -21,7 +21,7 @@ from rendergraph.farm.bundle import make_bundle
 from rendergraph.farm.executors import ExecutorChoice, make_executor
 from rendergraph.session.pipeline import Pipeline, loaded
 from rendergraph.session.progress import Progress, shown
-from rendergraph.stamps import looking
+from rendergraph.stamps import track_reads
 
 if TYPE_CHECKING:
     from rendergraph.session.gpu import Gpu
@@ -144,7 +144,7 @@ def sweep(
         DeviceError: there is no usable GL device.
     """
     base, out, reference = loaded(base), Path(out), named_reference(reference)
-    with looking() as files:
+    with track_reads() as files:
         planned = prepare(base, axes, out, reference, metric=metric, frame=frame, only=only)
     runs = planned.runs
     with claimed(out):

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.errors import InputError
-from rendergraph.program import Remembered, stage_texts, text_key
+from rendergraph.program import stage_texts, text_key
+from rendergraph.stamps import FileCache
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Expanded
 
 _BUILTIN = "rendergraph.nodes"
-_TEXTS: Remembered[str] = Remembered()
+_TEXTS: FileCache[str] = FileCache()
 
 
 def sources_digest(expanded: Expanded) -> str:

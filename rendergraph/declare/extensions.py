@@ -14,7 +14,7 @@ from rendergraph.declare.blame import raised_at, told
 from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.glsl import about
-from rendergraph.stamps import Stamps, again, looking
+from rendergraph.stamps import Stamps, replay_reads, track_reads
 from rendergraph.textures import SEMANTICS, Semantic
 
 T = TypeVar("T")
@@ -82,12 +82,12 @@ class Extensions:
     def sources(self) -> tuple[Source, ...]:
         """Every extension there is."""
         found, stamps = self._found
-        again(stamps)
+        replay_reads(stamps)
         return found
 
     @cached_property
     def _found(self) -> tuple[tuple[Source, ...], Stamps]:
-        with looking() as stamps:
+        with track_reads() as stamps:
             return tuple(self._find()), stamps
 
     @property

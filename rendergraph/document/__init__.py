@@ -13,7 +13,7 @@ from rendergraph.document.events import YamlLimits, build, over_limit
 from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
 from rendergraph.errors import InputError, Option, Place, Problem
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 
 def load(
@@ -82,7 +82,7 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
         InputError: there is none, it is a folder or a device, it may not be read, or it is longer.
     """
     name = shown(name or str(path))
-    look(path)
+    record_read(path)
     try:
         if not path.is_file() and path.exists():
             what = "is a folder, a file is needed" if path.is_dir() else "is not a regular file"

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.glsl.names import blank
-from rendergraph.stamps import Stamp, look, stamp
+from rendergraph.stamps import Stamp, record_read, stamp
 
 MAX_BYTES = 1_000_000
 """Bytes of one stage's text after includes."""
@@ -126,7 +126,7 @@ def read_text(file: Path) -> str:
     Raises:
         InputError: there is none, it is too large, or no UTF-8.
     """
-    look(file)
+    record_read(file)
     if not file.is_file():
         beside = file.parent.glob("*") if file.parent.is_dir() else ()
         known = {path.name for path in beside if path.suffix == file.suffix and path.is_file()}
@@ -156,7 +156,7 @@ def runs(file: Path) -> tuple[str, tuple[Run, ...]]:
     Raises:
         InputError: the file cannot be read.
     """
-    look(file)
+    record_read(file)
     return _runs(file, stamp(file))
 
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
 from rendergraph.glsl.files import MAX_BYTES, Links, Run, runs
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 MAX_DEPTH = 32
 """Includes inside each other."""
@@ -262,7 +262,7 @@ class Includes:
             if target is None:
                 text = f"'{name}' lies outside '{shown_file(self._links.of(home))}', where this shader's includes are"
                 raise _error("RG406", text, origin, raw)
-            look(target)
+            record_read(target)
             if target.is_file():
                 return target, shared, home
         known = {

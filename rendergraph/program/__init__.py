@@ -23,11 +23,10 @@ from __future__ import annotations
 
 from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
 from rendergraph.program.macros import positions_macro
-from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts
+from rendergraph.program.text_key import text_key
 
 __all__ = [
-    "Remembered",
     "StageText",
     "StepTexts",
     "Texts",

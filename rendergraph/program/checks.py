@@ -13,12 +13,13 @@ from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
 from rendergraph.glsl.reached import reached
-from rendergraph.program.remembered import Remembered, text_key
 from rendergraph.program.text import StageText, prefix, stage_texts
+from rendergraph.program.text_key import text_key
+from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, TextureDesc
 
-_PASSED: Remembered[None] = Remembered()
+_PASSED: FileCache[None] = FileCache()
 """Texts in which nothing was wrong."""
 Texts = Callable[[], Mapping[str, StageText]]
 """A program's texts, put together where they are looked at."""

@@ -18,14 +18,15 @@ from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Block, Includes, Origin, SourceText, generated
 from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
-from rendergraph.program.remembered import Remembered, text_key
+from rendergraph.program.text_key import text_key
 from rendergraph.resources import folder
+from rendergraph.stamps import FileCache
 from rendergraph.steps import FunctionBinding, Read, Resource, Step
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
 
 VERSION = "#version 450 core"
 _EXTENSION = re.compile(r"\s*#\s*extension\b")
-_TEXTS: Remembered[dict[str, StageText]] = Remembered(256)
+_TEXTS: FileCache[dict[str, StageText]] = FileCache(256)
 """The texts of steps, some 100 KiB each."""
 _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of one test each
 

@@ -19,7 +19,7 @@ from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene import image_header
 from rendergraph.scene.model import ImageSource, Material, Mesh
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 """The root rule: returns the resolved path, or raises InputError where it leaves every root."""
@@ -263,7 +263,7 @@ _NOT = {"missing": "does not exist", "other": "is not a regular file", "unreadab
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
     """What stands at a path, links followed."""
-    look(path)
+    record_read(path)
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

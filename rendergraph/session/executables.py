@@ -13,7 +13,7 @@ from rendergraph.declare import Node
 from rendergraph.expand import Expansion
 from rendergraph.gl.programs import Program
 from rendergraph.session.values import Expanded
-from rendergraph.stamps import Stamps, again, changed
+from rendergraph.stamps import Stamps, modified, replay_reads
 
 MOST = 4
 """Compiled pipelines that are kept."""
@@ -49,12 +49,12 @@ class ExecutableCache(Struct, eq=False):
         entry = self._entries.pop(key, None)
         if entry is None:
             return None
-        if changed(entry.files):
+        if modified(entry.files):
             self.stale |= _programs(entry.executable)
             losing()
             entry.executable.release()
             return None
-        again(entry.files)
+        replay_reads(entry.files)
         self._entries[key] = entry
         return entry.executable
 

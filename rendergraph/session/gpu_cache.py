@@ -95,7 +95,7 @@ class GpuCache:
         self._executables.make_room(needed)
         check_memory(self._device, needed, linked.selection.allowed("plan").get("memory"))
         views, poison = planned.expansion.views, planned.options.poison
-        with stamps.looking() as files:
+        with stamps.track_reads() as files:
             executable = compile_plan(self._device, planned.plan, types, views, scene, self.programs, poison=poison)
         self._executables.add(key, executable, files)
         executable.shares_kept = planned.options.shares

@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.resources import shipped_pipelines
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 if TYPE_CHECKING:
     from rendergraph.document import Document, YamlLimits
@@ -81,7 +81,7 @@ def metadata(path: Path) -> dict[str, str]:
     """
     from rendergraph.images import read_metadata  # most pipelines are files
 
-    look(path)
+    record_read(path)
     said = read_metadata(path)
     if "pipeline" not in said:
         text = "the picture does not say how it was made; EXR and PNG files that rendergraph wrote do"

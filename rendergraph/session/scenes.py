@@ -39,10 +39,9 @@ def scene_of(resolved: Resolved) -> Scene:
     # One camera serves pictures of about one shape, such as a viewer's smaller ones.
     shape = max(math.floor(10 * spec.size[0] / spec.size[1] + 0.1), 1) / 10
     found = _IN_USE.get(key) or _IN_USE.get((*key, shape))
-    if found is not None and not stamps.changed(found.files):
-        stamps.again(found.files)
+    if found is not None and stamps.unchanged(found.files):
         return found
-    with stamps.looking() as files:
+    with stamps.track_reads() as files:
         scene = Scene("empty")
         if spec.scene is not None:
             scene = load(spec.scene, check_path=spec.roots.check, limits=limits, extensions=extensions)

@@ -15,7 +15,7 @@ from typing import Generic, TypeVar
 
 from rendergraph.errors import RendergraphError
 from rendergraph.session.gpu import Gpu
-from rendergraph.stamps import Stamps, changed, looking, stamp
+from rendergraph.stamps import Stamps, modified, stamp, track_reads
 
 T = TypeVar("T")
 
@@ -62,7 +62,7 @@ def turns(draw: Callable[[Gpu], T], gpu: Gpu) -> Iterator[Turn[T]]:
     while True:
         start, before = time.perf_counter(), _made(gpu)
         value, error = None, None
-        with looking() as files:
+        with track_reads() as files:
             try:
                 value = draw(gpu)
             except RendergraphError as problem:
@@ -78,10 +78,10 @@ def wait(files: Stamps) -> list[Path]:
     A file that has vanished is given a moment to come back: many editors write by renaming.
     """
     while True:
-        found = changed(files)
+        found = modified(files)
         if found:
             _settle(found)
-            if found := changed(files):  # it may be back, just as it was
+            if found := modified(files):  # it may be back, just as it was
                 return found
         time.sleep(INTERVAL)
 

@@ -97,9 +97,9 @@ class Painter:
 
     @_said.register
     def _picture(self, ask: Ask) -> Answer:
-        if stamps.changed(self._files):
+        if stamps.modified(self._files):
             self._forget()
-        with stamps.looking() as files:
+        with stamps.track_reads() as files:
             try:
                 shown = self._draw(ask)
             finally:
@@ -206,7 +206,7 @@ class Painter:
 
     @_said.register
     def _changed(self, question: Changed) -> Answer:
-        return Answer({"changed": [path.name for path in stamps.changed(self._files)]})
+        return Answer({"changed": [path.name for path in stamps.modified(self._files)]})
 
     @_said.register
     def _pixel(self, place: Pixel) -> Answer:

@@ -21,8 +21,8 @@ def note(event, arguments):
         opened.add(os.path.realpath(arguments[0]))
 sys.addaudithook(note)
 import rendergraph as rg
-from rendergraph.stamps import looking
-with looking() as looked:
+from rendergraph.stamps import track_reads
+with track_reads() as looked:
     pipeline = rg.load("top.yaml", environment="sky.hdr", patches=["patch.yaml"], plugins=["tools"])
     pipeline.render(size=(8, 8))
 inside = lambda paths: sorted({os.path.relpath(p, here) for p in paths if p.startswith(here + os.sep)})
@@ -82,24 +82,24 @@ def test_every_file_that_is_opened_was_looked_at(tmp_path: Path) -> None:
 def test_a_collection_inside_another_is_part_of_it_and_the_first_look_counts(tmp_path: Path) -> None:
     file, gone = tmp_path / "a", tmp_path / "gone"
     file.write_text("1")
-    with stamps.looking() as outer:
-        stamps.look(file)
+    with stamps.track_reads() as outer:
+        stamps.record_read(file)
         file.write_text("22")
-        with stamps.looking() as inner:
-            stamps.look(file)
-            stamps.look(gone)
-    assert stamps.changed(outer) == [file]
-    assert stamps.changed(inner) == []
+        with stamps.track_reads() as inner:
+            stamps.record_read(file)
+            stamps.record_read(gone)
+    assert stamps.modified(outer) == [file]
+    assert stamps.modified(inner) == []
     assert outer[str(gone)] is None
     gone.write_text("")
-    assert stamps.changed(inner) == [gone]
+    assert stamps.modified(inner) == [gone]
 
 
 def test_of_a_folder_only_what_may_be_source_counts(tmp_path: Path) -> None:
-    with stamps.looking() as looked:
-        stamps.look(tmp_path)
+    with stamps.track_reads() as looked:
+        stamps.record_read(tmp_path)
     for name in ("a.png", ".a.py.swp", "__pycache__", "a.py~", "#a.py#"):
         (tmp_path / name).write_text("")
-    assert stamps.changed(looked) == []
+    assert stamps.modified(looked) == []
     (tmp_path / "b.frag").write_text("")
-    assert stamps.changed(looked) == [tmp_path]
+    assert stamps.modified(looked) == [tmp_path]

@@ -1,43 +1,15 @@
-"""What has been found out about program texts, kept from one pipeline to the next: variants share most of theirs."""
+"""What decides a step's program texts, to share them between pipelines: variants have most of theirs in common."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
-from typing import Generic, TypeVar
+from collections.abc import Hashable, Mapping
 
 from msgspec.structs import replace
 
-from rendergraph import stamps
 from rendergraph.catalog import NodeType
 from rendergraph.expand import ViewTable
-from rendergraph.stamps import Stamps
 from rendergraph.steps import Read, Resource, Step, Write
 from rendergraph.textures import TextureDesc
-
-T = TypeVar("T")
-_MOST = 2048
-
-
-class Remembered(Generic[T]):
-    """Answers by key, each as long as the files that it was made from stay as they were; the oldest go first."""
-
-    def __init__(self, most: int = _MOST) -> None:
-        self._most = most
-        self._known: dict[Hashable, tuple[T, Stamps]] = {}
-
-    def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """The answer; what raises is asked again next time."""
-        found = self._known.get(key)
-        if found is not None and not stamps.changed(found[1]):
-            stamps.again(found[1])
-            return found[0]
-        with stamps.looking() as files:
-            value = make()
-        self._known.pop(key, None)
-        while len(self._known) >= self._most:
-            del self._known[next(iter(self._known))]
-        self._known[key] = value, files
-        return value
 
 
 def text_key(
