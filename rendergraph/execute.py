@@ -21,8 +21,8 @@ from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, RenderError, SceneError, is_interruption, node_named
 from rendergraph.expand import CAMERA
 from rendergraph.gl import textures
+from rendergraph.gl.queries import Timer
 from rendergraph.gl.saved_state import settle
-from rendergraph.gl.timer import Timer
 from rendergraph.link import Graph, GraphNode
 from rendergraph.ports import Count
 from rendergraph.projection import shifted

@@ -37,11 +37,11 @@ def check_uniforms(
     files = ", ".join(file for _, file in step.shaders)
     problems = []
     for name, uniform in program.uniforms.items():
-        if not uniform.opaque and name not in uniforms:
+        if not uniform.is_opaque and name not in uniforms:
             hint = suggestion(name, [known for known, _ in step.uniforms])
             text = f"{files} looks at uniform '{name}', which nothing sets{hint}"
             problems.append(_placed(step.problem("RG434", text), name, texts))
-        elif uniform.opaque and name not in images and name not in sampled:
+        elif uniform.is_opaque and name not in images and name not in sampled:
             slot = name.endswith("_texture") and step.kind == "geometry"
             guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
             text = (
@@ -49,7 +49,7 @@ def check_uniforms(
                 f"it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
             )
             problems.append(_placed(step.problem("RG430", text), name, texts))
-        elif not uniform.opaque and (wrong := misfit(uniform, uniforms[name])) is not None:
+        elif not uniform.is_opaque and (wrong := misfit(uniform, uniforms[name])) is not None:
             problems.append(_placed(step.problem("RG436", f"{files} {wrong}"), name, texts))
     if problems:
         raise InputError(problems)
@@ -74,11 +74,11 @@ def check_samplers(step: Step, program: Program, resources: Mapping[str, Resourc
 def misfit(uniform: Uniform, value: Any) -> str | None:
     """What a uniform and the value that it is given disagree about: the driver would read beyond the numbers."""
     numbers = value if isinstance(value, tuple | list) else (value,)
-    if len(numbers) % uniform.numbers or not 1 <= len(numbers) // uniform.numbers <= uniform.size:
+    if len(numbers) % uniform.number_count or not 1 <= len(numbers) // uniform.number_count <= uniform.size:
         array = f"[{uniform.size}]" if uniform.size > 1 else ""
         count = f"{len(numbers)} number{'' if len(numbers) == 1 else 's'}"
         return f"declares '{uniform.name}' as {uniform.glsl}{array}, but it is given {count}"
-    if uniform.whole and any(isinstance(number, float) for number in numbers):
+    if uniform.is_integer and any(isinstance(number, float) for number in numbers):
         return f"declares '{uniform.name}' as {uniform.glsl}, but it is given floats, {numbers[0]!r}"
     return None
 

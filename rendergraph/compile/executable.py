@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from rendergraph.compile.memory import Memory
     from rendergraph.compile.views import ViewBuffers
     from rendergraph.gl.device import Device
-    from rendergraph.gl.passed import Passed
-    from rendergraph.gl.timer import Timer
+    from rendergraph.gl.queries import OcclusionQuery, Timer
 
 
 _MOST_PARTS = 64
@@ -142,7 +141,7 @@ class Executable(Struct, eq=False, dict=True):
         filled: what the CPU wrote into buffers last.
         touched: the sources that have changed since the last frame, as `_looks` names them, but for the scene's.
         timers: one a step.
-        passed: what steps are left out by.
+        occlusion_queries: they decide which steps the device skips.
         buffers: draw commands.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written and everything bound before the next frame.
@@ -163,7 +162,7 @@ class Executable(Struct, eq=False, dict=True):
     statics: list[Call] = field(default_factory=list)
     scene_views: list[SceneView] = field(default_factory=list)
     timers: list[Timer] = field(default_factory=list)
-    passed: list[Passed] = field(default_factory=list)
+    occlusion_queries: list[OcclusionQuery] = field(default_factory=list)
     buffers: list[moderngl.Buffer] = field(default_factory=list)
     vertex_arrays: Call = bool
     fresh: bool = True
@@ -213,8 +212,8 @@ class Executable(Struct, eq=False, dict=True):
 
     def break_off(self) -> None:
         """A step was broken off in its middle: leave nothing of it to what is drawn after."""
-        for passed in self.passed:
-            passed.break_off()
+        for query in self.occlusion_queries:
+            query.abort()
         self.fresh = True
 
     def next(self, parity: int, *, reuse: bool) -> list[FrameStep]:
@@ -367,10 +366,10 @@ class Executable(Struct, eq=False, dict=True):
             buffer.release()
         for timer in self.timers:
             timer.release()
-        for passed in self.passed:
-            passed.release()
+        for query in self.occlusion_queries:
+            query.release()
         self.timers.clear()
-        self.passed.clear()
+        self.occlusion_queries.clear()
 
 
 def source_of_step(key: StepKey) -> str:

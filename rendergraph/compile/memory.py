@@ -13,8 +13,8 @@ from msgspec import Struct, field
 from rendergraph.allocate import Physical, ResourcePlan
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
-from rendergraph.gl.blocks import Block, make_blocks
 from rendergraph.gl.device import Device
+from rendergraph.gl.memory_objects import Block, make_blocks
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import GpuTexture, texel
 from rendergraph.steps import Read, Write

@@ -34,10 +34,9 @@ from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
 from rendergraph.expand import ViewTable
 from rendergraph.gl import state as gl_state
 from rendergraph.gl.device import Device
-from rendergraph.gl.passed import Passed
 from rendergraph.gl.programs import Program
+from rendergraph.gl.queries import OcclusionQuery, Timer
 from rendergraph.gl.textures import Clear, poison_value
-from rendergraph.gl.timer import Timer
 from rendergraph.program import StepTexts, Texts, check_kept_text, positions_macro
 from rendergraph.program.variants import view_count
 from rendergraph.steps import Read, Step, Write
@@ -114,7 +113,9 @@ class _Compiler(Struct, eq=False, dict=True):
         self._geometry_draws: dict[tuple[str, int], list[Draw] | SortedDraws] = {}
         # In a context of somebody else's such a query may be under way: there all is drawn.
         asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
-        self._passed = {step.key: Passed(self.device) for step in self.plan.schedule.steps if step.key in asked}
+        self._queries = {
+            step.key: OcclusionQuery(self.device) for step in self.plan.schedule.steps if step.key in asked
+        }
         self.looks_back = False
         # Where a texture takes a block over: the driver, which knows of no sharing, has to be done with the others.
         self._takeovers = {
@@ -134,7 +135,7 @@ class _Compiler(Struct, eq=False, dict=True):
         made.vertex_arrays = partial(self.programs.forget, id(self.memory))
         made.looks_back = self.looks_back or self.views.looks_back
         made.timers = [Timer(self.device) for _ in self.plan.schedule.steps]
-        made.passed = list(self._passed.values())
+        made.occlusion_queries = list(self._queries.values())
         made.renew()
         return made
 
@@ -171,14 +172,14 @@ class _Compiler(Struct, eq=False, dict=True):
     def _watch(self, step: Step, compiled: CompiledStep) -> None:
         """See whether the step draws anything, where another one asks, and leave it out where it asks itself."""
         first, last = compiled.watched
-        after = self._passed.get((step.node, step.if_drawn)) if step.if_drawn is not None else None
+        after = self._queries.get((step.node, step.if_drawn)) if step.if_drawn is not None else None
         if after is not None:
-            first.append(after.only_if)
-        if step.key in self._passed:
-            first.append(self._passed[step.key].start)
-            last.append(self._passed[step.key].stop)
+            first.append(after.begin_conditional)
+        if step.key in self._queries:
+            first.append(self._queries[step.key].start)
+            last.append(self._queries[step.key].stop)
         if after is not None:
-            last.append(after.anyway)
+            last.append(after.end_conditional)
 
     def _fullscreen(self, step: Step, compiled: CompiledStep, parity: int) -> None:
         program, binds, uniforms = self._program(step, {})

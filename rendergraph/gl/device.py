@@ -1,4 +1,4 @@
-"""The GL device: opening a context, what it is, what it can."""
+"""The GL device: opening a context, its identity and its limits."""
 
 from __future__ import annotations
 
@@ -25,12 +25,10 @@ class Device(Struct, eq=False, dict=True):
     """An OpenGL context with its raw functions.
 
     Attributes:
-        ctx: moderngl's context.
-        raw: the raw functions.
         owned: whether `release` ends the context; a borrowed one stays its owner's.
-        limits: what the driver offers at most.
-        textures_made: how many textures have been allocated so far.
-        mips: the program of `fill_mips`, where it has been needed.
+        limits: the driver's maxima.
+        textures_made: number of textures allocated so far.
+        mips: the program of `fill_mips`, once needed.
     """
 
     ctx: moderngl.Context
@@ -43,38 +41,37 @@ class Device(Struct, eq=False, dict=True):
     _sample_positions: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
 
     def unbind(self) -> None:
-        """Bind a framebuffer of the device's own: moderngl binds again what was bound last, freed or not."""
+        """Bind a framebuffer of the device's own: moderngl rebinds the last one, even if it has been freed."""
         if self._idle is None:
             self._idle = self.ctx.framebuffer([self.ctx.renderbuffer((1, 1))])
         self._idle.use()
 
     def sample_positions(self, count: int) -> list[tuple[float, float]]:
-        """Where each sample of a multisampled texture lies in its texel, from 0 to 1, bottom left first."""
+        """Return the position of each sample in its texel, from 0 to 1, from the bottom left."""
         if count not in self._sample_positions:
             texture = self.ctx.texture((1, 1), 4, samples=count)
             framebuffer = self.ctx.framebuffer([texture])
             framebuffer.use()
-            place = (ctypes.c_float * 2)()
-            found = []
+            position = (ctypes.c_float * 2)()
+            positions = self._sample_positions[count] = []
             for number in range(count):
-                self.raw.glGetMultisamplefv(0x8E50, number, ctypes.byref(place))
-                found.append((float(place[0]), float(place[1])))
-            self._sample_positions[count] = found
+                self.raw.glGetMultisamplefv(0x8E50, number, ctypes.byref(position))
+                positions.append((float(position[0]), float(position[1])))
             self.unbind()
             framebuffer.release()
             texture.release()
         return self._sample_positions[count]
 
     def current(self) -> AbstractContextManager[Any]:
-        """Where everything that touches GL is done.
+        """Return a context manager for everything that touches GL.
 
-        An owned context is the thread's current one meanwhile; what was current before is again afterwards. A borrowed
-        one, which its owner makes current, is set to what drawing needs, and is given back as it was found.
+        It makes an owned context the thread's current one and restores the previous one afterwards. A borrowed one,
+        which its owner makes current, is set to what drawing needs and given back as it was.
         """
-        return self._own() if self.owned else self._borrowed()
+        return self._owned() if self.owned else self._borrowed()
 
     @contextmanager
-    def _own(self) -> Iterator[None]:
+    def _owned(self) -> Iterator[None]:
         with previous_context(), self.ctx:
             yield
 
@@ -94,26 +91,24 @@ class Device(Struct, eq=False, dict=True):
 
     @property
     def can_time(self) -> bool:
-        """Whether a time query can begin: the owner of a borrowed context may have one under way."""
+        """Whether a time query can begin: the owner of a borrowed context may have one active."""
         return self.owned or not self.raw.current_query(TIME_ELAPSED)
 
     @property
     def renderer(self) -> str:
-        """GL_RENDERER."""
         return str(self.ctx.info["GL_RENDERER"])
 
     @property
     def software(self) -> bool:
-        """Whether it is a rasteriser on the CPU, whose times say nothing about GPUs."""
+        """Whether it is a rasteriser on the CPU, whose times do not transfer to GPUs."""
         return any(name in self.renderer.lower() for name in SOFTWARE_RENDERERS)
 
     @cached_property
     def has_depth_bounds(self) -> bool:
-        """Whether fragments can be kept to a range of the depth that is there."""
         return "GL_EXT_depth_bounds_test" in self.ctx.extensions
 
     def as_json(self) -> dict[str, object]:
-        """What pictures and reports say about it."""
+        """Return the fields that pictures and reports contain."""
         return {
             "renderer": self.renderer,
             "vendor": str(self.ctx.info["GL_VENDOR"]),
@@ -122,13 +117,13 @@ class Device(Struct, eq=False, dict=True):
         }
 
     def release(self) -> None:
-        """End the context if it is ours."""
+        """End the context if it is owned."""
         if self.mips is not None:
             with self.current():
                 self.mips.release()
             self.mips = None
         if self._idle is not None:
-            with self.current():  # names of another context that is current would be freed otherwise
+            with self.current():  # otherwise names of another current context would be freed
                 for attachment in self._idle.color_attachments:
                     attachment.release()
                 self._idle.release()
@@ -139,12 +134,12 @@ class Device(Struct, eq=False, dict=True):
 
 @cache
 def first_process() -> int:
-    """The process that asked first, which a forked one remembers."""
+    """Return the first process that called this; a fork inherits the answer."""
     return os.getpid()
 
 
 def open_device(index: int | None = None) -> Device:
-    """A headless context on the machine's GL device.
+    """Open a headless context on the machine's GL device.
 
     Args:
         index: EGL device number as `doctor` lists them; None for the default, or RENDERGRAPH_DEVICE where set.
@@ -154,8 +149,8 @@ def open_device(index: int | None = None) -> Device:
     """
     if first_process() != os.getpid():
         text = (
-            "OpenGL has been used in the process that this one was forked from, and drivers do not survive that; "
-            "start processes anew, as multiprocessing does with 'spawn'"
+            "OpenGL was used before this process was forked, and drivers do not survive a fork; "
+            "start new processes instead, as multiprocessing does with 'spawn'"
         )
         raise DeviceError(Problem("RG611", text))
     named = os.environ.get("RENDERGRAPH_DEVICE", "0")
@@ -174,7 +169,7 @@ def open_device(index: int | None = None) -> Device:
             }
             context = egl.create_context(mode="standalone", glversion=REQUIRED_VERSION, device_index=chosen, **names)
             ctx = moderngl.create_context(context=context)
-            return wrap(ctx, context.load, owned=True)
+            return _wrap(ctx, context.load, owned=True)
     except DeviceError:
         raise
     except Exception as error:  # glcontext raises bare Exception, with a different text a cause
@@ -183,17 +178,13 @@ def open_device(index: int | None = None) -> Device:
 
 
 def borrow_device(ctx: moderngl.Context) -> Device:
-    """The caller's current context; it stays the caller's, state and all.
-
-    Raises:
-        DeviceError: it is older than OpenGL 4.5, or no loader of GL functions is found.
-    """
-    return wrap(ctx, _system_loader(), owned=False)
+    """Return a device for the caller's current context; its state stays the caller's."""
+    return _wrap(ctx, _system_loader(), owned=False)
 
 
 @contextmanager
 def previous_context() -> Iterator[None]:
-    """Makes current again what is current now: moderngl leaves a context with none being current."""
+    """Restore the current context afterwards: moderngl leaves its own with no context being current."""
     egl = _egl()
     if egl is None or not (before := egl.eglGetCurrentContext()):
         yield
@@ -207,7 +198,7 @@ def previous_context() -> Iterator[None]:
 
 @cache
 def _egl() -> Any:
-    """The functions about current contexts, None where there is no EGL."""
+    """Return the functions about current contexts, None without EGL."""
     try:
         egl = ctypes.CDLL("libEGL.so.1")
     except OSError:
@@ -219,21 +210,20 @@ def _egl() -> Any:
 
 
 def _system_loader() -> Callable[[str], int]:
-    """The address of a GL function of whatever context is current."""
+    """Return a loader of GL functions of the current context."""
     for library, name in (("libEGL.so.1", "eglGetProcAddress"), ("libGL.so.1", "glXGetProcAddressARB")):
         try:
             function = getattr(ctypes.CDLL(library), name)
         except (OSError, AttributeError):
             continue
         function.argtypes, function.restype = [ctypes.c_char_p], ctypes.c_void_p
-        return lambda wanted: function(wanted.encode()) or 0
-    raise DeviceError(
-        Problem("RG611", "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more")
-    )
+        return lambda symbol: function(symbol.encode()) or 0
+    text = "neither libEGL.so.1 nor libGL.so.1 can be loaded; `rendergraph doctor` says more"
+    raise DeviceError(Problem("RG611", text))
 
 
-def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
-    """A `Device` of a context, checked for what we need."""
+def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
+    """Return a device for a context, after checking its version."""
     if ctx.version_code < REQUIRED_VERSION:
         text = f"{ctx.info['GL_RENDERER']} offers OpenGL {ctx.version_code / 100:.1f}; rendergraph needs 4.5"
         raise DeviceError(Problem("RG611", text))
@@ -253,5 +243,5 @@ def wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "storage_bindings": raw.integer(0x90DD),
         **{f"groups_{axis}": raw.integer_at(0x91BE, number) for number, axis in enumerate("xyz")},
     }
-    raw.error()  # of limits that this driver does not know
+    raw.error()  # from limits that this driver does not know
     return Device(ctx, raw, owned, limits)

@@ -1,4 +1,4 @@
-"""The EGL devices of this machine, without opening one."""
+"""The EGL devices of this machine, listed without opening one."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _MOST_DEVICES = 32
 
 
 def devices() -> list[dict[str, Any]]:
-    """The EGL devices in the order of their numbers (EGL_EXT_device_enumeration, EGL_EXT_device_query).
+    """Return the EGL devices by number (EGL_EXT_device_enumeration, EGL_EXT_device_query).
 
     Raises:
-        OSError: there is no EGL, or it lists no devices.
+        OSError: EGL is missing, or lists no devices.
     """
     egl = ctypes.CDLL("libEGL.so.1")
     egl.eglGetProcAddress.restype = ctypes.c_void_p
@@ -58,7 +58,7 @@ def devices() -> list[dict[str, Any]]:
 
 
 def hardware() -> tuple[int, ...]:
-    """The numbers of the devices that are no rasterisers on the CPU; none where nobody can say."""
+    """Return the numbers of the devices that are not software rasterisers; none if they cannot be listed."""
     try:
         return tuple(device["number"] for device in devices() if not device["software"])
     except OSError:

@@ -1,4 +1,4 @@
-"""How much memory a plan may take: what the driver says is free on the device, or the machine's own."""
+"""How much memory a plan may use: what the driver reports as free on the device, or what the machine has."""
 
 from __future__ import annotations
 
@@ -20,12 +20,7 @@ def check_memory(device: Device, needed: int, allowed: int | None = None) -> Non
     Args:
         device: where the textures would be.
         needed: bytes.
-        allowed: MiB that may be used; by default what RENDERGRAPH_MEMORY_LIMIT says, else three quarters of what is
-            free on the device.
-
-    Raises:
-        RenderError: it needs more than that.
-        UsageError: RENDERGRAPH_MEMORY_LIMIT is no whole number.
+        allowed: MiB; by default RENDERGRAPH_MEMORY_LIMIT, else three quarters of what is free on the device.
     """
     named = os.environ.get(VARIABLE, "")
     if allowed is None and named:
@@ -33,12 +28,11 @@ def check_memory(device: Device, needed: int, allowed: int | None = None) -> Non
             raise UsageError(Problem("RG500", f"{VARIABLE} is '{named}', not a number of MiB, as in 4096"))
         allowed = int(named)
     if allowed is not None:
-        limit = allowed << 20
-        of = ""
+        limit, of = allowed << 20, ""
     else:
         free = free_on_device(device) or free_on_machine()
         if free is None:
-            return  # nobody says
+            return
         limit = free * 3 // 4
         of = f", three quarters of the {free / 2**20:.0f} MiB that are free"
     if needed > limit:
@@ -50,7 +44,7 @@ def check_memory(device: Device, needed: int, allowed: int | None = None) -> Non
 
 
 def free_on_device(device: Device) -> int | None:
-    """Bytes the driver says are free for textures, None where it does not say or the device is the CPU itself."""
+    """Return the bytes that the driver reports as free for textures, None if it does not or the device is the CPU."""
     if device.software:
         return None
     for extension, parameter in (
@@ -66,12 +60,11 @@ def free_on_device(device: Device) -> int | None:
 
 
 def free_on_machine() -> int | None:
-    """Bytes that can be had: what the system would give up of its file cache counts, a container's bound too."""
-    found = [bytes for bytes in (_of_system(), _of_group()) if bytes is not None]
-    return min(found, default=None)
+    """Return the bytes available to a process: reclaimable file cache counts, and so does a container's limit."""
+    return min((bytes for bytes in (_free_in_system(), _free_in_group()) if bytes is not None), default=None)
 
 
-def _of_system() -> int | None:
+def _free_in_system() -> int | None:
     try:
         with open("/proc/meminfo", encoding="ascii") as lines:
             for line in lines:
@@ -82,8 +75,8 @@ def _of_system() -> int | None:
         return None
 
 
-def _of_group() -> int | None:
-    """What is left of a control group's memory (version 2), None where it has no bound."""
+def _free_in_group() -> int | None:
+    """Return what is left of a control group's memory (version 2), None if it has no limit."""
     try:
         bound = (_GROUP / "memory.max").read_text(encoding="ascii").strip()
         used = int((_GROUP / "memory.current").read_text(encoding="ascii"))

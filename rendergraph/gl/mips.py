@@ -1,8 +1,8 @@
-"""The levels of a picture of light, each the exact mean of the one above.
+"""Mip levels of a float texture, each the exact mean of the one above.
 
-By a program of ours: Mesa's software rasteriser compiles its own anew in each process, 0.1 to 0.15 s for each format,
-while it keeps compiled programs of its users on disk. Pictures of bytes are left to the driver, which is faster at them
-from a few million texels on.
+A compute shader does it: Mesa's software rasteriser compiles its own program anew in each process, 0.1 to 0.15 s for
+each format, but keeps those of its users on disk. Byte textures are left to the driver, which is faster at them from a
+few million texels on.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ void main() {
 
 
 def fill_mips(device: Device, texture: GpuTexture) -> None:
-    """Fill all levels of a 2D texture of floats, the first of which is there; unit 0 of textures and images is used."""
+    """Fill the levels of a 2D float texture from its first; uses texture and image unit 0."""
     if device.mips is None:
         device.mips = device.ctx.compute_shader(_TEXT)
     desc, raw, program = texture.desc, device.raw, device.mips

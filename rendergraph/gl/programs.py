@@ -27,69 +27,34 @@ _NAME_LENGTH, _TYPE, _ARRAY_SIZE, _BLOCK_INDEX, _LOCATION = 0x92F9, 0x92FA, 0x92
 _ACTIVE, _BUFFER_DATA_SIZE = 0x92F5, 0x9303
 _LINK_STATUS = 0x8B82
 
-_WRITERS: dict[int, tuple[str, Any, int]] = {  # GL type: raw function, NumPy type, numbers per element
-    0x1406: ("glProgramUniform1fv", np.float32, 1),
-    0x8B50: ("glProgramUniform2fv", np.float32, 2),
-    0x8B51: ("glProgramUniform3fv", np.float32, 3),
-    0x8B52: ("glProgramUniform4fv", np.float32, 4),
-    0x1404: ("glProgramUniform1iv", np.int32, 1),
-    0x8B53: ("glProgramUniform2iv", np.int32, 2),
-    0x8B54: ("glProgramUniform3iv", np.int32, 3),
-    0x8B55: ("glProgramUniform4iv", np.int32, 4),
-    0x1405: ("glProgramUniform1uiv", np.uint32, 1),
-    0x8DC6: ("glProgramUniform2uiv", np.uint32, 2),
-    0x8DC7: ("glProgramUniform3uiv", np.uint32, 3),
-    0x8DC8: ("glProgramUniform4uiv", np.uint32, 4),
-    0x8B56: ("glProgramUniform1iv", np.int32, 1),
-    0x8B57: ("glProgramUniform2iv", np.int32, 2),
-    0x8B58: ("glProgramUniform3iv", np.int32, 3),
-    0x8B59: ("glProgramUniform4iv", np.int32, 4),
-    0x8B5A: ("glProgramUniformMatrix2fv", np.float32, 4),
-    0x8B5B: ("glProgramUniformMatrix3fv", np.float32, 9),
-    0x8B5C: ("glProgramUniformMatrix4fv", np.float32, 16),
+_VALUES = {  # GL type: name in GLSL, ending of the `glProgramUniform…` that writes it
+    0x1406: ("float", "1fv"),
+    0x8B50: ("vec2", "2fv"),
+    0x8B51: ("vec3", "3fv"),
+    0x8B52: ("vec4", "4fv"),
+    0x1404: ("int", "1iv"),
+    0x8B53: ("ivec2", "2iv"),
+    0x8B54: ("ivec3", "3iv"),
+    0x8B55: ("ivec4", "4iv"),
+    0x1405: ("uint", "1uiv"),
+    0x8DC6: ("uvec2", "2uiv"),
+    0x8DC7: ("uvec3", "3uiv"),
+    0x8DC8: ("uvec4", "4uiv"),
+    0x8B56: ("bool", "1iv"),
+    0x8B57: ("bvec2", "2iv"),
+    0x8B58: ("bvec3", "3iv"),
+    0x8B59: ("bvec4", "4iv"),
+    0x8B5A: ("mat2", "Matrix2fv"),
+    0x8B5B: ("mat3", "Matrix3fv"),
+    0x8B5C: ("mat4", "Matrix4fv"),
 }
-
-_GLSL = {
-    0x1406: "float",
-    0x8B50: "vec2",
-    0x8B51: "vec3",
-    0x8B52: "vec4",
-    0x1404: "int",
-    0x8B53: "ivec2",
-    0x8B54: "ivec3",
-    0x8B55: "ivec4",
-    0x1405: "uint",
-    0x8DC6: "uvec2",
-    0x8DC7: "uvec3",
-    0x8DC8: "uvec4",
-    0x8B56: "bool",
-    0x8B57: "bvec2",
-    0x8B58: "bvec3",
-    0x8B59: "bvec4",
-    0x8B5A: "mat2",
-    0x8B5B: "mat3",
-    0x8B5C: "mat4",
-    0x8B5D: "sampler1D",
-    0x8B5E: "sampler2D",
-    0x8B5F: "sampler3D",
-    0x8B60: "samplerCube",
-    0x8B62: "sampler2DShadow",
-    0x8DC1: "sampler2DArray",
-    0x8DC4: "sampler2DArrayShadow",
-    0x8DC5: "samplerCubeShadow",
-    0x8DCA: "isampler2D",
-    0x8DCC: "isamplerCube",
-    0x8DCF: "isampler2DArray",
-    0x8DD2: "usampler2D",
-    0x8DD4: "usamplerCube",
-    0x8DD7: "usampler2DArray",
-    0x9108: "sampler2DMS",
-    0x9109: "isampler2DMS",
-    0x910A: "usampler2DMS",
-    0x910B: "sampler2DMSArray",
-    0x910C: "isampler2DMSArray",
-    0x910D: "usampler2DMSArray",
-}
+_SAMPLERS = {
+    0x8B5D: "sampler1D", 0x8B5E: "sampler2D", 0x8B5F: "sampler3D", 0x8B60: "samplerCube", 0x8B62: "sampler2DShadow",
+    0x8DC1: "sampler2DArray", 0x8DC4: "sampler2DArrayShadow", 0x8DC5: "samplerCubeShadow", 0x8DCA: "isampler2D",
+    0x8DCC: "isamplerCube", 0x8DCF: "isampler2DArray", 0x8DD2: "usampler2D", 0x8DD4: "usamplerCube",
+    0x8DD7: "usampler2DArray", 0x9108: "sampler2DMS", 0x9109: "isampler2DMS", 0x910A: "usampler2DMS",
+    0x910B: "sampler2DMSArray", 0x910C: "isampler2DMSArray", 0x910D: "usampler2DMSArray",
+}  # fmt: skip
 
 ProgramError = moderngl.Error
 
@@ -105,22 +70,27 @@ class Uniform(Struct, frozen=True):
     @property
     def glsl(self) -> str:
         """The type's name in GLSL."""
-        return _GLSL.get(self.type, "an opaque type")
+        return _SAMPLERS.get(self.type, "an opaque type") if self.is_opaque else _VALUES[self.type][0]
 
     @property
-    def numbers(self) -> int:
+    def writer(self) -> str:
+        """The raw function that writes it."""
+        return f"glProgramUniform{_VALUES[self.type][1]}"
+
+    @property
+    def number_count(self) -> int:
         """Numbers in one element."""
-        return _WRITERS[self.type][2]
+        ending = _VALUES[self.type][1]
+        return int(ending[-3]) ** 2 if "Matrix" in ending else int(ending[0])
 
     @property
-    def whole(self) -> bool:
-        """Whether it takes whole numbers or switches."""
-        return self.type in _WRITERS and _WRITERS[self.type][1] is not np.float32
+    def is_integer(self) -> bool:
+        return not self.is_opaque and not self.writer.endswith("fv")
 
     @property
-    def opaque(self) -> bool:
+    def is_opaque(self) -> bool:
         """Whether it is a sampler or an image."""
-        return self.type not in _WRITERS
+        return self.type not in _VALUES
 
 
 class Program(Struct, eq=False):
@@ -144,7 +114,6 @@ class Program(Struct, eq=False):
 
     @property
     def glo(self) -> int:
-        """The GL name."""
         return int(self.object.glo)
 
     @property
@@ -155,21 +124,22 @@ class Program(Struct, eq=False):
         return values[0], values[1], values[2]
 
     def writer(self, name: str, value: UniformValue) -> Callable[[], None] | None:
-        """A call that writes one uniform, None where the program does not look at it."""
+        """Return a call that writes one uniform, None if the program does not use it."""
         uniform = self.uniforms.get(name)
         if uniform is None:
             return None
-        if uniform.opaque:
+        if uniform.is_opaque:
             return partial(self.device.raw.glProgramUniform1i, self.glo, uniform.location, int(value))  # type: ignore[arg-type]
-        function, dtype, numbers = _WRITERS[uniform.type]
+        function = uniform.writer
+        dtype = np.float32 if not uniform.is_integer else np.uint32 if function.endswith("uiv") else np.int32
         data = np.ascontiguousarray(value, dtype).ravel()
-        count = max(1, data.size // numbers)
+        count = max(1, data.size // uniform.number_count)
         arguments: tuple[int, ...] = (self.glo, uniform.location, min(count, uniform.size))
         if "Matrix" in function:
             arguments = (*arguments, 0)  # not transposed
-        known = self.object.get(name, None) if count == uniform.size == 1 else None
-        if isinstance(known, moderngl.Uniform) and data.itemsize == 4:
-            return partial(known.write, data.tobytes())  # half the time of a call through ctypes
+        member = self.object.get(name, None) if count == uniform.size == 1 else None
+        if isinstance(member, moderngl.Uniform) and data.itemsize == 4:
+            return partial(member.write, data.tobytes())  # half the time of a call through ctypes
         write = partial(getattr(self.device.raw, function), *arguments, data.ctypes.data)
         write.data = data  # type: ignore[attr-defined]  # the array travels with the call: its address stays good
         return write
@@ -182,7 +152,6 @@ class Program(Struct, eq=False):
             self.device.raw.glShaderStorageBlockBinding(self.glo, self.storage[name], binding)
 
     def release(self) -> None:
-        """Free it."""
         self.object.release()
 
 
@@ -204,8 +173,8 @@ def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) 
                 fragment_outputs={name: number for number, name in enumerate(outputs)},
             )
     except ProgramError:
-        if device.owned:  # in a context of another's, what is found may be another's
-            _delete_left(device.raw, before)
+        if device.owned:  # in a borrowed context the objects may be the owner's
+            _delete_leftovers(device.raw, before)
         raise
     finally:
         device.raw.glDeleteProgram(before)
@@ -214,8 +183,8 @@ def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) 
     return program
 
 
-def _delete_left(raw: RawGL, before: int) -> None:
-    """Delete what moderngl leaves when a stage does not compile: the program, never linked, and the other stages."""
+def _delete_leftovers(raw: RawGL, before: int) -> None:
+    """Delete what moderngl leaves behind when a stage does not compile: the unlinked program and the other stages."""
     after = raw.glCreateProgram()
     linked = ctypes.c_int()
     for name in range(before + 1, after):
@@ -229,7 +198,7 @@ def _delete_left(raw: RawGL, before: int) -> None:
 
 
 def driver_message(error: Exception) -> tuple[str | None, str]:
-    """Stage (`vertex`, … or None for linking) and the driver's own text out of moderngl's error."""
+    """Return stage (`vertex`, … or None for linking) and the driver's own text from moderngl's error."""
     text = str(error)
     match = re.search(r"(vertex|fragment|geometry|compute)_shader\s*\n=+\n(.*)", text, re.DOTALL)
     if match:
@@ -238,7 +207,7 @@ def driver_message(error: Exception) -> tuple[str | None, str]:
 
 
 def outputs_of(program: Program) -> set[str]:
-    """The names of a program's active outputs: what its last stage writes somewhere."""
+    """Return the names of a program's active outputs: what its last stage writes."""
     raw, glo = program.device.raw, program.glo
     return {_name(raw, glo, _OUTPUT, index).removesuffix("[0]") for index in range(_count(raw, glo, _OUTPUT))}
 

@@ -1,7 +1,7 @@
-"""The state around a frame that no step states: set to what every frame needs, and given back on a borrowed context.
+"""The GL state that no step sets: set to what every frame needs, and restored on a borrowed context.
 
-One table says how each piece of OpenGL's state is read, how it is set, and what frames need of it. `settle` sets what
-is needed; `SavedState` keeps all that drawing changes and puts it back.
+One table says how each piece of OpenGL's state is read, how it is set, and which value frames need. `settle` sets these
+values; `SavedState` saves all that drawing changes and restores it.
 """
 
 from __future__ import annotations
@@ -46,26 +46,24 @@ NEEDED: dict[int, bool] = {
     0x8C36: False,  # SAMPLE_SHADING
     **{0x3000 + plane: False for plane in range(8)},  # CLIP_DISTANCE0…
 }
-"""Capabilities that no step states, and whether they are enabled while frames are drawn."""
+"""Capabilities that no step sets, and whether frames need them enabled."""
 
 _STATED = (0x0B44, 0x0B71, 0x0B90, 0x8037, 0x864F)
-"""Capabilities that each step states: CULL_FACE, DEPTH_TEST, STENCIL_TEST, POLYGON_OFFSET_FILL, DEPTH_CLAMP."""
+"""Capabilities that each step sets: CULL_FACE, DEPTH_TEST, STENCIL_TEST, POLYGON_OFFSET_FILL, DEPTH_CLAMP."""
 
 _INDEXED = ((0x0BE2, _DRAW_BUFFERS), (0x0C11, _VIEWPORTS))
-"""Capabilities of each draw buffer or viewport, which steps and framebuffers state: BLEND, SCISSOR_TEST."""
+"""Capabilities of each draw buffer or viewport, set by steps and framebuffers: BLEND, SCISSOR_TEST."""
 
 
 class Setting(Struct, frozen=True):
-    """A function that sets state, and how what it takes is found.
+    """A raw function that sets state, and how its arguments are queried.
 
     Attributes:
-        call: the raw function.
-        first: what it takes before the values.
-        queries: parameter and number of values, in the order the function takes them.
-        kind: `i` for whole numbers, `f` for fractions.
-        count: for state of which there are several, the parameter that says how many; the function then takes an index
-            after `first`.
-        needed: the values while frames are drawn, None where steps say or it does not matter.
+        queries: parameter and number of values, in the order of the arguments.
+        first: the arguments before the values.
+        kind: `i` for integers, `f` for floats.
+        count: for indexed state, the parameter with the number of indices; the index is the argument after `first`.
+        needed: the values while frames are drawn, None if steps set them or they do not matter.
     """
 
     call: str
@@ -143,18 +141,9 @@ _BLOCKS = (
 """Target, number of binding points; parameters for the buffer, its start and its size at each."""
 
 _TEXTURES = {
-    0x0DE0: 0x8068,
-    0x0DE1: 0x8069,
-    0x806F: 0x806A,
-    0x8C18: 0x8C1C,
-    0x8C1A: 0x8C1D,
-    0x84F5: 0x84F6,
-    0x8513: 0x8514,
-    0x9009: 0x900A,
-    0x8C2A: 0x8C2C,
-    0x9100: 0x9104,
-    0x9102: 0x9105,
-}
+    0x0DE0: 0x8068, 0x0DE1: 0x8069, 0x806F: 0x806A, 0x8C18: 0x8C1C, 0x8C1A: 0x8C1D, 0x84F5: 0x84F6, 0x8513: 0x8514,
+    0x9009: 0x900A, 0x8C2A: 0x8C2C, 0x9100: 0x9104, 0x9102: 0x9105,
+}  # fmt: skip
 """Texture target to the parameter that says what is bound to it."""
 
 _READERS: dict[tuple[str, bool], tuple[str, Any]] = {
@@ -166,7 +155,7 @@ _READERS: dict[tuple[str, bool], tuple[str, Any]] = {
 
 
 def settle(raw: RawGL) -> None:
-    """Set what frames need and no step states."""
+    """Set the state that frames need and no step sets."""
     for capability, on in NEEDED.items():
         (raw.glEnable if on else raw.glDisable)(capability)
     for setting in SETTINGS:
@@ -178,28 +167,20 @@ def settle(raw: RawGL) -> None:
 
 
 class SavedState:
-    """A borrowed context's state as its owner has it, and the way back to it.
+    """A borrowed context's state as its owner left it.
 
-    Not kept, since drawing does not touch it: program pipelines, tessellation, hints but one, clear values, atomic
-    counters, debug output. A query that the owner has begun counts what is drawn meanwhile.
-
-    Attributes:
-        enabled: capabilities and whether they are.
-        indexed: the same of each draw buffer and viewport.
-        units: the active unit, and each unit with its sampler and textures.
-        images: what is bound to each image unit.
-        blocks: what is bound to each binding point of blocks.
-        settings: raw functions and what they are called with.
+    Not saved, since drawing does not touch it: program pipelines, tessellation, all hints but one, clear values, atomic
+    counters, debug output. A query that the owner has begun also counts what is drawn meanwhile.
     """
 
     def __init__(self, raw: RawGL, ctx: moderngl.Context) -> None:
-        """Read everything; a transform feedback under way is paused.
+        """Read everything and pause an active transform feedback.
 
         Raises:
-            RenderError: conditional rendering is under way, which can neither be paused nor taken up again.
+            RenderError: conditional rendering is active, which can be neither paused nor resumed.
         """
         self._raw, self._ctx = raw, ctx
-        raw.error()  # the owner's own, which must not be taken for ours
+        raw.error()  # an error of the owner's must not be taken for ours
         _refuse_conditional(raw)
         self._feedback = bool(raw.integer(_FEEDBACK_ACTIVE)) and not raw.integer(_FEEDBACK_PAUSED)
         if self._feedback:
@@ -212,7 +193,7 @@ class SavedState:
             for index in range(raw.integer(count))
         ]
         self.units = raw.integer(_ACTIVE_TEXTURE), list(_units(raw, raw.integer(_TEXTURE_UNITS)))
-        raw.glActiveTexture(self.units[0])  # which looking has moved
+        raw.glActiveTexture(self.units[0])  # which the queries have changed
         self.images = list(_images(raw))
         self.blocks = list(_blocks(raw))
         self.settings = [
@@ -222,7 +203,6 @@ class SavedState:
         ]
 
     def restore(self) -> None:
-        """Set everything as it was."""
         raw = self._raw
         self._ctx.fbo, self._ctx.mglo.fbo = self._framebuffer
         for capability, on in self.enabled:
@@ -244,7 +224,7 @@ class SavedState:
                 raw.glBindBufferRange(target, index, buffer, start, size)
             else:
                 raw.glBindBufferBase(target, index, buffer)
-        for call, arguments in self.settings:  # after the points of blocks, which change what is bound beside them
+        for call, arguments in self.settings:  # after the blocks, which change the plain bindings too
             call(*arguments)
         if self._feedback:
             raw.glResumeTransformFeedback()
@@ -263,7 +243,7 @@ def _values(raw: RawGL, setting: Setting, index: tuple[int, ...]) -> Iterator[fl
 
 
 def _units(raw: RawGL, count: int) -> Iterator[tuple[int, int, list[tuple[int, int]]]]:
-    """Each unit with its sampler and its textures by target."""
+    """Yield each unit with its sampler and its textures by target."""
     value = ctypes.c_int()
     address = ctypes.byref(value)
     for unit in range(count):
@@ -277,7 +257,7 @@ def _units(raw: RawGL, count: int) -> Iterator[tuple[int, int, list[tuple[int, i
 
 
 def _images(raw: RawGL) -> Iterator[tuple[Any, ...]]:
-    """What `glBindImageTexture` takes for each image unit: unit, texture, level, layered, layer, access, format."""
+    """Yield the arguments of `glBindImageTexture` for each image unit."""
     value = ctypes.c_int()
     for unit in range(raw.integer(_IMAGE_UNITS)):
         raw.glGetIntegeri_v(0x8F3A, unit, ctypes.byref(value))
@@ -292,7 +272,7 @@ def _images(raw: RawGL) -> Iterator[tuple[Any, ...]]:
 
 
 def _blocks(raw: RawGL) -> Iterator[tuple[int, int, int, int, int]]:
-    """Target, index, buffer, start and size of each binding point; size 0 is the whole buffer."""
+    """Yield target, index, buffer, start and size of each binding point; size 0 is the whole buffer."""
     value = ctypes.c_int64()
     for target, count, parameters in _BLOCKS:
         for index in range(raw.integer(count)):
@@ -306,7 +286,7 @@ def _blocks(raw: RawGL) -> Iterator[tuple[int, int, int, int, int]]:
 
 
 def _refuse_conditional(raw: RawGL) -> None:
-    """OpenGL has no query for it, but begins none inside another."""
+    """Refuse active conditional rendering, for which OpenGL has no query: try to begin one inside it."""
     query = raw.make("glCreateQueries", _SAMPLES_PASSED)
     raw.glBeginConditionalRender(query, _QUERY_NO_WAIT)
     under_way = raw.error() is not None
@@ -314,5 +294,5 @@ def _refuse_conditional(raw: RawGL) -> None:
         raw.glEndConditionalRender()
     raw.delete("glDeleteQueries", query)
     if under_way:
-        text = "conditional rendering is under way in the borrowed context; end it with glEndConditionalRender first"
+        text = "conditional rendering is active in the borrowed context; end it with glEndConditionalRender first"
         raise RenderError(Problem("RG618", text))

@@ -2,44 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
+from typing import get_args
 
 from rendergraph.gl.raw import RawGL
-from rendergraph.steps import Blend, State, StencilFace
+from rendergraph.steps import Compare, State, Stencil
 
-_COMPARE = {
-    "never": 0x200,
-    "less": 0x201,
-    "equal": 0x202,
-    "lequal": 0x203,
-    "greater": 0x204,
-    "notequal": 0x205,
-    "gequal": 0x206,
-    "always": 0x207,
-}
+_COMPARE = {name: 0x200 + number for number, name in enumerate(get_args(Compare))}
 _STENCIL_OP = {
-    "keep": 0x1E00,
-    "zero": 0,
-    "replace": 0x1E01,
-    "incr": 0x1E02,
-    "incr_wrap": 0x8507,
-    "decr": 0x1E03,
-    "decr_wrap": 0x8508,
-    "invert": 0x150A,
-}
+    "keep": 0x1E00, "zero": 0, "replace": 0x1E01, "incr": 0x1E02, "incr_wrap": 0x8507, "decr": 0x1E03,
+    "decr_wrap": 0x8508, "invert": 0x150A,
+}  # fmt: skip
 _FACTOR = {
-    "zero": 0,
-    "one": 1,
-    "src_color": 0x300,
-    "one_minus_src_color": 0x301,
-    "src_alpha": 0x302,
-    "one_minus_src_alpha": 0x303,
-    "dst_alpha": 0x304,
-    "one_minus_dst_alpha": 0x305,
-    "dst_color": 0x306,
+    "zero": 0, "one": 1, "src_color": 0x300, "one_minus_src_color": 0x301, "src_alpha": 0x302,
+    "one_minus_src_alpha": 0x303, "dst_alpha": 0x304, "one_minus_dst_alpha": 0x305, "dst_color": 0x306,
     "one_minus_dst_color": 0x307,
-}
+}  # fmt: skip
 _EQUATION = {"add": 0x8006, "min": 0x8007, "max": 0x8008, "subtract": 0x800A, "reverse_subtract": 0x800B}
 _CULL = {"front": 0x404, "back": 0x405}
 _BLEND, _CULL_FACE, _DEPTH_TEST, _STENCIL_TEST, _OFFSET, _CLAMP = 0x0BE2, 0x0B44, 0x0B71, 0x0B90, 0x8037, 0x864F
@@ -64,69 +43,43 @@ def pieces(
         targets: number of colour targets.
     """
 
-    def on(capability: int) -> Call:
-        return partial(raw.glEnable, capability)
+    def switch(capability: int, on: bool, *more: Call) -> tuple[Call, ...]:
+        return (partial(raw.glEnable, capability), *more) if on else (partial(raw.glDisable, capability),)
 
-    def off(capability: int) -> Call:
-        return partial(raw.glDisable, capability)
-
-    calls: Pieces = {}
-    calls["depth"] = (
-        (on(_DEPTH_TEST), partial(raw.glDepthFunc, _COMPARE[state.depth_func])) if depth_test else (off(_DEPTH_TEST),)
-    )
-    calls["cull"] = (on(_CULL_FACE), partial(raw.glCullFace, _CULL[cull])) if cull != "none" else (off(_CULL_FACE),)
-    calls["front"] = (partial(raw.glFrontFace, 0x900 if clockwise else 0x901),)
-    calls["blend"] = tuple(_blend(raw, state, targets))
-    calls["stencil"] = tuple(_stencil(raw, state))
-    calls["offset"] = (
-        (on(_OFFSET), partial(raw.glPolygonOffset, *state.polygon_offset)) if state.polygon_offset else (off(_OFFSET),)
-    )
-    calls["clamp"] = (on(_CLAMP),) if state.depth_clamp else (off(_CLAMP),)
-    calls["fill"] = (partial(raw.glPolygonMode, 0x408, 0x1B01 if state.wireframe else 0x1B02),)
-    return calls
+    return {
+        "depth": switch(_DEPTH_TEST, depth_test, partial(raw.glDepthFunc, _COMPARE[state.depth_func])),
+        "cull": switch(_CULL_FACE, cull != "none", partial(raw.glCullFace, _CULL.get(cull, 0))),
+        "front": (partial(raw.glFrontFace, 0x900 if clockwise else 0x901),),
+        "blend": tuple(_blend(raw, state, targets)),
+        "stencil": switch(_STENCIL_TEST, state.stencil is not None, *_stencil(raw, state.stencil)),
+        "offset": switch(
+            _OFFSET, state.polygon_offset is not None, partial(raw.glPolygonOffset, *(state.polygon_offset or ()))
+        ),
+        "clamp": switch(_CLAMP, state.depth_clamp),
+        "fill": (partial(raw.glPolygonMode, 0x408, 0x1B01 if state.wireframe else 0x1B02),),
+    }
 
 
-def _blend(raw: RawGL, state: State, targets: int) -> list[Call]:
+def _blend(raw: RawGL, state: State, targets: int) -> Iterator[Call]:
     blends = state.blend if isinstance(state.blend, tuple) else (state.blend,) * max(1, targets)
-    calls: list[Call] = []
     for index, blend in enumerate(blends):
         if blend is None:
-            calls.append(partial(raw.glDisablei, _BLEND, index))
+            yield partial(raw.glDisablei, _BLEND, index)
             continue
-        calls += [
-            partial(raw.glEnablei, _BLEND, index),
-            partial(raw.glBlendFuncSeparatei, index, *_factors(blend)),
-            partial(raw.glBlendEquationi, index, _EQUATION[blend.op]),
-        ]
-    return calls
+        factors = blend.src, blend.dst, blend.src_alpha or blend.src, blend.dst_alpha or blend.dst
+        yield partial(raw.glEnablei, _BLEND, index)
+        yield partial(raw.glBlendFuncSeparatei, index, *(_FACTOR[name] for name in factors))
+        yield partial(raw.glBlendEquationi, index, _EQUATION[blend.op])
 
 
-def _factors(blend: Blend) -> tuple[int, int, int, int]:
-    src, dst = _FACTOR[blend.src], _FACTOR[blend.dst]
-    return src, dst, _FACTOR[blend.src_alpha or blend.src], _FACTOR[blend.dst_alpha or blend.dst]
-
-
-def _stencil(raw: RawGL, state: State) -> list[Call]:
-    if state.stencil is None:
-        return [partial(raw.glDisable, _STENCIL_TEST)]
-    calls: list[Call] = [partial(raw.glEnable, _STENCIL_TEST)]
-    faces: tuple[tuple[int, StencilFace], ...] = (
-        (_CULL["front"], state.stencil.front),
-        (_CULL["back"], state.stencil.back or state.stencil.front),
-    )
-    for face, s in faces:
-        calls += [
-            partial(raw.glStencilFuncSeparate, face, _COMPARE[s.func], s.reference, s.read_mask),
-            partial(
-                raw.glStencilOpSeparate,
-                face,
-                _STENCIL_OP[s.stencil_fail],
-                _STENCIL_OP[s.depth_fail],
-                _STENCIL_OP[s.depth_pass],
-            ),
-            partial(raw.glStencilMaskSeparate, face, s.write_mask),
-        ]
-    return calls
+def _stencil(raw: RawGL, stencil: Stencil | None) -> Iterator[Call]:
+    if stencil is None:
+        return
+    for face, s in ((_CULL["front"], stencil.front), (_CULL["back"], stencil.back or stencil.front)):
+        operations = [_STENCIL_OP[name] for name in (s.stencil_fail, s.depth_fail, s.depth_pass)]
+        yield partial(raw.glStencilFuncSeparate, face, _COMPARE[s.func], s.reference, s.read_mask)
+        yield partial(raw.glStencilOpSeparate, face, *operations)
+        yield partial(raw.glStencilMaskSeparate, face, s.write_mask)
 
 
 def changes(before: Pieces | None, after: Pieces) -> list[Call]:

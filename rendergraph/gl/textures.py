@@ -1,7 +1,7 @@
-"""Textures as immutable storage and views of it; reading back and clearing in one place each.
+"""Textures as immutable storage, views of them, transfers, clears and samplers.
 
-Storage is immutable because views need it; samplers are separate objects because two readers of one texture may
-differ and aliased textures would otherwise share filter state.
+Views need immutable storage. Samplers are separate objects, as two readers of one texture may differ and aliased
+textures would otherwise share filter state.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device
 from rendergraph.textures import FORMATS, Sampler, TextureDesc
 
-MOST_READ = 1 << 30
-"""Bytes that are read back at once."""
+MOST_READ = 1 << 30  # bytes read back at once
 
 _TARGETS = {"texture2d": 0x0DE1, "texture2d_array": 0x8C1A, "texture_cube": 0x8513}
 _MULTISAMPLE_TARGETS = {"texture2d": 0x9100, "texture2d_array": 0x9102}
@@ -40,18 +39,11 @@ class GpuTexture(Struct, frozen=True):
 
 
 def target_of(desc: TextureDesc) -> int:
-    """The GL texture target."""
     return _MULTISAMPLE_TARGETS[desc.kind] if desc.samples > 1 else _TARGETS[desc.kind]
 
 
 def create(device: Device, desc: TextureDesc, label: str = "", *, memory: int | None = None) -> GpuTexture:
-    """Allocate a texture.
-
-    Args:
-        device: where.
-        desc: what.
-        label: what an error calls it.
-        memory: a memory object at whose beginning it lies; by default it has memory of its own.
+    """Allocate a texture, in memory of its own or at the beginning of a memory object; `label` is its name in errors.
 
     Raises:
         RenderError: the driver refused, mostly for lack of memory.
@@ -85,9 +77,9 @@ def create(device: Device, desc: TextureDesc, label: str = "", *, memory: int | 
 def view(
     device: Device, texture: GpuTexture, *, format: str | None = None, mip: int | None = None, layer: int | None = None
 ) -> GpuTexture:
-    """The same storage seen in another format of its texel class, or one mip or layer as a 2D texture."""
+    """Return a view of a texture in another format of its texel class, or of one mip or layer as a 2D texture."""
     desc = texture.desc
-    shown = TextureDesc(
+    viewed = TextureDesc(
         kind=desc.kind if layer is None else "texture2d",
         format=format or desc.format,
         width=desc.mip_size(mip or 0)[0],
@@ -98,23 +90,23 @@ def view(
     )
     raw = device.raw
     glo = raw.make("glGenTextures")
-    target = target_of(shown)
+    target = target_of(viewed)
     raw.glTextureView(
-        glo, target, texture.glo, FORMATS[shown.format].gl, mip or 0, shown.mips, layer or 0, max(1, shown.layers)
+        glo, target, texture.glo, FORMATS[viewed.format].gl, mip or 0, viewed.mips, layer or 0, max(1, viewed.layers)
     )
     error = raw.error()
     if error:
-        raise RenderError(Problem("RG612", f"the driver refused a texture view of {desc} as {shown} ({error})"))
-    return GpuTexture(glo, target, shown)
+        raise RenderError(Problem("RG612", f"the driver refused a texture view of {desc} as {viewed} ({error})"))
+    return GpuTexture(glo, target, viewed)
 
 
 def delete(device: Device, texture: GpuTexture) -> None:
-    """Free it; storage lives until its last view is gone."""
+    """Free a texture; its storage lives until its last view is gone."""
     device.raw.delete("glDeleteTextures", texture.glo)
 
 
 def copies(device: Device, source: GpuTexture, target: GpuTexture) -> list[Callable[[], object]]:
-    """The calls that copy all texels of one texture to another of its description."""
+    """Return the calls that copy all texels of one texture to another of its description."""
     return [
         partial(
             device.raw.glCopyImageSubData,
@@ -127,7 +119,7 @@ def copies(device: Device, source: GpuTexture, target: GpuTexture) -> list[Calla
 
 
 def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
-    """GL format, GL type, NumPy type and components in which texels travel."""
+    """Return GL format, GL type, NumPy type and components for transfers."""
     fmt = FORMATS[format_name]
     if fmt.family == "depth":
         return _DEPTH_COMPONENT, _FLOAT, np.float32, 1
@@ -145,17 +137,10 @@ def transfer_format(format_name: str) -> tuple[int, int, Any, int]:
 def read(
     device: Device, texture: GpuTexture, *, mip: int = 0, layer: int | None = None, stencil: bool = False
 ) -> npt.NDArray[Any]:
-    """Texels as (layers, height, width, channels), the top row first.
+    """Return texels as (layers, height, width, channels), top row first; `stencil` as 32-bit integers, not the depth.
 
-    Samples are resolved: the mean of colours, one sample of depth, stencil and whole numbers. `finish` comes first:
+    Samples are resolved: the mean of colours, one sample of depth, stencil and integers. `finish` comes first:
     without it a software rasteriser has returned stale texels.
-
-    Args:
-        device: where it is.
-        texture: what is read.
-        mip: its level.
-        layer: one layer alone; all of them by default.
-        stencil: the stencil as 32-bit integers, in place of the depth.
     """
     desc = texture.desc
     if desc.samples > 1:
@@ -179,7 +164,7 @@ def read(
         raise RenderError(Problem("RG613", f"reading back a {desc.format} texture failed ({error})"))
     if FORMATS[desc.format].family == "depth_stencil":
         texels = texels[..., 1:].view(np.uint32) & 255 if stencil else texels[..., :1]
-    if FORMATS[desc.format].srgb:  # drivers hand out the encoded bytes; what the texels mean is linear
+    if FORMATS[desc.format].srgb:  # drivers return the encoded bytes; the values that the texels mean are linear
         code = np.arange(256) / 255
         linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
         colors, alpha = np.take(linear, texels[..., :3]), texels[..., 3:] / np.float32(255)
@@ -188,7 +173,7 @@ def read(
 
 
 def _bands(layers: int, height: int, row: int) -> Iterator[tuple[int, int, int, int]]:
-    """First layer, layers, first row and rows of the parts read at once: OpenGL counts their bytes in 31 bits."""
+    """Yield first layer, layers, first row and rows of each read: OpenGL counts its bytes in 31 bits."""
     if layers * height * row <= MOST_READ:
         yield 0, layers, 0, height
         return
@@ -229,7 +214,7 @@ def _resolved(device: Device, texture: GpuTexture) -> GpuTexture:
 
 
 def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip: int = 0) -> None:
-    """Write (layers, height, width, channels) or (height, width, channels) into one mip, rows as given."""
+    """Write (layers, height, width, channels) or (height, width, channels) into one mip, rows in the order given."""
     desc = texture.desc
     width, height = desc.mip_size(mip)
     gl_format, gl_type, dtype, channels = transfer_format(desc.format)
@@ -245,7 +230,7 @@ def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip
 
 
 def upload_bytes(device: Device, texture: GpuTexture, texels: npt.NDArray[np.uint8]) -> None:
-    """Write (height, width, 4) bytes into mip 0 as they are, sRGB-encoded where the format says so."""
+    """Write (height, width, 4) bytes into mip 0 unchanged, so sRGB-encoded for an sRGB format."""
     data = np.ascontiguousarray(texels)
     height, width = data.shape[:2]
     device.raw.glPixelStorei(0x0CF5, 1)
@@ -253,7 +238,7 @@ def upload_bytes(device: Device, texture: GpuTexture, texels: npt.NDArray[np.uin
 
 
 def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.NDArray[Any]:
-    """A clear value as the channels of a format: one number goes to all of them, missing ones are 0."""
+    """Return a clear value for the channels of a format: one number fills them all, missing ones are 0."""
     values = np.zeros(channels, np.float64)
     given = np.atleast_1d(np.asarray(value, np.float64))[:channels]
     values[: len(given)] = given
@@ -268,7 +253,7 @@ def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.ND
 class Clear:
     """A clear of a texture, one mip or one layer, prepared once and called in every frame.
 
-    Of a texture in its own format: Mesa stores wrong bits through views in some others.
+    The texture must not be a view in another format: Mesa stores wrong bits through some of these.
     """
 
     def __init__(
@@ -287,28 +272,25 @@ class Clear:
         values = texel(value, channels, dtype)
         if FORMATS[desc.format].family == "depth_stencil":
             values[1:] = 0
-        if FORMATS[desc.format].srgb:  # a clear stores what it is given, where drawing encodes it
+        if FORMATS[desc.format].srgb:  # a clear stores its value unchanged, while drawing encodes it
             color = np.clip(values[:3], 0.0, 1.0)
             values[:3] = np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
         self._values = values  # kept alive: the calls below hold its address
         self._clear = device.raw.glClearTexSubImage
-        levels = range(desc.mips) if mip is None else (mip,)
+        layers = (0, desc.layers) if layer is None else (layer, 1)
         self._calls = []
-        for level in levels:
-            width, height = desc.mip_size(level)
-            first, count = (0, desc.layers) if layer is None else (layer, 1)
-            self._calls.append(
-                (texture.glo, level, 0, 0, first, width, height, count, gl_format, gl_type, values.ctypes.data)
-            )
+        for level in range(desc.mips) if mip is None else (mip,):
+            (width, height), (first, count) = desc.mip_size(level), layers
+            box = (level, 0, 0, first, width, height, count)
+            self._calls.append((texture.glo, *box, gl_format, gl_type, values.ctypes.data))
 
     def __call__(self) -> None:
-        """Clear."""
         for call in self._calls:
             self._clear(*call)
 
 
 def poison_value(format_name: str) -> float:
-    """A value no pass should ever show: NaN, or the largest where the format has none."""
+    """Return a value that no pass should ever show: NaN, or the largest if the format has none."""
     family = FORMATS[format_name].family
     if family == "float" and format_name != "r11f_g11f_b10f":
         return float("nan")
@@ -323,7 +305,7 @@ _WRAPS = {"clamp": 0x812F, "repeat": 0x2901, "mirror": 0x8370, "border": 0x812D}
 
 
 def create_sampler(device: Device, sampler: Sampler) -> int:
-    """A GL sampler object; the border is 1 in every channel, which is open and lit; of what is compared 0, nothing."""
+    """Create a sampler; its border is 1 in every channel (open and lit), and 0 for comparisons (no occluder)."""
     names = (_MIN_FILTERS[sampler.filter], _MAG_FILTERS[sampler.filter], _WRAPS[sampler.wrap], _WRAPS[sampler.wrap])
     return create_gl_sampler(device, *names, compare=sampler.compare, anisotropy=sampler.anisotropy)
 
@@ -338,7 +320,6 @@ def create_gl_sampler(
     compare: bool = False,
     anisotropy: int = 1,
 ) -> int:
-    """A GL sampler object from GL enums."""
     raw = device.raw
     glo = raw.make("glCreateSamplers")
     raw.glSamplerParameteri(glo, 0x2801, min_filter)
@@ -349,9 +330,7 @@ def create_gl_sampler(
     raw.glSamplerParameterfv(glo, 0x1004, ctypes.byref(border))
     if compare:
         raw.glSamplerParameteri(glo, 0x884C, 0x884E)  # COMPARE_MODE, COMPARE_REF_TO_TEXTURE
-        raw.glSamplerParameteri(
-            glo, 0x884D, 0x0206
-        )  # COMPARE_FUNC, GEQUAL: 1 for what is as near as the texel or nearer
+        raw.glSamplerParameteri(glo, 0x884D, 0x0206)  # COMPARE_FUNC, GEQUAL: 1 if not farther than the texel
     if anisotropy > 1:
         raw.glSamplerParameteri(glo, 0x84FE, anisotropy)
     return glo

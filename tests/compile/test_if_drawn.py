@@ -11,7 +11,7 @@ import pytest
 import rendergraph as rg
 from rendergraph.api import ADD, Internal, Node, Output, Radiance, State, Steps, param
 from rendergraph.errors import InputError
-from rendergraph.gl.passed import Passed
+from rendergraph.gl.queries import OcclusionQuery
 
 TEXT = "nodes: {a: {type: peels}}\noutputs: {image: a.color}"
 SHADERS = {
@@ -51,17 +51,17 @@ def test_what_has_changed_since_is_asked_anew(bench: Any) -> None:
         assert bench.session.render(pipeline.set("a.height", height))["image"].mean() == expected
 
 
-@pytest.mark.parametrize("method", ["stop", "anyway"])
+@pytest.mark.parametrize("method", ["stop", "end_conditional"])
 def test_what_is_broken_off_leaves_nothing_out_later(bench: Any, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
-    end, ended = getattr(Passed, method), []
+    end, ended = getattr(OcclusionQuery, method), []
 
-    def interrupted(passed: Passed) -> None:
-        ended.append(passed)
+    def interrupted(query: OcclusionQuery) -> None:
+        ended.append(query)
         if len(ended) == 1:  # as if Ctrl-C came while something is counted, or left out
             raise KeyboardInterrupt
-        end(passed)
+        end(query)
 
-    monkeypatch.setattr(Passed, method, interrupted)
+    monkeypatch.setattr(OcclusionQuery, method, interrupted)
     with pytest.raises(KeyboardInterrupt):
         bench.draw(TEXT, Peels, shaders=SHADERS)
     assert (

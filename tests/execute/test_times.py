@@ -11,7 +11,7 @@ import pytest
 from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Frame, Input, Internal, Node, Output, Steps, View, Views
 from rendergraph.execute import FrameTimes, StepTime, median_times
-from rendergraph.gl.timer import Timer
+from rendergraph.gl.queries import Timer
 from rendergraph.scene.frame_scene import FrameScene
 
 SHADERS = {

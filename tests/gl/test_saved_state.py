@@ -460,7 +460,7 @@ def test_conditional_rendering_is_refused_and_goes_on(borrowed: tuple[rg.Session
     session, owner = borrowed
     query = owner.raw.make("glCreateQueries", 0x8914)
     owner.raw.glBeginConditionalRender(query, 0x8E13)
-    with pytest.raises(RenderError, match="RG618 conditional rendering is under way"):
+    with pytest.raises(RenderError, match="RG618 conditional rendering is active"):
         session.render(FORWARD)
     owner.raw.glEndConditionalRender()
     assert owner.raw.error() is None  # ours would have ended it

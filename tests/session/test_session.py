@@ -222,8 +222,8 @@ def test_a_forked_process_is_told_that_it_cannot_draw() -> None:
     done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=False, timeout=120)
     assert done.stdout.splitlines() == [
         "RG615 a session stays in its process; fork before OpenGL is used, or start processes anew ('spawn')",
-        "RG611 OpenGL has been used in the process that this one was forked from, and drivers do not survive that; "
-        "start processes anew, as multiprocessing does with 'spawn'",
+        "RG611 OpenGL was used before this process was forked, and drivers do not survive a fork; "
+        "start new processes instead, as multiprocessing does with 'spawn'",
         "parent draws",
     ], done.stderr
 

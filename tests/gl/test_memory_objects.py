@@ -11,7 +11,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.errors import RenderError
-from rendergraph.gl.blocks import Block, make_blocks
+from rendergraph.gl.memory_objects import Block, make_blocks
 from rendergraph.gl.textures import Clear, read
 from rendergraph.textures import TextureDesc
 

@@ -1,6 +1,8 @@
-"""Memory of a device as a file descriptor, which is how OpenGL takes memory objects: Vulkan allocates and exports it.
+"""Blocks of memory that textures of any description lie in (GL_EXT_memory_object_fd).
 
-A few functions of Vulkan 1.1 over its loader. Structures are packed by hand: each is used once.
+Textures in a block overwrite each other: one may be written only when no command that uses another is running. OpenGL
+imports the memory as a file descriptor; Vulkan 1.1 allocates and exports it. Its structures are packed by hand, as each
+is used once.
 """
 
 from __future__ import annotations
@@ -8,11 +10,81 @@ from __future__ import annotations
 import ctypes
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import reduce
+from operator import and_
 from typing import Any
 
+from msgspec import Struct, field
+
+from rendergraph.errors import Problem, RenderError
+from rendergraph.gl import textures
+from rendergraph.gl.device import Device
+from rendergraph.gl.textures import GpuTexture
 from rendergraph.textures import FORMATS, TextureDesc
+
+_DEVICE_UUID, _HANDLE_TYPE_OPAQUE_FD = 0x9597, 0x9586
+
+
+class Block(Struct, eq=False):
+    """A memory object with its textures, by description."""
+
+    device: Device
+    glo: int
+    textures: dict[TextureDesc, GpuTexture] = field(default_factory=dict)
+
+    def release(self) -> None:
+        for texture in self.textures.values():
+            textures.delete(self.device, texture)
+        self.textures.clear()
+        self.device.raw.delete("glDeleteMemoryObjectsEXT", self.glo)
+
+
+def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list[Block]:
+    """Return a block for each list of descriptions, as large as its largest texture is on this device.
+
+    Raises:
+        RenderError: the driver has no memory objects, there is no Vulkan for the device, or too little memory.
+    """
+    blocks: list[Block] = []
+    if not groups:
+        return blocks
+    try:
+        if "GL_EXT_memory_object_fd" not in device.ctx.extensions:
+            raise NoMemoryObjects("the driver has no GL_EXT_memory_object_fd")
+        identity = (ctypes.c_ubyte * 16)()
+        device.raw.glGetUnsignedBytei_vEXT(_DEVICE_UUID, 0, identity)
+        with open_vulkan(bytes(identity)) as vulkan:
+            for descs in groups:
+                blocks.append(_block(device, vulkan, descs))
+    except BaseException as error:
+        for block in blocks:
+            block.release()
+        if isinstance(error, NoMemoryObjects):
+            text = f"no memory objects on {device.renderer}: {error}; leave out --heap"
+            raise RenderError(Problem("RG621", text)) from None
+        raise
+    return blocks
+
+
+def _block(device: Device, vulkan: Vulkan, descs: Sequence[TextureDesc]) -> Block:
+    sizes, masks = zip(*map(vulkan.requirements, descs), strict=True)
+    types = reduce(and_, masks)
+    if not types:
+        raise NoMemoryObjects("no memory type fits all textures of a block")
+    block = Block(device, device.raw.make("glCreateMemoryObjectsEXT"))
+    try:  # the driver owns the descriptor from then on
+        device.raw.glImportMemoryFdEXT(block.glo, max(sizes), _HANDLE_TYPE_OPAQUE_FD, vulkan.export(max(sizes), types))
+        for desc in dict.fromkeys(descs):
+            block.textures[desc] = textures.create(device, desc, "a texture of a block", memory=block.glo)
+    except BaseException:
+        block.release()
+        raise
+    return block
+
+
+# --- Vulkan -----------------------------------------------------------------------------------------------------------
 
 _FORMATS = {
     "r8": 9, "rg8": 16, "rgba8": 37, "srgb8_a8": 43, "r16": 70, "rg16": 77, "rgba16": 91, "rgb10_a2": 64,
@@ -25,17 +97,17 @@ _COLOR_USES, _DEPTH_USES = 0x1 | 0x2 | 0x4 | 0x10, 0x1 | 0x2 | 0x4 | 0x20
 
 
 class NoMemoryObjects(Exception):
-    """Vulkan is missing, or has not the device that OpenGL draws on."""
+    """Vulkan is missing, or does not have the device that OpenGL draws on."""
 
 
 class Vulkan:
-    """A device of Vulkan's, open for as long as memory is taken from it."""
+    """A Vulkan device, open while memory is allocated from it."""
 
     def __init__(self, library: Any, physical: Any, device: Any) -> None:
         self._library, self._physical, self._device = library, physical, device
 
     def requirements(self, desc: TextureDesc) -> tuple[int, int]:
-        """Bytes that a texture takes on this device, and a mask of the types of memory that it can lie in."""
+        """Return the bytes of a texture on this device and a mask of the memory types that fit it."""
         uses = _DEPTH_USES if FORMATS[desc.format].is_depth else _COLOR_USES
         external = _packed("@I P I", 1000072001, 0, _OPAQUE_FD)
         flags = 0x10 if desc.kind == "texture_cube" else 0
@@ -48,7 +120,7 @@ class Vulkan:
         return found[0], found[2] & 0xFFFFFFFF
 
     def export(self, size: int, types: int) -> int:
-        """A file descriptor of new memory of a type in the mask, the device's own where there is one."""
+        """Return a file descriptor of new memory of a type in the mask, device-local if possible."""
         table = (ctypes.c_uint32 * 256)()
         self._library.vkGetPhysicalDeviceMemoryProperties(self._physical, table)
         able = [number for number in range(table[0]) if types >> number & 1]
@@ -62,7 +134,7 @@ class Vulkan:
         get = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(address)
         asked = _packed("@I P Q I", 1000074002, 0, memory.value, _OPAQUE_FD)
         result = get(self._device, _address(asked), ctypes.addressof(descriptor))
-        self._library.vkFreeMemory(self._device, memory, None)  # whoever holds the descriptor holds the memory
+        self._library.vkFreeMemory(self._device, memory, None)  # the descriptor keeps the memory
         _check("vkGetMemoryFdKHR", result)
         return descriptor.value
 
@@ -72,11 +144,7 @@ class Vulkan:
 
 @contextmanager
 def open_vulkan(identity: bytes) -> Iterator[Vulkan]:
-    """The device with this 16-byte identity, which OpenGL gives as its own.
-
-    Raises:
-        NoMemoryObjects: there is none, or it does not export memory.
-    """
+    """Open the device with this 16-byte identity, which OpenGL reports for its own."""
     try:
         library = ctypes.CDLL("libvulkan.so.1")
     except OSError:
@@ -117,7 +185,7 @@ def _same_device(library: Any, instance: Any, identity: bytes) -> Any:
 
 @contextmanager
 def _no_layer() -> Iterator[None]:
-    """Without Mesa's layer that orders devices: it looks for a display, and complains where there is none."""
+    """Disable Mesa's layer that orders devices: it looks for a display, and complains if there is none."""
     before = os.environ.get("NODEVICE_SELECT")
     os.environ["NODEVICE_SELECT"] = "1"
     try:
