@@ -14,9 +14,8 @@ import numpy.typing as npt
 
 import rendergraph as rg
 from rendergraph.compare import compare
-from rendergraph.compare.report.parts import heat
 from rendergraph.compare.values import Comparison
-from rendergraph.images import write
+from rendergraph.images import heat_map, write
 
 ROOT = Path(__file__).parents[2]
 PICTURE = ROOT / "docs" / "images" / "comparison.png"
@@ -42,7 +41,7 @@ def side_by_side(comparison: Comparison) -> npt.NDArray[np.uint8]:
     assert other.flip_map is not None
     parts = [np.asarray(result.pixels, np.uint8)[..., :3] for result in (one, other)]
     gap = np.full((parts[0].shape[0], BETWEEN, 3), 255, np.uint8)
-    return np.concatenate([parts[0], gap, parts[1], gap, heat(other.flip_map)], axis=1)
+    return np.concatenate([parts[0], gap, parts[1], gap, heat_map(other.flip_map)], axis=1)
 
 
 def main() -> None:
