@@ -25,11 +25,17 @@ if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.
 
 __all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load", "sweep", "view"]
 
-_ELSEWHERE = {"RendergraphError": "errors", "sweep": "compare", "view": "viewer"}
-
 
 def __dir__() -> list[str]:
     return [*__all__, "__version__"]  # what `rg.<TAB>` offers
 
 
-__getattr__ = lazy_exports(__name__, dict.fromkeys(__all__, "session") | _ELSEWHERE)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "compare": ("sweep",),
+        "errors": ("RendergraphError",),
+        "session": ("Frame", "Pipeline", "RenderOptions", "Selection", "Session", "load"),
+        "viewer": ("view",),
+    },
+)

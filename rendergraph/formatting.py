@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 
@@ -34,3 +36,33 @@ def format_value(value: Any) -> str:
     if isinstance(value, float) and float(f"{value:g}") == value:
         return f"{value:g}"
     return str(value)
+
+
+def table(
+    rows: Sequence[Sequence[object]], heads: Sequence[str] = (), *, right: Sequence[int] = (), width: int = 1 << 20
+) -> str:
+    """Return aligned columns, two spaces between them.
+
+    Args:
+        rows: cells; None is empty. A row may have fewer than others.
+        heads: titles of the columns.
+        right: numbers of the columns that are aligned to the right.
+        width: of the whole, in characters; the last column is wrapped to fit.
+    """
+    cells = [["" if cell is None else str(cell) for cell in row] for row in [heads, *rows] if row]
+    widths = [max(map(len, column)) for column in zip_longest(*cells, fillvalue="")]
+    start = sum(widths[:-1]) + 2 * (len(widths) - 1)
+    room = max(24, width - start)
+    lines = []
+    for row in cells:
+        row += [""] * (len(widths) - len(row))
+        wrapped = [row[-1]]
+        if len(row[-1]) > room:
+            import textwrap  # most tables fit
+
+            wrapped = textwrap.wrap(row[-1], room, break_long_words=False)
+        padded = zip([*row[:-1], wrapped[0]], widths, strict=True)
+        texts = [text.rjust(w) if number in right else text.ljust(w) for number, (text, w) in enumerate(padded)]
+        lines.append("  ".join(texts).rstrip())
+        lines += [" " * start + line for line in wrapped[1:]]
+    return "\n".join(lines)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 
-def lazy_exports(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package.
-
-    Args:
-        package: its `__name__`.
-        modules: exported name to the module that defines it, relative to the package.
-    """
+def lazy_exports(package: str, names: Mapping[str, Iterable[str]]) -> Callable[[str], Any]:
+    """Return the `__getattr__` of a package, which is called `package`; `names` are those that each module defines."""
+    module_of = {name: module for module, members in names.items() for name in members}
 
     def load(name: str) -> Any:
-        if name not in modules:
+        if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         import importlib  # `rendergraph --help` needs nothing that is exported
 
-        return getattr(importlib.import_module(f".{modules[name]}", package), name)
+        return getattr(importlib.import_module(f".{module_of[name]}", package), name)
 
     return load

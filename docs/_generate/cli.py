@@ -2,48 +2,47 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import re
 from collections.abc import Iterator
 
 import click
 
-from rendergraph.cli.app import EXIT_CODES, VERBS
+from rendergraph.cli.app import EXIT_CODES, VERBS, verb
 
 from .markdown import block, page, prose, table
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """One page."""
-    verbs = {verb: importlib.import_module(f"rendergraph.cli.{verb.replace('-', '_')}").command for verb in VERBS}
-    rows = [(f"[`{verb}`](#{verb})", prose(command.get_short_help_str(200))) for verb, command in verbs.items()]
+    verbs = {name: verb(name) for name in VERBS}
+    rows = [(f"[`{name}`](#{name})", prose(command.get_short_help_str(200))) for name, command in verbs.items()]
     yield (
         "cli.md",
         page(
             "Command line",
             "Data goes to stdout, everything else to stderr. Every verb has `--json`, which prints one document, "
-            "`--quiet`, which says nothing but errors, and `--help`. On a terminal errors are marked in colour; "
+            "`--quiet`, which prints only errors, and `--help`. On a terminal errors are marked in colour; "
             "`NO_COLOR=1` leaves that out.",
             table(("verb", ""), rows),
-            *(_verb(verb, command) for verb, command in verbs.items()),
+            *(_verb(name, command) for name, command in verbs.items()),
             "## Exit codes",
             table(("code", "meaning"), [(f"`{number}`", text) for number, text in EXIT_CODES.items()]),
         ),
     )
 
 
-def _verb(verb: str, command: click.Command) -> str:
+def _verb(name: str, command: click.Command) -> str:
     # click keeps the help option a command first makes, so the names the group gives it must be there already.
     names = ["-h", "--help"]
-    context = click.Context(command, info_name=f"rendergraph {verb}", help_option_names=names)
+    context = click.Context(command, info_name=f"rendergraph {name}", help_option_names=names)
     about, _, examples = inspect.cleandoc(command.help or "").partition("\b")
     lines = [f"$ {line.strip()}" for line in examples.splitlines()[2:] if line.strip()]
     options = [record for parameter in command.params if (record := parameter.get_help_record(context)) and record[1]]
-    usage = f"rendergraph {verb} {' '.join(command.collect_usage_pieces(context))}"
+    usage = f"rendergraph {name} {' '.join(command.collect_usage_pieces(context))}"
     return "\n\n".join(
         [
-            f"## {verb}",
+            f"## {name}",
             prose(about.strip()),
             block(usage, "text"),
             block("\n".join(lines), "console") if lines else "",

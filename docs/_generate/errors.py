@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import yaml
-
-from rendergraph.resources import folder
+from rendergraph.reference import error_codes, error_page
 
 from .markdown import block, page, prose, table
 
@@ -27,8 +25,7 @@ LANGUAGES = {"pipeline": "yaml", "scene": "yaml", "node": "python", "shader": "g
 
 def pages() -> Iterator[tuple[str, str]]:
     """The index and every page."""
-    files = sorted(folder("rendergraph.errors").glob("RG*.yaml"))
-    found: list[dict[str, Any]] = [yaml.safe_load(file.read_text(encoding="utf-8")) for file in files]
+    found = [error_page(code) for code in error_codes()]
     yield "errors/index.md", _index(found)
     for entry in found:
         yield f"errors/{entry['code']}.md", _page(entry)

@@ -11,9 +11,9 @@ import msgspec
 
 from rendergraph import document
 from rendergraph.catalog import entries, find
-from rendergraph.cli.explain import file_keys
 from rendergraph.compare.axes import MOST_RUNS
 from rendergraph.glsl import MAX_BYTES, expansion, source
+from rendergraph.reference import file_keys
 from rendergraph.resolve import flatten
 from rendergraph.scene import files, image_header
 from rendergraph.steps import MOST_STEPS

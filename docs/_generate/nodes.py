@@ -9,9 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts, summary
-from rendergraph.cli.program_text import program, shown_at_work
 from rendergraph.errors import InputError
+from rendergraph.reference import (
+    describe_node,
+    describe_program,
+    example_text,
+    find_node_of_type,
+    input_facts,
+    meaning,
+    output_facts,
+    summary,
+)
 from rendergraph.session import Selection
 
 from .api import signature
@@ -28,7 +36,7 @@ def pages(studio: Studio) -> Iterator[tuple[str, str]]:
         family: [found for found in map(catalog.get, names) if found.plugin == "builtin"]
         for family, names in catalog.families().items()
     }
-    described = {found.name: describe(found) for members in families.values() for found in members}
+    described = {found.name: describe_node(found) for members in families.values() for found in members}
     yield "nodes/index.md", _index(families)
     for members in families.values():
         for found in members:
@@ -91,7 +99,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         prose(rest.strip()),
         _extends(found),
         _pictures(found, node["outputs"], studio),
-        f"## In a file\n\n{block(in_a_file(found, Catalog.discover()), 'yaml')}",
+        f"## In a file\n\n{block(example_text(found, Catalog.discover()), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
         f"## Outputs\n\n{outputs}",
         f"## Parameters\n\n{parameters}" if parameters else "",
@@ -162,8 +170,9 @@ def _first(function: Any) -> str:
 def _in_scope(found: NodeType) -> str:
     """What the shaders of its steps may use in the pipeline above, folded; nothing where it has no program there."""
     try:
-        linked, node = shown_at_work(found, Catalog.discover(), Selection)
-        steps = [program(linked, node, step["step"]) for step in program(linked, node, None)["steps"]]
+        linked, node = find_node_of_type(found, Catalog.discover(), Selection)
+        first = describe_program(linked, node, None)
+        others = [describe_program(linked, node, step["step"]) for step in first["steps"][1:]]
     except InputError:
         return ""
     tables = [
@@ -171,7 +180,7 @@ def _in_scope(found: NodeType) -> str:
             f"step {step['step']}: " + ", ".join(f"<code>{name}</code>" for name in step["shaders"].values()),
             table(("in scope", "from"), [(code(one["name"]), prose(one["source"])) for one in step["scope"]]),
         )
-        for step in steps
+        for step in (first, *others)
     ]
     return "## In scope of its shaders\n\n" + "\n\n".join(tables)
 

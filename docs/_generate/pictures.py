@@ -15,8 +15,8 @@ import yaml
 import rendergraph as rg
 from rendergraph.catalog import Catalog
 from rendergraph.errors import DeviceError, InputError
-from rendergraph.example import example
 from rendergraph.link.graph import Endpoint
+from rendergraph.reference import example_file
 
 if TYPE_CHECKING:
     from rendergraph.catalog import NodeType
@@ -147,7 +147,7 @@ def exhibit(found: NodeType, port: str) -> tuple[View, View | None] | None:
 
 def example_and_base(found: NodeType) -> list[tuple[rg.Pipeline, rg.Pipeline]]:
     """The example on a type's page, and the shipped pipeline that it is a patch on; one such pair or none."""
-    text = example(found, Catalog.discover())
+    text = example_file(found, Catalog.discover())
     patch = yaml.safe_load(text) if text else {}
     if "extends" not in patch:
         return []

@@ -13,11 +13,12 @@ from copy import copy
 from types import FrameType
 from typing import NoReturn
 
-from rendergraph.cli.output import be_quiet, only_data, print_error, say
-from rendergraph.cli.words import click
+from rendergraph.cli.lazy_click import click
+from rendergraph.cli.output import only_data, print_error, say, set_quiet
 from rendergraph.errors import Interruption, Place, Problem, RendergraphError, suggestion
 from rendergraph.version import __version__
 
+_LISTS = ("nodes", "pipelines", "scenes", "environments")
 VERBS = (
     "run",
     "view",
@@ -30,10 +31,7 @@ VERBS = (
     "sweep",
     "farm",
     "bench",
-    "nodes",
-    "pipelines",
-    "scenes",
-    "environments",
+    *_LISTS,
     "explain",
     "schema",
     "new-node",
@@ -42,7 +40,7 @@ VERBS = (
 )
 """In the order of `--help`; verb `x-y` is the function `command` in `rendergraph.cli.x_y`."""
 
-_MEANT = {
+_SYNONYMS = {
     "render": "run",
     "draw": "run",
     "serve": "view",
@@ -54,33 +52,42 @@ _MEANT = {
     "profile": "bench",
     "help": "explain",
 }
-"""Words that other programs have for our verbs."""
+"""What other programs call our verbs."""
 
 INTERRUPTED = 130
 EXIT_CODES = {
-    0: "done",
+    0: "success",
     1: "failed while running: disk, memory, GL",
-    2: "the command line itself: an unknown verb or option, a malformed value",
-    3: "something named there or in a file is missing or wrong: pipeline, scene, mesh, image, shader",
-    4: "a comparison beyond its threshold",
+    2: "wrong command line: unknown verb or option, malformed value",
+    3: "an error in a file, or something missing: pipeline, scene, mesh, image, shader",
+    4: "a comparison exceeded its threshold",
     5: "no usable GL device",
     INTERRUPTED: "interrupted",
     143: "terminated",
 }
 
 
-def _hush(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    be_quiet(value)
+def verb(name: str) -> click.Command:
+    """Import a verb and return its command."""
+    if name in _LISTS:
+        found: click.Command = getattr(importlib.import_module("rendergraph.cli.lists"), name)
+    else:
+        found = importlib.import_module(f"rendergraph.cli.{name.replace('-', '_')}").command
+    return found
+
+
+def _set_quiet(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    set_quiet(value)
 
 
 _QUIET = click.Option(
-    ["-q", "--quiet"], is_flag=True, is_eager=True, expose_value=False, callback=_hush, help="Say nothing but errors."
+    ["-q", "--quiet"], is_flag=True, is_eager=True, expose_value=False, callback=_set_quiet, help="Print only errors."
 )
-"""Of every verb."""
+"""An option of every verb."""
 
 
 class _Verbs(click.Group):
-    """A group whose members are imported when they are asked for."""
+    """A group whose members are imported when they are needed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)
@@ -88,7 +95,7 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in VERBS:
             return None
-        found: click.Command = copy(importlib.import_module(f"rendergraph.cli.{cmd_name.replace('-', '_')}").command)
+        found = copy(verb(cmd_name))
         found.params = [*found.params, _QUIET]
         if found.callback is not None:
             found.callback = only_data()(found.callback)
@@ -98,15 +105,14 @@ class _Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS and not args[0].startswith("-"):
-            meant = _MEANT.get(args[0].lower()) or (f"run {args[0]}" if _is_drawn(args[0]) else None)
+            meant = _SYNONYMS.get(args[0].lower()) or (f"run {args[0]}" if _is_pipeline(args[0]) else None)
             hint = f"; did you mean '{meant}'?" if meant else suggestion(args[0], VERBS)
             ctx.fail(f"there is no verb '{args[0]}'{hint}")
         return super().resolve_command(ctx, args)
 
 
-def _is_drawn(word: str) -> bool:
-    """Whether a word names what `run` takes."""
-    from rendergraph.resources import shipped_pipelines  # where a verb is misspelt alone
+def _is_pipeline(word: str) -> bool:
+    from rendergraph.resources import shipped_pipelines  # only needed where a verb is misspelt
 
     return word in shipped_pipelines() or word.endswith((".yaml", ".yml"))
 
@@ -130,31 +136,23 @@ def group() -> None:
 
 
 def main(args: Sequence[str]) -> int:
-    """Run one command line.
-
-    Args:
-        args: words after the program's name.
-
-    Returns:
-        The exit code of design.md §7.
-    """
-    words = list(args)
-    as_json = "--json" in words
-    be_quiet(False)
+    """Run one command line, the words after the program's name, and return the exit code of design.md §7."""
+    as_json = "--json" in args
+    set_quiet(False)
     try:
         with _terminable():
-            code = _invoke(words)
+            code = _invoke(list(args))
             _flush()
             return code
     except RendergraphError as error:
-        return _told(error.problems, error.exit_code, as_json)
+        return _fail(error.problems, error.exit_code, as_json)
     except click.exceptions.NoArgsIsHelpError as error:
         say(error.format_message())
         return error.exit_code
     except click.UsageError as error:
-        return _told([_usage(error)], error.exit_code, as_json)
+        return _fail([_usage(error)], error.exit_code, as_json)
     except click.ClickException as error:
-        return _told([Problem("RG500", error.format_message())], error.exit_code, as_json)
+        return _fail([Problem("RG500", error.format_message())], error.exit_code, as_json)
     except (KeyboardInterrupt, click.Abort):
         say("interrupted")
         return INTERRUPTED
@@ -163,19 +161,19 @@ def main(args: Sequence[str]) -> int:
             say("terminated")
         return 128 + signalled.number
     except BrokenPipeError:
-        _discard_stdout()  # whoever read us has enough: `rendergraph nodes | head`
+        _discard_stdout()  # the reader closed the pipe: `rendergraph nodes | head`
         return 0
     except MemoryError:
-        return _told([Problem("RG509", "out of memory")], 1, as_json)
+        return _fail([Problem("RG509", "out of memory")], 1, as_json)
     except OSError as error:
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
         where = Place(str(error.filename)) if error.filename else None
-        return _told([Problem("RG509", error.strerror or str(error), where)], 1, as_json)
-    except BaseException as error:  # an exit, too, that nobody here has asked for
+        return _fail([Problem("RG509", error.strerror or str(error), where)], 1, as_json)
+    except BaseException as error:  # SystemExit in third-party code, too
         if os.environ.get("RENDERGRAPH_TRACEBACK"):
             raise
-        return _told([unexpected(error)], 1, as_json)
+        return _fail([unexpected(error)], 1, as_json)
 
 
 def _invoke(words: list[str]) -> int:
@@ -195,8 +193,8 @@ def _invoke(words: list[str]) -> int:
     return 0
 
 
-def _told(problems: Sequence[Problem], code: int, as_json: bool) -> int:
-    """Say what went wrong; if even that cannot be said, the code still can."""
+def _fail(problems: Sequence[Problem], code: int, as_json: bool) -> int:
+    """Print what went wrong and return the exit code, even where nothing can be printed."""
     try:
         print_error(problems, code, as_json=as_json)
         _flush()
@@ -216,10 +214,10 @@ def _usage(error: click.UsageError) -> Problem:
 
 
 def unexpected(error: BaseException) -> Problem:
-    """What is said of an exception that nobody meant to be seen."""
+    """Return the message of an exception that should not reach the user."""
     what = f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"
-    text = f"a mistake in rendergraph, not yours: {what}; RENDERGRAPH_TRACEBACK=1 shows where, please report that "
-    return Problem("RG599", text + "with what `rendergraph doctor` prints")
+    text = f"internal error (a bug in rendergraph): {what}; RENDERGRAPH_TRACEBACK=1 shows where, please report it "
+    return Problem("RG599", text + "with the output of `rendergraph doctor`")
 
 
 def _flush() -> None:
@@ -228,16 +226,16 @@ def _flush() -> None:
 
 
 def _discard_stdout() -> None:
-    """Let the interpreter's own last flush go nowhere."""
+    """Send the interpreter's last flush nowhere."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """SIGTERM and SIGHUP unwind like Ctrl-C does: half-written files are removed, children ended.
+    """Let SIGTERM and SIGHUP unwind like Ctrl-C: half-written files are removed, child processes ended.
 
-    A SIGHUP that is ignored, as under nohup, stays so.
+    A SIGHUP that is ignored, as under nohup, stays ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -246,8 +244,8 @@ def _terminable() -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> NoReturn:
         raise Interruption(number)
 
-    asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, stop) for number in asked}
+    handled = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, stop) for number in handled}
     try:
         yield
     finally:

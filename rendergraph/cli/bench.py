@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, say, table, warn
-from rendergraph.cli.words import click
 from rendergraph.formatting import format_bytes
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""`rendergraph check`: is it right?"""
+"""`rendergraph check`: validate a pipeline or a sweep file."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit_json, say, warn
-from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
+    from rendergraph.errors import Problem
     from rendergraph.session import Selection
 
 
@@ -19,10 +20,10 @@ if TYPE_CHECKING:
 @options.pipeline_options
 @options.json_option
 def command(selection: Selection, as_json: bool) -> None:
-    """Find every mistake, without a GPU.
+    """Find every error, without a GPU.
 
-    Looks at the pipeline, everything it refers to, its scene and the options; given a sweep's file, at every run. Exits
-    0 where all is well; exits 3 with every mistake, its line and the way out where not.
+    Checks the pipeline, everything it refers to, its scene and the options; of a sweep file, every run. Exits 0 if
+    there are no errors. Otherwise exits 3 and prints each error with its line and how to fix it.
 
     \b
     Examples:
@@ -45,28 +46,18 @@ def command(selection: Selection, as_json: bool) -> None:
         if as_json:
             emit_json({"sweep": file, "runs": runs, "warnings": [problem.as_json() for problem in warnings]})
         return
-    linked = stages.link(stages.resolve(selection))
-    warn(linked.warnings)
+    linked = options.link(selection)
     stages.check(linked)
     graph, path = linked.graph, linked.spec.path
-    stale = (
-        path
-        and not is_picture(path)
-        and outdated(path, Roots.around(path, selection.asset_roots), linked.catalog, selection.plugins)
-    )
-    later = [stale] if stale else []
+    later: list[Problem] = []
+    if path and not is_picture(path):
+        stale = outdated(path, Roots.around(path, selection.asset_roots), linked.catalog, selection.plugins)
+        later = [stale] if stale else []
     warn(later)
     width, height = graph.size
     links = sum(len(ends) for node in graph.nodes for ends in node.inputs.values())
     say(f"{graph.name}: {len(graph.nodes)} nodes, {links} links, {width}×{height}, outputs {', '.join(graph.outputs)}")
     if as_json:
-        emit_json(
-            {
-                "pipeline": graph.name,
-                "size": [width, height],
-                "nodes": len(graph.nodes),
-                "links": links,
-                "outputs": {name: str(end) for name, end in graph.outputs.items()},
-                "warnings": [problem.as_json() for problem in [*linked.warnings, *later]],
-            }
-        )
+        report = {"pipeline": graph.name, "size": [width, height], "nodes": len(graph.nodes), "links": links}
+        outputs = {name: str(end) for name, end in graph.outputs.items()}
+        emit_json(report | {"outputs": outputs, "warnings": [one.as_json() for one in (*linked.warnings, *later)]})

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit_json, say, warn
-from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, UsageError, suggestion
 
 _LIMITS = ("import-seconds", "pass-seconds", "memory")

@@ -12,8 +12,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, on_terminal, say, table, warn
-from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Option, Place, Problem, UsageError, suggestion
 from rendergraph.formatting import format_bytes
 

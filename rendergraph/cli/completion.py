@@ -1,13 +1,14 @@
-"""What a shell offers on TAB: pipelines, scenes, node ids, their parameters and the values these take."""
+"""What a shell offers on TAB: pipelines, scenes, node ids, their parameters and values."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from rendergraph.cli.words import click
+from rendergraph import reference
+from rendergraph.cli.lazy_click import click
 from rendergraph.errors import RendergraphError
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 
@@ -17,100 +18,97 @@ if TYPE_CHECKING:
     from rendergraph.session.values import Linked
 
 Context = click.Context
-Parameter = click.Parameter
+Complete: TypeAlias = "Callable[[Context, click.Parameter, str], list[CompletionItem]]"
 _BREAKS = "=:"
-"""Of bash's word breaks, those that stand in settings: it completes what comes after the last one."""
+"""The word breaks of bash that occur in settings: bash completes the text after the last one."""
 
 
-def pipelines(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """Shipped pipelines and files."""
-    return [*_matching(shipped_pipelines(), incomplete), *_files(incomplete)]
+def _words(find: Callable[[Context, str], Iterable[str]], *, or_files: bool = False) -> Complete:
+    """Return what click calls to complete a word: the words that `find` returns for it and that begin with it."""
+
+    def complete(ctx: Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        from click.shell_completion import CompletionItem
+
+        items = [CompletionItem(word) for word in find(ctx, incomplete) if word.startswith(incomplete)]
+        if or_files and incomplete and ("/" in incomplete or "." in incomplete or any(Path().glob(f"{incomplete}*"))):
+            items.append(CompletionItem(incomplete, type="file"))  # the shell lists files itself
+        return items
+
+    return complete
 
 
-def scenes(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """Shipped scenes and files."""
-    return [*_matching(shipped_scenes(), incomplete), *_files(incomplete)]
-
-
-def topics(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """What `explain` explains."""
-    from rendergraph.catalog import Catalog
-    from rendergraph.cli.explain import FILES
-
-    names = {*Catalog.discover(()).names(), *shipped_pipelines(), *shipped_scenes(), *FILES}
-    return [*_matching(sorted(names), incomplete), *_files(incomplete)]
-
-
-def families(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """Families of nodes."""
+def _topics(ctx: Context, incomplete: str) -> list[str]:
     from rendergraph.catalog import Catalog
 
-    return _matching(filter(None, Catalog.discover(()).families()), incomplete)
+    names = Catalog.discover(()).names()
+    return sorted({*names, *shipped_pipelines(), *shipped_scenes(), *reference.FILE_KINDS})
 
 
-def cameras(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """Cameras of the pipeline's scene."""
+def _families(ctx: Context, incomplete: str) -> Iterable[str]:
+    from rendergraph.catalog import Catalog
+
+    return filter(None, Catalog.discover(()).families())
+
+
+def _cameras(ctx: Context, incomplete: str) -> Iterable[str]:
     linked = _linked(ctx)
-    return _matching(linked.scene.cameras, incomplete) if linked else []
+    return linked.scene.cameras if linked else ()
 
 
-def settings(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
+def _settings(ctx: Context, incomplete: str) -> Iterable[str]:
     """What `-s` takes: node ids, then their parameters and inputs, then values."""
     linked = _linked(ctx)
     if linked is None:
-        return []
+        return ()
     path, equals, _ = incomplete.partition("=")
     node, dot, name = path.partition(".")
     if not dot:
-        words = [f"{name}=" for name in linked.spec.parameters] + [f"{node.id}." for node in linked.graph.nodes]
-        return _matching(words, incomplete)
+        return [*(f"{name}=" for name in linked.spec.parameters), *(f"{node.id}." for node in linked.graph.nodes)]
     if node not in linked.graph:
-        return []
+        return ()
     if equals:
-        return _matching((f"{path}={value}" for value in _values(linked, node, name)), incomplete)
+        return (f"{path}={value}" for value in _values(linked, node, name))
     cls = linked.graph[node].type.cls
-    return _matching((f"{node}.{name}=" for name in (*cls.parameters(), *cls.inputs(), "type", "enabled")), incomplete)
+    return (f"{node}.{name}=" for name in (*cls.parameters(), *cls.inputs(), "type", "enabled"))
 
 
-def ports(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """What `--metric` takes."""
-    from click.shell_completion import CompletionItem
-
-    return [CompletionItem(item.value.rstrip("=")) for item in taps(ctx, param, incomplete)]
-
-
-def taps(ctx: Context, param: Parameter, incomplete: str) -> list[CompletionItem]:
-    """What `--tap` takes: ports that hold a texture."""
+def _ports(ctx: Context, incomplete: str) -> list[str]:
+    """Ports that hold a texture."""
     linked = _linked(ctx)
-    if linked is None or "=" in incomplete:
-        return []
-    ports = (str(end) for end, info in linked.graph.textures.items() if info.desc is not None)
-    return _matching((f"{port}=" for port in ports), incomplete)
+    return [str(end) for end, info in linked.graph.textures.items() if info.desc is not None] if linked else []
+
+
+def _taps(ctx: Context, incomplete: str) -> list[str]:
+    return [f"{port}=" for port in _ports(ctx, incomplete)]
+
+
+pipelines = _words(lambda ctx, incomplete: shipped_pipelines(), or_files=True)
+scenes = _words(lambda ctx, incomplete: shipped_scenes(), or_files=True)
+topics = _words(_topics, or_files=True)
+families, cameras, settings, ports, taps = map(_words, (_families, _cameras, _settings, _ports, _taps))
 
 
 def _values(linked: Linked, node: str, name: str) -> Iterator[str]:
-    """What a parameter, an input or the type of a node can be."""
-    from rendergraph.cli.describe import describe
-
-    found = linked.graph[node].type
+    """Values of a parameter, connections of an input, or types of a node."""
+    node_type = linked.graph[node].type
     if name == "type":
         yield from linked.catalog.names()
     elif name == "enabled":
         yield from ("true", "false")
-    elif name in found.cls.inputs():
+    elif name in node_type.cls.inputs():
         yield "null"
         yield from (str(end) for end in linked.graph.textures if end.node != node)
     else:
-        described = describe(found, linked.catalog.extensions)["parameters"]
-        known: dict[str, Any] = next((one for one in described if one["name"] == name), {})
-        yield from known.get("choices", ("true", "false") if isinstance(known.get("default"), bool) else ())
+        parameters = reference.describe_node(node_type, linked.catalog.extensions)["parameters"]
+        found: dict[str, Any] = next((one for one in parameters if one["name"] == name), {})
+        yield from found.get("choices", ("true", "false") if isinstance(found.get("default"), bool) else ())
 
 
 def _linked(ctx: Context) -> Linked | None:
-    """The pipeline of the command line, as far as it is typed; None where there is none that could be looked at."""
+    """The pipeline of the command line typed so far; None where there is none or it cannot be linked."""
     from rendergraph.session import Selection, stages
 
-    named: Any = ctx.params.get("pipeline") or ctx.params.get("pipelines") or tuple(ctx.args)  # left over by a last -s
+    named: Any = ctx.params.get("pipeline") or ctx.params.get("pipelines") or tuple(ctx.args)  # args: before a last -s
     source = named[0] if isinstance(named, tuple) and named else named
     if not isinstance(source, str):
         return None
@@ -123,22 +121,8 @@ def _linked(ctx: Context) -> Linked | None:
     return None
 
 
-def _matching(words: Iterable[str], incomplete: str) -> list[CompletionItem]:
-    from click.shell_completion import CompletionItem
-
-    return [CompletionItem(word) for word in words if word.startswith(incomplete)]
-
-
-def _files(incomplete: str) -> list[CompletionItem]:
-    """The shell's own files, where the word looks like one's name."""
-    from click.shell_completion import CompletionItem
-
-    looks = "/" in incomplete or "." in incomplete or any(Path().glob(f"{incomplete}*")) if incomplete else False
-    return [CompletionItem(incomplete, type="file")] if looks else []
-
-
 def install() -> None:
-    """Make bash complete words with `=` inside, and put no blank behind one that is to be gone on with."""
+    """Make bash complete words that contain `=`, and add no space after a word that goes on."""
     from click.shell_completion import BashComplete, add_completion_class
 
     class Bash(BashComplete):

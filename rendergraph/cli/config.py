@@ -1,4 +1,4 @@
-"""`rendergraph config`: what a pipeline is after everything is applied."""
+"""`rendergraph config`: print a pipeline with everything applied."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, warn
-from rendergraph.cli.words import click
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def command(selection: Selection, as_json: bool) -> None:
     """Print the resolved pipeline, with origins.
 
-    That is the file with `extends`, patches and settings applied, and beside each value the line it comes from. Of a
-    picture that `rendergraph run` wrote (EXR or PNG) it prints the pipeline that the picture was made with.
+    The file with `extends`, patches and settings applied, and beside each value the line it comes from. For a picture
+    that `rendergraph run` wrote (EXR or PNG), the pipeline that made it.
 
     \b
     Examples:

@@ -1,12 +1,13 @@
-"""`rendergraph diff`: what differs in structure."""
+"""`rendergraph diff`: compare the structure of two pipelines."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json
-from rendergraph.cli.words import click
 
 
 @click.command("diff", no_args_is_help=True)
@@ -14,19 +15,15 @@ from rendergraph.cli.words import click
 @click.argument("b", shell_complete=options.offered("pipelines"))
 @options.selection_options
 @click.option(
-    "--svg",
-    "picture",
-    type=options.NamedPath(dir_okay=False),
-    metavar="FILE",
-    help="Draw both graphs with the difference coloured.",
+    "--svg", type=options.NamedPath(dir_okay=False), metavar="FILE", help="Draw both graphs, differences in colour."
 )
 @options.json_option
-def command(a: str, b: str, select: options.Select, picture: Path | None, as_json: bool) -> None:
-    """Show what differs between two pipelines.
+def command(a: str, b: str, select: options.Select, svg: Path | None, as_json: bool) -> None:
+    """Show the differences between two pipelines.
 
-    Nodes, links and parameters after everything is resolved, and what that does to the plan: passes, bytes, peak.
-    Nodes that are equal but for their names are recognised. Needs no GPU. Where node types are missing there is no
-    plan, and the exit code is 3.
+    Compares nodes, links and parameters after everything is resolved, and the plan: passes, bytes, peak. Nodes that
+    differ only in their names are recognised. Needs no GPU. With unknown node types there is no plan, and the exit code
+    is 3.
 
     \b
     Examples:
@@ -37,21 +34,19 @@ def command(a: str, b: str, select: options.Select, picture: Path | None, as_jso
     from rendergraph import diff
     from rendergraph.session import stages
 
-    old, new = (options.sketched(select(name)) for name in (a, b))
+    old, new = (options.sketch(select(name)) for name in (a, b))
     difference = diff.diff(old.graph, new.graph)
-    missing = (*old.missing, *new.missing)
+    missing = [problem.as_json() for problem in (*old.missing, *new.missing)]
     plans = None
     if not missing:
-        was, now = (diff.figures(stages.plan(stages.expand(found)).plan) for found in (old, new))
+        was, now = (diff.figures(stages.plan(stages.expand(linked)).plan) for linked in (old, new))
         plans = was, now
-    if picture is not None:
-        options.write(diff.diff_svg(old.graph, new.graph, difference), picture)
+    written: dict[str, Any] = {}
+    if svg is not None:
+        options.write(diff.diff_svg(old.graph, new.graph, difference), svg)
+        written["svg"] = str(svg)
     if as_json:
-        written = {} if picture is None else {"svg": str(picture)}
-        lacking = {"missing": [problem.as_json() for problem in missing]}
-        emit_json(diff.diff_json(difference, plans) | written | lacking)
-    elif picture is not None:
-        emit(str(picture))
+        emit_json(diff.diff_json(difference, plans) | written | {"missing": missing})
     else:
-        emit(diff.diff_text(difference, plans).rstrip("\n"))
-    options.conclude(old, new)
+        emit(written["svg"] if written else diff.diff_text(difference, plans).rstrip("\n"))
+    options.exit_if_missing(old, new)

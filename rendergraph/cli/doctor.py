@@ -1,4 +1,4 @@
-"""`rendergraph doctor`: can this machine render, and what is missing?"""
+"""`rendergraph doctor`: check whether this machine can render, and what is missing."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import sys
 from typing import Any
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, table
-from rendergraph.cli.words import click
 from rendergraph.installed import version, versions
 
 _OPTIONAL_FEATURES = ("memory objects", "depth bounds")
@@ -23,8 +23,7 @@ NO_DEVICE = 5
 def command(as_json: bool) -> None:
     """Check devices, drivers and versions.
 
-    Shows each GL device and what it can, and says what to install where something is missing. Exits 5 where no
-    device can be used.
+    Lists each GL device with its features, and what to install if something is missing. Exits 5 if no device is usable.
 
     \b
     Examples:
@@ -38,9 +37,9 @@ def command(as_json: bool) -> None:
 
 
 def examine() -> dict[str, Any]:
-    """Everything there is to say, as plain JSON values; nothing here fails."""
-    asked = _probe()
-    devices = [device | _probe(str(device["number"])) for device in asked.get("devices", [])]
+    """Return everything that `doctor` finds out, as plain JSON values; never raises."""
+    found = _probe()
+    devices = [device | _probe(str(device["number"])) for device in found.get("devices", [])]
     for device in devices:
         device["usable"] = not device.get("problem")
     packages = _packages()
@@ -51,27 +50,29 @@ def examine() -> dict[str, Any]:
         "python": platform.python_version(),
         "platform": platform.platform(),
         "packages": packages,
-        "libraries": asked.get("libraries", {}),
-        "problem": asked.get("problem"),
+        "libraries": found.get("libraries", {}),
+        "problem": found.get("problem"),
         "devices": devices,
-        "install": _advice(asked, devices, packages),
+        "install": _advice(found, devices, packages),
     }
 
 
 def _probe(*arguments: str) -> dict[str, Any]:
-    """What `probe` says, or what became of it."""
-    import subprocess  # this module is loaded for `--help`, too
+    """Run `probe` in a child process and return its answer, or the `problem`."""
+    import subprocess
 
-    words = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
+    command_line = [sys.executable, "-m", "rendergraph.cli.probe", *arguments]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False)
+        done = subprocess.run(
+            command_line, capture_output=True, text=True, errors="replace", timeout=_SECONDS, check=False
+        )
     except subprocess.TimeoutExpired:
         return {"problem": f"the driver did not answer within {_SECONDS} s"}
     except (OSError, ValueError) as error:
         return {"problem": f"the probe cannot be started: {error}"}
     try:
-        found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-        return found
+        answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        return answer
     except (ValueError, IndexError):
         pass
     if done.returncode < 0:
@@ -81,7 +82,6 @@ def _probe(*arguments: str) -> dict[str, Any]:
 
 
 def _packages() -> dict[str, str | None]:
-    """What rendergraph requires, and the versions installed."""
     from importlib.metadata import PackageNotFoundError, requires
 
     try:
@@ -92,13 +92,13 @@ def _packages() -> dict[str, str | None]:
     return versions(names)
 
 
-def _advice(asked: dict[str, Any], devices: list[dict[str, Any]], packages: dict[str, str | None]) -> list[str]:
-    """What to do, one sentence each; package names are Debian's and Ubuntu's."""
+def _advice(found: dict[str, Any], devices: list[dict[str, Any]], packages: dict[str, str | None]) -> list[str]:
+    """One sentence for each thing to do; package names are those of Debian and Ubuntu."""
     advice = []
     missing = [name for name, version in packages.items() if version is None]
     if missing:
         advice.append(f"pip install {' '.join(missing)}")
-    libraries = asked.get("libraries", {})
+    libraries = found.get("libraries", {})
     apt = [p for library, p in (("libEGL.so.1", "libegl1"), ("libGL.so.1", "libgl1")) if libraries.get(library)]
     if not any(device["usable"] for device in devices):
         apt.append("libgl1-mesa-dri")
@@ -117,8 +117,8 @@ def _advice(asked: dict[str, Any], devices: list[dict[str, Any]], packages: dict
 def _overruns(device: dict[str, Any]) -> bool:
     """Whether the device is zink over Mesa 22's lavapipe.
 
-    That looks for uniforms to inline behind every branch, and notes those of the block it numbers 4 behind the end of
-    its table, so that the next draw reads through a wild pointer. Which block has that number the driver decides.
+    It looks for uniforms to inline at every branch, and writes those of the block that it numbers 4 beyond the end of
+    its table, so the next draw reads through a wild pointer. The driver chooses which block gets that number.
     """
     version = re.search(r"Mesa (\d+)", device.get("version", ""))
     return device.get("renderer", "").startswith("zink (llvmpipe") and version is not None and int(version[1]) <= 22
@@ -137,11 +137,11 @@ def _text(report: dict[str, Any]) -> str:
             continue
         lacking = [n for n, has in device["features"].items() if not has and n not in _OPTIONAL_FEATURES]
         words = [f"OpenGL {device['gl']}", device["version"].split(" ", 1)[-1]]
-        words += ["software: its times say nothing about GPUs"] if device["software"] else []
+        words += ["software: no measure of a GPU"] if device["software"] else []
         words += [f"lacks {', '.join(lacking)}"] if lacking else []
         words += [device[key] for key in ("render_node", "drm") if device.get(key)][:1]
         rows.append((device["number"], "yes", device["renderer"], ", ".join(words)))
-    lines.append(table(rows, ("device", "usable", "renderer", "what it is")) if rows else "no GL devices")
+    lines.append(table(rows, ("device", "usable", "renderer", "properties")) if rows else "no GL devices")
     lines.append("")
     lines.append("ready to render" if report["ok"] else "cannot render here yet")
     lines += [f"  {line}" for line in report["install"]]

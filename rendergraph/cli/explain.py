@@ -1,47 +1,47 @@
-"""`rendergraph explain`: the reference, offline."""
+"""`rendergraph explain`: the reference manual in the terminal."""
 
 from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rendergraph import reference
 from rendergraph.cli import options
-from rendergraph.cli.describe import describe, in_a_file, input_facts, meaning, output_facts
-from rendergraph.cli.output import emit, emit_json, table, warn
-from rendergraph.cli.program_text import as_text, program, shown_at_work
-from rendergraph.cli.words import click
-from rendergraph.errors import InputError, Problem, UsageError, suggestion
+from rendergraph.cli.lazy_click import click
+from rendergraph.cli.output import amount, emit, emit_json, section, sections, warn
+from rendergraph.errors import InputError, Problem, UsageError, node_named, suggestion
+from rendergraph.formatting import format_value
+from rendergraph.resources import shipped_pipelines, shipped_scenes
 
 if TYPE_CHECKING:
     from rendergraph.cli.options import Select
-    from rendergraph.keys import Table
-    from rendergraph.session.values import Linked
 
-FILES = ("pipeline", "scene", "sweep", "settings", "header")
-"""Kinds of file whose keys can be explained."""
+Entry = dict[str, Any]
+"""Facts about a topic, as `--json` prints them."""
 
 
 @click.command("explain", no_args_is_help=True)
 @click.argument("topic", shell_complete=options.offered("topics"))
-@click.option("--glsl", is_flag=True, help="Print the program of the node: what is in scope, and its final text.")
+@click.option("--glsl", is_flag=True, help="Print the node's program: what is in scope, and the final text.")
 @click.option(
     "--pipeline",
     metavar="PIPELINE",
     shell_complete=options.offered("pipelines"),
-    help="The program that node TOPIC of this pipeline has.",
+    help="Pipeline that has the node TOPIC; with --glsl.",
 )
-@click.option("--step", type=click.IntRange(min=0), metavar="N", help="Which of the node's steps, as `plan` counts.")
+@click.option("--step", type=click.IntRange(min=0), metavar="N", help="Step of the node, as `plan` counts.")
 @options.selection_options
 @options.json_option
 def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, select: Select, as_json: bool) -> None:
-    """Explain a node, pipeline, scene, error code or file.
+    """Explain a node, pipeline, scene, error code or file format.
 
-    `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of such a file; the path of a file explains the
-    pipeline, the scene or the node that it is. With --glsl a type is shown in a small pipeline, or TOPIC is a node of
-    --pipeline; either is changed by the options that `run` has.
+    `pipeline`, `scene`, `sweep`, `settings` and `header` list every key of that kind of file. The path of a file
+    explains the pipeline, scene or node in it. With --glsl, TOPIC is a node type, which is shown in a small pipeline,
+    or a node of --pipeline; the options of `run` change either pipeline.
 
     \b
     Examples:
@@ -53,217 +53,219 @@ def command(topic: str, glsl: bool, pipeline: str | None, step: int | None, sele
       rendergraph explain tonemap --glsl
       rendergraph explain ao --glsl --step 2 --pipeline ssao-hemisphere -s ao.samples=16
     """
-    from rendergraph.session import Selection, stages
+    from rendergraph.session import Selection
 
     plugins = select(topic).plugins
     if not glsl and (pipeline or step is not None or select(topic) != Selection(topic, plugins=plugins)):
         raise UsageError(Problem("RG500", "--pipeline, --step and what changes a pipeline go with --glsl"))
     if pipeline is not None:
-        linked = stages.link(stages.resolve(select(pipeline)))
-        warn(linked.warnings)
-        _program(linked, topic, step, as_json)
-        return
-    if re.fullmatch(r"[Rr][Gg]\d+", topic):
-        page = error_page(topic.upper())
-        emit_json(page) if as_json else emit(_error_text(page))
-        return
-    if topic in FILES:
-        keys = file_keys(topic)
-        emit_json({"file": topic, "keys": keys}) if as_json else emit(_keys_text(topic, keys))
-        return
+        found = reference.describe_program(options.link(select(pipeline)), topic, step)
+        _print(found, _program_text, as_json)
+    elif re.fullmatch(r"[Rr][Gg]\d+", topic):
+        _print(reference.error_page(topic.upper()), _error_text, as_json)
+    elif topic in reference.FILE_KINDS:
+        _print({"file": topic, "keys": reference.file_keys(topic)}, _keys_text, as_json)
+    else:
+        _node_or_file(topic, plugins, select, glsl=glsl, step=step, as_json=as_json)
+
+
+def _node_or_file(
+    topic: str, plugins: tuple[Path, ...], select: Select, *, glsl: bool, step: int | None, as_json: bool
+) -> None:
+    """Explain a node type, a pipeline or a scene; a name that is both a node type and a file is explained as both."""
     from rendergraph.catalog import SHADERS, Catalog
-    from rendergraph.resources import shipped_pipelines, shipped_scenes
 
     catalog = Catalog.discover(plugins)
     warn(catalog.notes)
     if topic.endswith(SHADERS):
         catalog = catalog.with_file(topic, Path(topic))
-    shown = None if glsl else _file(topic, select)
-    if topic not in catalog and shown is not None:
-        emit_json(shown[0]) if as_json else emit(shown[1])
-        return
+    file, file_text = ({}, "") if glsl else _file(topic, select, catalog)
     if topic not in catalog:
-        known = [*catalog.names(), *FILES, *shipped_pipelines(), *shipped_scenes()]
-        beside = next((f"{topic}{end}" for end in SHADERS if Path(f"{topic}{end}").is_file()), None)
-        if beside is not None:
-            raise InputError(Problem("RG511", f"nothing is called '{topic}'; did you mean './{beside}'?"))
-        hint = suggestion(topic, known)
-        text = f"nothing is called '{topic}'{hint}; `nodes`, `pipelines` and `scenes` list what there is"
-        raise InputError(Problem("RG511", text))
-    found = catalog.get(topic)
-    if glsl:
-        _program(*shown_at_work(found, catalog, select), step, as_json)
+        if not file:
+            raise InputError(Problem("RG511", _unknown(topic, catalog.names(), SHADERS)))
+        emit_json(file) if as_json else emit(file_text)
         return
-    described = describe(found, catalog.extensions) | {"example": in_a_file(found, catalog)}
+    node_type = catalog.get(topic)
+    if glsl:
+        linked, node = reference.find_node_of_type(node_type, catalog, select)
+        _print(reference.describe_program(linked, node, step), _program_text, as_json)
+        return
+    described = reference.describe_node(node_type, catalog.extensions)
+    described["example"] = reference.example_text(node_type, catalog)
     if any("added" in parameter for parameter in described["parameters"]):
         warn(catalog.extensions.warnings)
-    warn(found.warnings)
-    if as_json:
-        emit_json((shown[0] if shown else {}) | described)
-    else:
-        emit(_node_text(described) + (f"\n\n{shown[1]}" if shown else ""))
+    warn(node_type.warnings)
+    _print(file | described, lambda found: sections(_node_text(found), file_text), as_json)
 
 
-def _file(topic: str, select: Select) -> tuple[dict[str, Any], str] | None:
-    """The pipeline or the scene that a topic names, as values and as text."""
-    from rendergraph.cli import about
+def _print(found: Entry, text_of: Callable[[Entry], str], as_json: bool) -> None:
+    emit_json(found) if as_json else emit(text_of(found))
 
-    kind = about.kind_of(topic)
+
+def _unknown(topic: str, types: Any, shader_suffixes: tuple[str, ...]) -> str:
+    shader = next((f"./{topic}{suffix}" for suffix in shader_suffixes if Path(f"{topic}{suffix}").is_file()), None)
+    names = [*types, *reference.FILE_KINDS, *shipped_pipelines(), *shipped_scenes()]
+    hint = f"; did you mean '{shader}'?" if shader else suggestion(topic, names)
+    return f"nothing is called '{topic}'{hint}" + ("" if shader else "; `nodes`, `pipelines` and `scenes` list names")
+
+
+def _file(topic: str, select: Select, catalog: Any) -> tuple[Entry, str]:
+    """Describe the pipeline or scene that a topic names, also as text; empty where it names neither."""
+    kind = reference.kind_of(topic)
     if kind == "pipeline":
-        found = about.pipeline(topic, select)
-        return found, about.pipeline_text(found)
+        found = reference.describe_pipeline(topic, options.link(select(topic)))
+        return found, _pipeline_text(found)
     if kind == "scene":
-        found = about.scene(topic, select)
-        return found, about.scene_text(found)
-    return None
+        from rendergraph.scene.load import load
+
+        path = shipped_scenes().get(topic) or Path(topic)
+        scene = load(path, extensions=catalog.extensions)
+        warn(scene.warnings)
+        found = reference.describe_scene(topic, path, scene)
+        return found, _scene_text(found)
+    return {}, ""
 
 
-def _program(linked: Linked, node: str, step: int | None, as_json: bool) -> None:
-    found = program(linked, node, step)
-    emit_json(found) if as_json else emit(as_text(found))
+# --- text ------------------------------------------------------------------------------------------------------------
 
 
-# --- error codes -----------------------------------------------------------------------------------------------------
+def _pipeline_text(found: Entry) -> str:
+    width, height = found["size"]
+    scene = f"Renders {found['scene']}" if found["scene"] else "Renders no scene"
+    outputs = ", ".join(f"{name} ({end})" for name, end in found["outputs"].items())
+    nodes = [(node["id"], node["type"], node["line"]) for node in found["nodes"]]
+    return sections(
+        f"{found['pipeline']}  (pipeline)",
+        found["line"],
+        f"{scene}, {width}×{height}; outputs {outputs}.",
+        section("Nodes", nodes, ("id", "type", "result")),
+        section("Parameters", list(found["parameters"].items())),
+        section("File", found["text"]),
+        f"`rendergraph graph {found['name']}` draws its graph, "
+        f"`rendergraph config {found['name']}` prints it with everything that it extends.",
+    )
 
 
-def error_page(code: str) -> dict[str, Any]:
-    """The page of a code.
-
-    Raises:
-        InputError: there is no such code.
-    """
-    import yaml
-
-    from rendergraph.resources import folder
-
-    pages = {path.name.partition("-")[0]: path for path in sorted(folder("rendergraph.errors").glob("RG*.yaml"))}
-    if code not in pages:
-        raise InputError(Problem("RG511", f"there is no error code '{code}'{suggestion(code, pages)}"))
-    page: dict[str, Any] = yaml.safe_load(pages[code].read_text(encoding="utf-8"))
-    return page
+_MOST_OBJECTS = 40
 
 
-def _error_text(page: dict[str, Any]) -> str:
-    about = "\n\n".join(textwrap.fill(" ".join(part.split()), 98) for part in str(page["about"]).split("\n\n"))
-    parts = [f"{page['code']}  {page['title']}", _indented(about)]
-    for key, title in (("wrong", "Wrong"), ("message", "Message"), ("right", "Right")):
-        if page.get(key):
-            parts.append(f"{title}\n{_indented(page[key])}")
-    return "\n\n".join(parts)
-
-
-def _indented(text: object) -> str:
-    return "\n".join(f"  {line}".rstrip() for line in str(text).rstrip().splitlines())
-
-
-# --- files -----------------------------------------------------------------------------------------------------------
-
-
-def table_of(kind: str) -> Table:
-    """The keys of a kind of file."""
-    if kind == "pipeline":
-        from rendergraph.read import PIPELINE as found
-    elif kind == "scene":
-        from rendergraph.scene.scene_keys import SCENE as found
-    elif kind == "sweep":
-        from rendergraph.compare.sweepfile import SWEEP as found
-    elif kind == "settings":
-        from rendergraph.settings import SETTINGS as found
-    else:
-        from rendergraph.catalog.header import HEADER as found
-    return found
-
-
-def file_keys(kind: str) -> list[dict[str, Any]]:
-    """Every key of a kind of file, section by section."""
-    from rendergraph.keys import briefly
-
-    return [
-        {
-            "section": section,
-            "key": key.name,
-            "value": briefly(key.takes),
-            "default": list(key.default) if isinstance(key.default, tuple) else key.default,
-            "unit": key.unit,
-            "required": key.required,
-            "doc": key.doc,
-        }
-        for section, keys in table_of(kind).sections()
-        for key in keys
+def _scene_text(found: Entry) -> str:
+    objects = [
+        (one["name"], one["triangles"], one["material"], "" if one["casts_shadow"] else "casts no shadow")
+        for one in found["objects"][:_MOST_OBJECTS]
     ]
+    more = len(found["objects"]) - len(objects)
+    listing = section("Objects", objects, ("name", "triangles", "material", ""), right=(1,))
+    return sections(
+        f"{found['scene']}  (scene, {found['triangles']} triangles{', animated' if found['moves'] else ''})",
+        found["line"],
+        listing + (f"\n  and {more} more" if more else ""),
+        section("Lights", [(one["name"], one["line"]) for one in found["lights"]]),
+        section("Cameras", [(one["name"], one["line"]) for one in found["cameras"]]),
+        *found["added"],
+        f"`rendergraph run forward --scene {found['name']}` renders it.",
+    )
 
 
-_KINDS = {
-    "pipeline": "a pipeline file",
-    "scene": "a scene file",
-    "sweep": "a sweep's file",
-    "settings": "`rendergraph.toml`",
-    "header": "a shader file's header",
-}
+def _error_text(page: Entry) -> str:
+    paragraphs = str(page["about"]).split("\n\n")
+    about = "\n\n".join(textwrap.fill(" ".join(paragraph.split()), 98) for paragraph in paragraphs)
+    return sections(
+        section(f"{page['code']}  {page['title']}", about),
+        *(section(key.capitalize(), str(page.get(key) or "")) for key in ("wrong", "message", "right")),
+    )
 
 
-def _keys_text(kind: str, keys: list[dict[str, Any]]) -> str:
-    parts = [f"Every key of {_KINDS[kind]}. All are optional unless it is said."]
-    for section in dict.fromkeys(row["section"] for row in keys):
-        rows = [
-            (row["key"], row["value"], row["unit"], _default(row), row["doc"])
-            for row in keys
-            if row["section"] == section
-        ]
-        parts.append((f"{section}\n" if section else "") + _block(rows))
-    parts.append("`rendergraph config forward` prints a pipeline." if kind == "pipeline" else "")
-    return "\n\n".join(filter(None, parts))
+def _keys_text(found: Entry) -> str:
+    kind = found["file"]
+    tables = []
+    for title, keys in groupby(found["keys"], key=lambda row: row["section"]):
+        rows = [(row["key"], row["value"], row["unit"], _default(row), row["doc"]) for row in keys]
+        tables.append(section(title, rows))
+    return sections(
+        f"Every key of {reference.FILE_KINDS[kind]}. All are optional unless marked as required.",
+        *tables,
+        "`rendergraph config forward` prints a pipeline." if kind == "pipeline" else "",
+    )
 
 
-def _default(row: dict[str, Any]) -> str:
+def _default(row: Entry) -> str:
     if row["required"]:
         return "required"
-    return "" if row["default"] is None else _value(row["default"])
+    return "" if row["default"] is None else format_value(row["default"])
 
 
-# --- nodes -----------------------------------------------------------------------------------------------------------
-
-
-def _node_text(node: dict[str, Any]) -> str:
-    family = f"  ({node['family']})" if node["family"] else ""
-    parts = [f"{node['name']}{family}", node["doc"]]
-    if node["inputs"]:
-        rows = [(p["name"], meaning(p), ", ".join(input_facts(p)), p["doc"]) for p in node["inputs"]]
-        parts.append("Inputs\n" + _block(rows))
-    for title, ports in (("Outputs", node["outputs"]), ("Textures of its own", node["internal"])):
-        rows = [(p["name"], meaning(p), ", ".join(output_facts(p)), p["doc"]) for p in ports]
-        parts.append(f"{title}\n{_block(rows)}" if rows else "")
-    if node["parameters"]:
-        knobs = [
-            (p["name"], p["type"], f"{_value(p['default'])} {p['unit']}".strip(), _range(p), p["doc"])
-            for p in node["parameters"]
-        ]
-        parts.append("Parameters\n" + _block(knobs, ("name", "value", "default", "range", "")))
-    added = [
-        (f"{p['name']}: {c['name']}", c["plugin"], c["doc"]) for p in node["parameters"] for c in p.get("added", ())
+def _node_text(node: Entry) -> str:
+    inputs = [(p["name"], reference.meaning(p), ", ".join(reference.input_facts(p)), p["doc"]) for p in node["inputs"]]
+    outputs, internal = (
+        [(p["name"], reference.meaning(p), ", ".join(reference.output_facts(p)), p["doc"]) for p in node[key]]
+        for key in ("outputs", "internal")
+    )
+    parameters = [
+        (p["name"], p["type"], f"{format_value(p['default'])} {p['unit']}".strip(), _range(p), p["doc"])
+        for p in node["parameters"]
     ]
-    if added:
-        parts.append("Choices of plugins\n" + _block(added))
-    if node["extends"]:
-        parts.append("To extend it, or what it stands on\n" + _indented("\n".join(node["extends"])))
-    parts.append("In a file\n" + _indented(node["example"]))
-    return "\n\n".join(filter(None, parts))
+    added = [
+        (f"{p['name']}: {choice['name']}", choice["plugin"], choice["doc"])
+        for p in node["parameters"]
+        for choice in p.get("added", ())
+    ]
+    return sections(
+        f"{node['name']}  ({node['family']})" if node["family"] else node["name"],
+        node["doc"],
+        section("Inputs", inputs),
+        section("Outputs", outputs),
+        section("Internal textures", internal),
+        section("Parameters", parameters, ("name", "value", "default", "range", "")) if parameters else "",
+        section("Choices added by plugins", added),
+        section("To extend it or one of its bases", "\n".join(node["extends"])),
+        section("Example", node["example"]),
+    )
 
 
-def _block(rows: Sequence[tuple[Any, ...]], heads: tuple[str, ...] = ()) -> str:
-    return _indented(table(rows, heads))
-
-
-def _range(parameter: dict[str, Any]) -> str:
+def _range(parameter: Entry) -> str:
     low, high = parameter.get("min"), parameter.get("max")
     if low is None and high is None:
         return ""
-    return f"{_value(low) if low is not None else '-∞'} … {_value(high) if high is not None else '∞'}"
+    return f"{'-∞' if low is None else format_value(low)} … {'∞' if high is None else format_value(high)}"
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+_SCOPE_TITLES = {
+    "textures": "textures",
+    "uniforms": "uniforms",
+    "blocks": "blocks, views and tables",
+    "macros": "macros",
+    "functions": "functions of other nodes, and their providers",
+    "includes": "included files, and what they declare",
+    "attributes": "attributes",
+    "varyings": "varyings",
+    "outputs": "outputs",
+}
+_WIDE = 64
+
+
+def _program_text(found: Entry) -> str:
+    """The program as GLSL; everything else is in comments."""
+    lines = [f"step {found['step']} of {node_named(found['node'], found['type'])} in pipeline '{found['pipeline']}'"]
+    if len(found["steps"]) > 1:
+        lines.append("steps with a program; --step N selects one:")
+        for one in found["steps"]:
+            shaders = ", ".join(one["shaders"].values())
+            lines.append(f"  {one['step']}  {one['kind']}  {shaders}  {one['label']}".rstrip())
+    if found["variants"] == 0:
+        lines.append("it draws nothing of this scene")
+    elif found["variants"] > 1:
+        differing = ", ".join(found["differ"])
+        lines.append(f"the first of {amount(found['variants'], 'variant')}, which differ in {differing}")
+    for title, members in groupby(found["scope"], key=lambda one: one["section"]):
+        rows = [(one["name"], one["source"]) for one in members]
+        width = max((len(name) for name, _ in rows if len(name) < _WIDE), default=0)
+        lines += ["", _SCOPE_TITLES[title]]
+        for name, source in rows:
+            if len(name) < _WIDE and width + len(source) < 2 * _WIDE:
+                lines.append(f"  {name.ljust(width)}  {source}")
+            else:
+                lines += [f"  {name}", *textwrap.wrap(source, 100, initial_indent=" " * 6, subsequent_indent=" " * 6)]
+    head = "\n".join(f"// {line}".rstrip() for line in lines)
+    stages = [f"// {'=' * 20} {stage} shader\n\n{one['annotated']}" for stage, one in found["stages"].items()]
+    return sections(head, *stages).rstrip()

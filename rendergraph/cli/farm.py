@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit, emit_json, say
 from rendergraph.cli.sweep import at_its_lines, with_file
-from rendergraph.cli.words import click
 from rendergraph.errors import Problem, UsageError
 
 if TYPE_CHECKING:

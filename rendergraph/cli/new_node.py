@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, say
-from rendergraph.cli.words import click
 
 _KINDS = ("fullscreen", "compute", "geometry", "shader-only")
 

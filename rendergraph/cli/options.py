@@ -1,4 +1,4 @@
-"""Options that several verbs share, and the kinds of value they take."""
+"""Options that several verbs share, and the types of their values."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from msgspec import Struct
 
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, warn
-from rendergraph.cli.words import click
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,39 +23,50 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 Select: TypeAlias = "Callable[[str], Selection]"
-"""Makes the selection of a pipeline's name, as the options say."""
+"""Returns the selection of a pipeline by its name, with everything that the options say."""
 
 _NAME = r"[A-Za-z_][A-Za-z0-9_-]*"
 _NODE = rf"{_NAME}(?:/{_NAME})*"
 
 
 class Target(Struct, frozen=True):
-    """A file, and the output or port it shows; of an output without a name the extension chooses it.
-
-    What is `on_sheet` is one of all ports, and on their contact sheet.
-    """
+    """A file, and the output or port that goes into it; without a `name` the extension chooses the output."""
 
     name: str
     path: Path
     is_tap: bool = False
-    on_sheet: bool = False
+    on_sheet: bool = False  # also shown on the contact sheet
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]  # generic in new versions of click only
-    """A value that a function reads from text; its ValueError says what is wrong with it."""
+    """A value that a function reads from text; the function's ValueError is the message."""
 
     def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
         self.name = name
         self._parse = parse
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The value; one that is no text has been read already."""
-        if not isinstance(value, str):
+        if not isinstance(value, str):  # a default, or converted before
             return value
         try:
             return self._parse(value)
         except ValueError as error:
             self.fail(str(error), param, ctx)
+
+
+class NamedPath(click.Path):
+    """A path that is not empty: an empty one would mean the current folder."""
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True) -> None:
+        super().__init__(file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "" or "\0" in str(value):
+            self.fail(f"'{value}' is not the name of a file" + ("" if self.file_okay else " or folder"), param, ctx)
+        return super().convert(value, param, ctx)
+
+
+# --- types of values -------------------------------------------------------------------------------------------------
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -81,11 +92,7 @@ def _setting(text: str) -> str:
 
 
 def settings(text: str) -> tuple[str, ...]:
-    """Several settings in one text, as a shell would split it.
-
-    Raises:
-        ValueError: one of them is none, or a quote is not closed.
-    """
+    """Split several settings in one text as a shell would."""
     import shlex
 
     return tuple(_setting(word) for word in shlex.split(text))
@@ -102,16 +109,14 @@ def _tap(text: str) -> Target:
 
     found = re.fullmatch(rf"(?P<name>{_NODE}\.\w+{TEXTURE_PART})=(?P<file>.*)", text, re.DOTALL)
     if not found:
-        example = (
-            "sun.shadow_map=depth.exr; of a part 'sun.shadow_map[1]=…', 'bloom.glow[mip=1]=…', 'light.marks:stencil=…'"
-        )
-        raise ValueError(f"'{text}' is not NODE.PORT=FILE, as in {example}")
+        parts = "'sun.shadow_map[1]=…', 'bloom.glow[mip=1]=…', 'light.marks:stencil=…'"
+        raise ValueError(f"'{text}' is not NODE.PORT=FILE, as in sun.shadow_map=depth.exr; for a part: {parts}")
     return Target(found["name"], _picture(found["file"], text), is_tap=True)
 
 
 def _picture(name: str, text: str) -> Path:
     if not name or "\0" in name or name.endswith("/"):
-        raise ValueError(f"'{text}' names no file")
+        raise ValueError(f"'{text}' has no file name")
     return Path(name)
 
 
@@ -151,75 +156,105 @@ OUTPUT = Parsed("[NAME=]FILE", _output)
 TAP = Parsed("NODE.PORT=FILE", _tap)
 LIMIT = Parsed("NAME=N", _limit)
 POSITIVE = Parsed("NUMBER", _positive)
-EXECUTOR = Parsed("WHO", _executor)
+EXECUTOR = Parsed("NAME", _executor)
 DEVICES = Parsed("N,N", _devices)
-
-
-class NamedPath(click.Path):
-    """A path that was typed, and not left out: an empty one would mean the current folder."""
-
-    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True) -> None:
-        super().__init__(file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The path."""
-        if value == "" or "\0" in str(value):
-            self.fail(f"'{value}' names no file" + ("" if self.file_okay else " and no folder"), param, ctx)
-        return super().convert(value, param, ctx)
-
-
 _PATH = NamedPath()
-_FIELDS = ("scene", "camera", "environment", "size", "sets", "patches", "asset_roots", "limits", "plugins")
-"""Of a `Selection`, all that an option sets."""
-
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
-heap_option = click.option(
-    "--heap", is_flag=True, help="Let textures of any size and format share memory, where the device can."
-)
-plugin_option = click.option(
-    "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node modules, or a folder of them: code."
-)
-device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
 
 
-def executor_options(function: F) -> F:
-    """Who does the work: the verb gets `executor`, `devices` and `timeout`."""
-    for decorate in reversed(
-        [
-            click.option(
-                "--executor",
-                type=EXECUTOR,
-                metavar="WHO",
-                help="Who draws: serial, processes[:N], dask[:N], dask://HOST:PORT.  [default: as suits the machine]",
-            ),
-            click.option(
-                "--devices", type=DEVICES, default="", metavar="N,N", help="GL devices that processes share out."
-            ),
-            click.option(
-                "--timeout",
-                type=POSITIVE,
-                metavar="SECONDS",
-                help="How long a worker may say nothing before another one gets its work.  [default: 600]",
-            ),
-        ]
-    ):
-        function = decorate(function)
-    return function
+# --- options ---------------------------------------------------------------------------------------------------------
 
 
-def offered(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
-    """What a shell offers on TAB, a function of `rendergraph.cli.completion`, looked up when one asks."""
+def offered(kind: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
+    """Return what completes a word: a function of `rendergraph.cli.completion`, imported when a shell asks."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
-        completion = importlib.import_module("rendergraph.cli.completion")  # it knows the verbs
-        found: list[Any] = getattr(completion, what)(ctx, param, incomplete)
+        completion = importlib.import_module("rendergraph.cli.completion")
+        found: list[Any] = getattr(completion, kind)(ctx, param, incomplete)
         return found
 
     return complete
 
 
+def _all(*decorators: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Return one decorator for several, in the order of `--help`."""
+
+    def decorate(function: F) -> F:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return decorate
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
+alias_option = click.option("--no-alias", is_flag=True, help="Give every texture its own memory.")
+heap_option = click.option(
+    "--heap", is_flag=True, help="Let textures of any size and format share memory, where the device supports it."
+)
+plugin_option = click.option(
+    "--plugin", "plugins", multiple=True, type=_PATH, metavar="PATH", help="Node module or folder of them; runs code."
+)
+device_option = click.option("--device", metavar="NUMBER", type=int, help="GL device, as `doctor` numbers them.")
+scene_option = click.option(
+    "--scene",
+    metavar="FILE",
+    shell_complete=offered("scenes"),
+    help="Scene to render: a shipped name, a scene file, .obj, .gltf, .glb.",
+)
+executor_options = _all(
+    click.option(
+        "--executor",
+        type=EXECUTOR,
+        metavar="NAME",
+        help="Where to render: serial, processes[:N], dask[:N], dask://HOST:PORT.  [default: depends on the machine]",
+    ),
+    click.option("--devices", type=DEVICES, default="", metavar="N,N", help="GL devices to distribute over workers."),
+    click.option(
+        "--timeout",
+        type=POSITIVE,
+        metavar="SECONDS",
+        help="Seconds without progress before a worker is replaced.  [default: 600]",
+    ),
+)
+"""The verb gets `executor`, `devices` and `timeout`."""
+SELECTION_OPTIONS = {
+    "scene": scene_option,
+    "camera": click.option(
+        "--camera", metavar="NAME", shell_complete=offered("cameras"), help="Camera of the scene to render from."
+    ),
+    "environment": click.option(
+        "--environment", type=_PATH, metavar="FILE", help="Environment map: a shipped name, .hdr or .exr."
+    ),
+    "size": click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
+    "sets": click.option(
+        "-s",
+        "--set",
+        "sets",
+        multiple=True,
+        type=SETTING,
+        shell_complete=offered("settings"),
+        help="Set a parameter, connect an input, change a type, or disable a node: ao.radius=0.5, light.lookup=null, "
+        "sun.type=T, ao.enabled=false.",
+    ),
+    "patches": click.option("-p", "--patch", "patches", multiple=True, type=_PATH, help="Apply a merge patch file."),
+    "asset_roots": click.option(
+        "--asset-root",
+        "asset_roots",
+        multiple=True,
+        type=_PATH,
+        metavar="DIR",
+        help="Another folder that files may be read from.",
+    ),
+    "limits": click.option(
+        "--limit", "limits", multiple=True, type=LIMIT, help="Raise a safety limit, as error messages name it."
+    ),
+    "plugins": plugin_option,
+}
+"""By the field of `Selection` that each sets."""
+
+
 def pipeline_options(function: F) -> F:
-    """The pipeline, and everything that changes it before anything looks at it; the verb gets it as `selection`."""
+    """Add the argument PIPELINE, and everything that changes a pipeline; the verb gets both as `selection`."""
 
     @wraps(function)
     def selected(*, pipeline: str, select: Select, **given: Any) -> None:
@@ -229,68 +264,26 @@ def pipeline_options(function: F) -> F:
 
 
 def selection_options(function: F) -> F:
-    """Everything that changes a pipeline before anything looks at it; the verb gets `select`, which takes its name."""
+    """Add everything that changes a pipeline; the verb gets `select`, which takes the pipeline's name."""
 
     @wraps(function)
     def selecting(**given: Any) -> None:
         from rendergraph.session import Selection
 
-        fields = {name: given.pop(name) for name in _FIELDS}
+        fields = {name: given.pop(name) for name in SELECTION_OPTIONS}
         function(select=partial(Selection, **fields), **given)
 
-    decorated: Callable[..., Any] = selecting
-    for decorate in reversed(
-        [
-            click.option(
-                "--scene",
-                metavar="FILE",
-                shell_complete=offered("scenes"),
-                help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb.",
-            ),
-            click.option(
-                "--camera",
-                metavar="NAME",
-                shell_complete=offered("cameras"),
-                help="See it through this camera of the scene.",
-            ),
-            click.option(
-                "--environment", type=_PATH, metavar="FILE", help="Light it by this picture of the sky (.hdr, .exr)."
-            ),
-            click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
-            click.option(
-                "-s",
-                "--set",
-                "sets",
-                multiple=True,
-                type=SETTING,
-                shell_complete=offered("settings"),
-                help="Set a parameter, rewire an input, swap a type, take a node out: ao.radius=0.5, "
-                "light.lookup=null, sun.type=T, ao.enabled=false.",
-            ),
-            click.option("-p", "--patch", "patches", multiple=True, type=_PATH, help="Apply a merge patch file."),
-            click.option(
-                "--asset-root",
-                "asset_roots",
-                multiple=True,
-                type=_PATH,
-                metavar="DIR",
-                help="A further folder that files may be read from.",
-            ),
-            click.option(
-                "--limit", "limits", multiple=True, type=LIMIT, help="Allow more than usual; messages say when."
-            ),
-            plugin_option,
-        ]
-    ):
-        decorated = decorate(decorated)
-    return decorated  # type: ignore[return-value]
+    return _all(*SELECTION_OPTIONS.values())(selecting)  # type: ignore[return-value]
+
+
+# --- what verbs do with them -----------------------------------------------------------------------------------------
 
 
 def linked(selection: Selection) -> Pipeline:
-    """The pipeline as Python has it, linked; its warnings are said.
+    """Return the Python API's pipeline, linked; print its warnings.
 
     Raises:
-        InputError: with every mistake found on the way.
+        InputError: with all errors.
     """
     from rendergraph.session import Pipeline
 
@@ -299,12 +292,17 @@ def linked(selection: Selection) -> Pipeline:
     return pipeline
 
 
-def sketched(selection: Selection) -> Linked:
-    """The graph to look at, where node types may be missing; what is, and its warnings, are said.
+def link(selection: Selection) -> Linked:
+    """Resolve and link; print the warnings."""
+    from rendergraph.session import stages
 
-    Raises:
-        InputError: with every mistake found on the way, where something else is wrong.
-    """
+    found = stages.link(stages.resolve(selection))
+    warn(found.warnings)
+    return found
+
+
+def sketch(selection: Selection) -> Linked:
+    """Resolve and link a graph in which node types may be missing; print these and other warnings."""
     from rendergraph.session import stages
 
     found = stages.sketch(stages.resolve(selection))
@@ -312,8 +310,8 @@ def sketched(selection: Selection) -> Linked:
     return found
 
 
-def conclude(*sketches: Linked) -> None:
-    """End with the exit code of a wrong file where something was missing, now that the rest has been shown."""
+def exit_if_missing(*sketches: Linked) -> None:
+    """Exit as for a wrong file where node types are missing, after everything else was printed."""
     if any(found.missing for found in sketches):
         click.get_current_context().exit(InputError.exit_code)
 
@@ -342,19 +340,16 @@ def command_line() -> str:
 
 
 def put(text: str, output: Path | None, *, as_json: bool = False) -> None:
-    """Text to stdout; or to a file, whole or not at all, and then the file's path to stdout."""
+    """Print text, or write it to a file and print the file's path."""
     if output is None:
         emit(text.rstrip("\n"))
         return
     write(text, output)
-    if as_json:
-        emit_json({"output": str(output)})
-    else:
-        emit(str(output))
+    emit_json({"output": str(output)}) if as_json else emit(str(output))
 
 
 def write(text: str, output: Path) -> None:
-    """Text to a file, whole or not at all.
+    """Write text to a file, whole or not at all.
 
     Raises:
         InputError: the file cannot be written there.

@@ -1,12 +1,12 @@
-"""`rendergraph plan`: order, lifetimes, memory."""
+"""`rendergraph plan`: show order, lifetimes and memory."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from rendergraph.cli import options
-from rendergraph.cli.output import emit, emit_json, warn
-from rendergraph.cli.words import click
+from rendergraph.cli.lazy_click import click
+from rendergraph.cli.output import emit, emit_json
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 @click.command("plan", no_args_is_help=True)
 @options.pipeline_options
 @options.json_option
-@click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@options.alias_option
 @options.heap_option
-@click.option("--shuffle", type=int, metavar="SEED", help="Another legal order.")
+@click.option("--shuffle", type=int, metavar="SEED", help="Use another legal order.")
 def command(selection: Selection, as_json: bool, no_alias: bool, heap: bool, shuffle: int | None) -> None:
     """Show order, lifetimes and memory, with reasons.
 
-    What runs in which order, how long each texture lives, which of them share memory, and the bytes.
+    Lists the order of the steps, how long each texture lives, which textures share memory, and the bytes.
 
     \b
     Examples:
@@ -31,10 +31,6 @@ def command(selection: Selection, as_json: bool, no_alias: bool, heap: bool, shu
     from rendergraph import diagrams
     from rendergraph.session import RenderOptions, stages
 
-    linked = stages.link(stages.resolve(selection))
-    warn(linked.warnings)
-    plan = stages.plan(stages.expand(linked, RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle))).plan
-    if as_json:
-        emit_json(diagrams.plan_json(plan))
-    else:
-        emit(diagrams.plan_text(plan).rstrip("\n"))
+    render_options = RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle)
+    plan = stages.plan(stages.expand(options.link(selection), render_options)).plan
+    emit_json(diagrams.plan_json(plan)) if as_json else emit(diagrams.plan_text(plan).rstrip("\n"))

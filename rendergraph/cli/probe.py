@@ -1,4 +1,4 @@
-"""What GL there is, asked in a process of its own, for a broken driver may take it down: `doctor` reads the JSON.
+"""Examine GL in a child process of `doctor`, because a broken driver may crash it; the answer is JSON on stdout.
 
 Without an argument it lists the EGL devices, with a number it opens that one.
 """
@@ -14,7 +14,7 @@ from rendergraph.gl.egl import devices
 
 
 def libraries() -> dict[str, str | None]:
-    """Shared library to what the loader says against it, None where it loads."""
+    """Return shared libraries with the loader's error message, None where one loads."""
     found: dict[str, str | None] = {}
     for name in ("libEGL.so.1", "libGL.so.1"):
         try:
@@ -26,11 +26,7 @@ def libraries() -> dict[str, str | None]:
 
 
 def context(index: int) -> dict[str, Any]:
-    """What a device's OpenGL is and can.
-
-    Raises:
-        DeviceError: it cannot be opened, or is older than 4.5.
-    """
+    """Return version, features and limits of a device's OpenGL."""
     from rendergraph.gl.device import open_device
 
     device = open_device(index)

@@ -1,4 +1,4 @@
-"""`rendergraph run`: pictures."""
+"""`rendergraph run`: render pictures."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from msgspec.structs import replace
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.options import Target
 from rendergraph.cli.output import Progress, Warnings, emit, emit_json, say_summary
-from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Place, Problem, UsageError
 from rendergraph.stamps import track_reads
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 @click.command("run", no_args_is_help=True)
 @options.pipeline_options
-@click.option("--frames", type=options.FRAMES, help="Render these frames; `####` in a file's name numbers them.")
-@click.option("--fps", type=options.POSITIVE, help="Frames a second.  [default: 30]")
+@click.option("--frames", type=options.FRAMES, help="Frames to render; `####` in a file name becomes the number.")
+@click.option("--fps", type=options.POSITIVE, help="Frames per second.  [default: 30]")
 @click.option("-o", "--output", "outputs", multiple=True, type=options.OUTPUT, help="Write an output to a file.")
 @click.option(
     "--tap",
@@ -41,21 +41,21 @@ if TYPE_CHECKING:
     "--tap-all",
     type=options.NamedPath(file_okay=False),
     metavar="FOLDER",
-    help="Write every port's texture there as a picture, and all on one sheet.",
+    help="Write every port's texture as a picture, and a contact sheet of all.",
 )
 @options.executor_options
 @options.json_option
 @options.device_option
-@click.option("--watch", is_flag=True, help="Stay, and render again whenever a file that went into it changes.")
+@click.option("--watch", is_flag=True, help="Keep running, and render again whenever a file changes that was read.")
 @click.option(
     "--reuse/--no-reuse",
     default=None,
-    help="Leave out steps whose values are still there from the frame before.  [default: unless --json measures them]",
+    help="Skip steps whose results are unchanged since the previous frame.  [default: unless --json, which times them]",
 )
-@click.option("--no-cull", is_flag=True, help="Draw objects outside of the view, too.")
-@click.option("--no-alias", is_flag=True, help="Give every texture memory of its own.")
+@click.option("--no-cull", is_flag=True, help="Draw objects outside the view frustum, too.")
+@options.alias_option
 @options.heap_option
-@click.option("--poison", is_flag=True, help="Overwrite textures that are dead, to show who still reads them.")
+@click.option("--poison", is_flag=True, help="Overwrite textures after their last use, to reveal later reads.")
 @click.option("--shuffle", type=int, metavar="SEED", help="Run the steps in another legal order.")
 def command(
     selection: Selection,
@@ -79,10 +79,10 @@ def command(
 ) -> None:
     """Render a pipeline to picture files.
 
-    The extension chooses the format, and the output where none is named: PNG and JPEG take `image`, EXR and HDR take
-    `radiance`. Without -o the picture goes to PIPELINE.png in the current folder. A picture that was written so (PNG or
-    EXR) stands for the pipeline, camera and frame that it was made with. FILE.mp4 is a film of all frames.
-    With --executor the frames are drawn in parts by several processes or machines, each frame as by one.
+    The extension selects the format, and the output if none is named: PNG and JPEG get `image`, EXR and HDR get
+    `radiance`. Without -o the picture is PIPELINE.png in the current folder. A PNG or EXR picture written by `run` can
+    be used as PIPELINE: it contains the pipeline, camera and frame that made it. FILE.mp4 is a film of all frames.
+    With --executor several processes or machines share the frames; the pictures are the same.
 
     \b
     Examples:
@@ -98,17 +98,16 @@ def command(
     from rendergraph.session import RenderOptions
     from rendergraph.session.gpu import Gpu
 
-    def modes(linked: Linked) -> RenderOptions:
-        shown = frames or linked.frames
-        plain = RenderOptions(shown, fps or linked.fps, timed=as_json, reuse=reuse)
-        return replace(plain, cull=not no_cull, alias=not no_alias, heap=heap, poison=poison, shuffle=shuffle)
+    def render_options(linked: Linked) -> RenderOptions:
+        base = RenderOptions(frames or linked.frames, fps or linked.fps, timed=as_json, reuse=reuse)
+        return replace(base, cull=not no_cull, alias=not no_alias, heap=heap, poison=poison, shuffle=shuffle)
 
     warnings = Warnings()
-    read = partial(_read, selection, modes, outputs, taps, tap_all, warnings)
+    read = partial(_read, selection, render_options, outputs, taps, tap_all, warnings)
     draw = partial(_draw, sheet=tap_all, warnings=warnings, quiet=as_json)
     if watch:
         if executor is not None:
-            raise UsageError(Problem("RG500", "--watch draws here; leave out --executor"))
+            raise UsageError(Problem("RG500", "--watch renders in this process; leave out --executor"))
         from rendergraph.cli.watching import keep_drawing
 
         keep_drawing(lambda gpu: draw(*read(), gpu), device, as_json=as_json)
@@ -124,9 +123,8 @@ def command(
         from rendergraph.farm.executors import make_executor
 
         if tap_all is not None:
-            raise UsageError(Problem("RG500", "--tap-all looks at one pipeline closely, and is drawn by one process"))
-        nodes = expanded.linked.graph.nodes
-        modules = {type(node.node).__module__ for node in nodes}
+            raise UsageError(Problem("RG500", "--tap-all renders in this process; leave out --executor"))
+        modules = {type(node.node).__module__ for node in expanded.linked.graph.nodes}
         with make_executor(executor, None, device, tasks=2, devices=devices, timeout=timeout) as farm:
             farm.upload_inputs(lambda: make_bundle(files, selection.plugins, modules))
             report = draw_in_parts(expanded, targets, farm, warnings=warnings, quiet=as_json)
@@ -143,7 +141,7 @@ def _read(
     tap_all: Path | None,
     warnings: Warnings,
 ) -> tuple[Expanded, list[Target]]:
-    """Everything before the device is opened: what is to be drawn, and the files it goes to, each with its name."""
+    """Do everything that needs no GL device: return the expanded pipeline, and the output files by their names."""
     from rendergraph import images
     from rendergraph.session import stages
     from rendergraph.session.wanted import every_port, figures
@@ -167,13 +165,13 @@ def _read(
     expanded = stages.expand(linked, replace(modes, outputs=wanted, taps=_names(taps)))
     targets = [*named, *taps]
     if tap_all is not None:
-        _make(tap_all)
+        _make_folder(tap_all)
     _check(targets, expanded, map(Path, files))
     return expanded, targets
 
 
 def _default(source: str, ending: str) -> Path:
-    """Where the picture goes when nobody says: beside itself, where it is one that is drawn again."""
+    """The file without -o; a picture that is rendered again is not overwritten."""
     from rendergraph.session.made import is_picture
 
     if is_picture(source):
@@ -183,18 +181,17 @@ def _default(source: str, ending: str) -> Path:
 
 
 def _as_picture(path: Path) -> Path:
-    """The file whose extension says which output is meant: a film is made of pictures."""
+    """The file whose extension selects the output: a film consists of pictures."""
     from rendergraph.images.video import is_film
 
     return path.with_suffix(".png") if is_film(path) else path
 
 
-def _make(folder: Path) -> None:
-    """Make a folder and those above it."""
+def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        text = f"cannot be made: {error.strerror or error}"
+        text = f"cannot be created: {error.strerror or error}"
         raise InputError(Problem("RG504", text, Place(str(folder)))) from error
 
 
@@ -205,7 +202,7 @@ def _names(targets: Iterable[Target]) -> tuple[str, ...]:
 def _draw(
     expanded: Expanded, targets: Sequence[Target], gpu: Gpu, *, sheet: Path | None, warnings: Warnings, quiet: bool
 ) -> dict[str, Any]:
-    """Draw and write everything; the document of `--json`. Paths are printed unless `quiet`."""
+    """Render and write everything, print the paths unless `quiet`, and return the document of `--json`."""
     from rendergraph import images
     from rendergraph.images.video import films, is_film
     from rendergraph.session import stages
@@ -236,19 +233,19 @@ def _draw(
                 if not quiet:
                     emit(str(file.path))
             progress.show(done)
-            unsound = {**frame.unsound, **unsound}  # said once an output, of the first frame that shows it
+            unsound = {**frame.unsound, **unsound}  # once for each output: of its first frame
     progress.clear()
     for target in moving:
         written.append(str(target.path))
         if not quiet:
             emit(str(target.path))
-    assert frame is not None  # a range of frames has one at least
+    assert frame is not None  # a range of frames is never empty
     warnings.say([*frame.warnings, *unsound.values()])
     return frame.as_json() | {"outputs": written}
 
 
 def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -> list[Saved]:
-    """The files, those of the sheet made viewable once, and the sheet."""
+    """The files with those of the contact sheet as viewable pictures, and the sheet."""
     from rendergraph import images
 
     viewed = images.PictureInfo("display_color", "rgba8", "display")
@@ -267,7 +264,7 @@ def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -
 
 
 def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path]) -> None:
-    """Everything that can be said about the files before anything is rendered; `files` are those that were read."""
+    """Refuse output files that cannot be written, before anything is rendered; `files` are those that were read."""
     from rendergraph import images
     from rendergraph.images.saving import extension
     from rendergraph.images.video import is_film
@@ -279,8 +276,8 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
             text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
             raise InputError(Problem("RG508", text))
     selection = linked.selection
-    own = [Path(name) for name in (selection.source, selection.scene, selection.environment) if name]
-    inputs = {os.path.realpath(name) for name in (*own, *files) if name.is_file()}
+    named = [Path(name) for name in (selection.source, selection.scene, selection.environment) if name]
+    inputs = {os.path.realpath(name) for name in (*named, *files) if name.is_file()}
     seen: set[str] = set()
     for target in targets:
         if is_film(target.path):
@@ -289,10 +286,10 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
             extension(target.path)
         place = os.path.realpath(target.path)
         if place in seen:
-            raise UsageError(Problem("RG502", f"two pictures go to '{target.path}'; give each a file of its own"))
+            raise UsageError(Problem("RG502", f"two outputs have the same file '{target.path}'; name two files"))
         seen.add(place)
         if place in inputs or any(images.stands_for(target.path, name) for name in inputs):
-            raise UsageError(Problem("RG502", f"'{target.path}' is read by this very run; write to another file"))
+            raise UsageError(Problem("RG502", f"'{target.path}' is also an input of this run; write to another file"))
         if len(numbers) > 1 and not images.is_numbered(target.path) and not is_film(target.path):
             better = target.path.with_name(f"{target.path.stem}.####{target.path.suffix}")
             text = f"{len(numbers)} frames do not fit one file '{target.path}'; number them: '{better}'"

@@ -1,4 +1,4 @@
-"""`rendergraph schema`: for editors."""
+"""`rendergraph schema`: JSON Schemas for editors and other programs."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rendergraph import reference
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import warn
-from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, suggestion
 
 if TYPE_CHECKING:
@@ -26,10 +27,10 @@ _KINDS = ("pipeline", "scene", "sweep", "results", "results-csv")
 def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: bool) -> None:
     """Print the JSON Schema of a kind of file.
 
-    That of pipeline files, the usual one, knows all installed nodes, and what shipped pipelines are made of, for files
-    that extend them. FILE is a pipeline: its schema knows what that extends, and its shader files, too. Of a type that
-    fails it has the name alone, and says so. `results` are the lines of a sweep's results.jsonl; of its results.csv,
-    `results-csv`, it is a Table Schema.
+    The schema of pipelines contains all installed nodes, and what shipped pipelines consist of, for files that extend
+    them. FILE is a pipeline: its schema also contains what it extends and its shader files. A node type with errors is
+    included by name only, with a warning. `results` describes the lines of a sweep's results.jsonl; `results-csv` is a
+    Table Schema of its results.csv.
 
     \b
     Examples:
@@ -48,10 +49,9 @@ def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: 
 
 
 def _of_table(what: str) -> Schema:
-    from rendergraph.cli.explain import table_of
     from rendergraph.keys import as_markdown, file_schema
 
-    found: Schema = as_markdown(file_schema(table_of(what)))
+    found: Schema = as_markdown(file_schema(reference.table_of(what)))
     return found
 
 

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from rendergraph.cli import compare as shared
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit, emit_json, on_terminal, say, say_event, table, warn
-from rendergraph.cli.words import click
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from msgspec.structs import replace
 
 from rendergraph.cli import options
+from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import emit, emit_json, say
-from rendergraph.cli.words import click
 from rendergraph.errors import Problem, UsageError
 
 if TYPE_CHECKING:

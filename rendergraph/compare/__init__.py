@@ -32,23 +32,20 @@ __all__ = [
     "sweep",
 ]
 
-_MODULES = {
-    "Axis": "axes",
-    "Comparison": "values",
-    "Result": "values",
-    "Space": "axes",
-    "compare": "pictures",
-    "compare_pictures": "files",
-    "Sweep": "product",
-    "check_sweep": "prepare",
-    "check_search": "optimise",
-    "search": "optimise",
-    "sweep": "product",
-}
-
 
 def __dir__() -> list[str]:
     return __all__
 
 
-__getattr__ = lazy_exports(__name__, _MODULES)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "axes": ("Axis", "Space"),
+        "files": ("compare_pictures",),
+        "optimise": ("check_search", "search"),
+        "pictures": ("compare",),
+        "prepare": ("check_sweep",),
+        "product": ("Sweep", "sweep"),
+        "values": ("Comparison", "Result"),
+    },
+)

@@ -17,19 +17,17 @@ if TYPE_CHECKING:
 
 __all__ = ["Frame", "OutputInfo", "Pipeline", "RenderOptions", "Selection", "Session", "load"]
 
-_MODULES = {
-    "Frame": "frame",
-    "OutputInfo": "frame",
-    "Pipeline": "pipeline",
-    "RenderOptions": "selection",
-    "Selection": "selection",
-    "Session": "session",
-    "load": "pipeline",
-}
-
 
 def __dir__() -> list[str]:
     return __all__
 
 
-__getattr__ = lazy_exports(__name__, _MODULES)
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "frame": ("Frame", "OutputInfo"),
+        "pipeline": ("Pipeline", "load"),
+        "selection": ("RenderOptions", "Selection"),
+        "session": ("Session",),
+    },
+)

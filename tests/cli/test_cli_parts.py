@@ -118,8 +118,14 @@ def test_films_need_their_extra_and_odd_wishes_are_told(
     cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write(tmp_path)
-    assert "draws here; leave out --executor" in cli("run", "p.yaml", "--watch", "--executor", "dask").err
-    assert "drawn by one process" in cli("run", "p.yaml", "--tap-all", "in", "--executor", "processes:2").err
+    assert (
+        "--watch renders in this process; leave out --executor"
+        in cli("run", "p.yaml", "--watch", "--executor", "dask").err
+    )
+    assert (
+        "--tap-all renders in this process; leave out --executor"
+        in cli("run", "p.yaml", "--tap-all", "in", "--executor", "processes:2").err
+    )
     assert "RG500" in cli("run", "p.yaml", "--executor", "threads").err
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setitem(sys.modules, "distributed", None)

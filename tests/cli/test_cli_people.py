@@ -48,7 +48,7 @@ def test_a_file_is_explained_as_what_it_is(cli: Any, tmp_path: Path) -> None:
     (tmp_path / "scene.yaml").write_text("scene: 1\nobjects: {box: {shape: box}}\n")
     (tmp_path / "own.yaml").write_text("# Mine.\nextends: forward\nscene: ./scene.yaml\n")
     shown = cli("explain", "own.yaml").out
-    assert shown.startswith("own  (pipeline)\n\nMine.\n\nDraws scene, 1280×720;")
+    assert shown.startswith("own  (pipeline)\n\nMine.\n\nRenders scene, 1280×720;")
     assert "`rendergraph graph own.yaml`" in shown
     shown = cli("explain", "scene.yaml").out
     assert shown.startswith("scene  (scene, 12 triangles)\n")
@@ -145,7 +145,7 @@ def test_a_hundred_mistakes_say_that_there_are_more(cli: Any, tmp_path: Path) ->
     nodes = "".join(f"  n{number}: {{type: nothing{number}}}\n" for number in range(150))
     (tmp_path / "own.yaml").write_text(f"rendergraph: 1\nnodes:\n{nodes}outputs: {{a: n0.c}}\n")
     result = cli("check", "own.yaml")
-    assert result.err.endswith("\nthese are the first 100 mistakes; there may be more\n")
+    assert result.err.endswith("\nthese are the first 100 errors; there may be more\n")
 
 
 def test_a_number_too_large_is_not_told_to_be_none(cli: Any, tmp_path: Path) -> None:

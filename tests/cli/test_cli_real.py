@@ -143,7 +143,7 @@ def test_a_folder_that_cannot_be_is_said_before_drawing(cli: Any, tmp_path: Path
     (tmp_path / "file").write_text("")
     result = cli("run", "forward", *SMALL, "--tap-all", "file/in")
     assert result.code == 3
-    assert "file/in: RG504 cannot be made: Not a directory" in result.err
+    assert "file/in: RG504 cannot be created: Not a directory" in result.err
 
 
 @pytest.mark.parametrize(

@@ -24,12 +24,12 @@ from rendergraph.api import (
     param,
 )
 from rendergraph.catalog import Catalog
-from rendergraph.cli.describe import describe, in_a_file, input_facts, output_facts, type_words
 from rendergraph.cli.output import table
+from rendergraph.reference import describe_node, error_codes, example_text, input_facts, output_facts, type_words
 from rendergraph.resources import folder
 
 CATALOG = Catalog.discover()
-CODES = sorted(path.name.partition("-")[0] for path in folder("rendergraph.errors").glob("RG*.yaml"))
+CODES = error_codes()
 
 
 def test_nodes_lists_every_type(cli: Any) -> None:
@@ -117,7 +117,7 @@ class Sample(Node):
 
 
 def test_a_description_says_everything() -> None:
-    found = describe(Catalog.of(Sample).get("sample"))
+    found = describe_node(Catalog.of(Sample).get("sample"))
     inputs = {port["name"]: port for port in found["inputs"]}
     outputs = {port["name"]: port for port in found["outputs"]}
     parameters = {entry["name"]: entry for entry in found["parameters"]}
@@ -148,7 +148,7 @@ def test_a_description_says_everything() -> None:
     facts = {port["name"]: ", ".join(input_facts(port)) for port in found["inputs"]}
     assert facts == {
         "radiance": "in group all, linear, repeat",
-        "depth": "optional, for the depth test alone",
+        "depth": "optional, for the depth test only",
         "shadows": "optional, one or a list, function",
         "target": "optional, continued",
     }
@@ -170,11 +170,11 @@ class Cube(Node):
 
 def test_an_example_has_gaps_where_nothing_fits() -> None:
     catalog = Catalog.of(Cube, Sample)
-    assert in_a_file(catalog.get("cube"), catalog) == "cube: {type: cube, inputs: {sky: NODE.sky}}"
+    assert example_text(catalog.get("cube"), catalog) == "cube: {type: cube, inputs: {sky: NODE.sky}}"
 
 
 def test_an_example_runs_as_it_is_printed(cli: Any, tmp_path: Path) -> None:
-    text = cli("explain", "gaussian_blur").out.partition("In a file\n")[2]
+    text = cli("explain", "gaussian_blur").out.partition("Example\n")[2]
     (tmp_path / "a.yaml").write_text(textwrap.dedent(text))
     assert (tmp_path / "a.yaml").read_text().rstrip() == cli("explain", "gaussian_blur", "--json").json["example"]
     assert cli("check", "a.yaml").code == 0
@@ -265,7 +265,11 @@ def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        ("shadows --glsl --pipeline forward", 3, r"RG511 node 'shadows' \(shadow_pcf\) has no program: .* of 'light'"),
+        (
+            "shadows --glsl --pipeline forward",
+            3,
+            r"RG511 node 'shadows' \(shadow_pcf\) has no program: its function is compiled into that of 'light'",
+        ),
         ("ligth --glsl --pipeline forward", 3, r"RG511 pipeline 'forward' has no node 'ligth'; did you mean 'light'"),
         (
             "display --glsl --pipeline forward --step 3",
@@ -275,7 +279,7 @@ def test_a_step_of_several_and_a_variant_of_several(cli: Any, tmp_path: Path) ->
         (
             "ssao_hemisphere --glsl -s ao.type=ssao_disc",
             3,
-            "RG511 what was set leaves no node of type 'ssao_hemisphere'",
+            "RG511 these options leave no node of type 'ssao_hemisphere'",
         ),
         ("tonemap --step 1", 2, "RG500 --pipeline, --step and what changes a pipeline go with --glsl"),
         ("tonemap -s display.exposure=1", 2, "RG500 --pipeline, --step and what changes a pipeline go with --glsl"),

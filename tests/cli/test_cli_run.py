@@ -91,9 +91,9 @@ def test_frames_are_numbered(cli: Any, fake: Any, tmp_path: Path) -> None:
     [
         (["-o", "a.gif"], 2, "RG501 '.gif' files are not written; available: .exr, .hdr, .jpeg, .jpg, .png"),
         (["-o", "a"], 2, "RG501 'a' has no extension to choose the format by; name it 'a.png'"),
-        (["-o", "a.png", "--tap", "n.p=./a.png"], 2, "RG502 two pictures go to 'a.png'; give each a file of its own"),
-        (["-o", "a.png", "-o", "link/a.png"], 2, "RG502 two pictures go to 'link/a.png'"),
-        (["--environment", "sky.hdr", "-o", "sky.hdr"], 2, "RG502 'sky.hdr' is read by this very run"),
+        (["-o", "a.png", "--tap", "n.p=./a.png"], 2, "RG502 two outputs have the same file 'a.png'; name two files"),
+        (["-o", "a.png", "-o", "link/a.png"], 2, "RG502 two outputs have the same file 'link/a.png'"),
+        (["--environment", "sky.hdr", "-o", "sky.hdr"], 2, "RG502 'sky.hdr' is also an input of this run"),
         (
             ["--frames", "1-9", "-o", "a.png"],
             2,
@@ -197,7 +197,7 @@ def test_no_picture_takes_the_place_of_a_texture_that_is_read(cli: Any, tmp_path
     (tmp_path / "link").symlink_to(tmp_path)
     for name in ("wood.0001.png", "link/wood.0001.png", "wood.####.png"):
         found = cli("run", "forward", "--scene", "s.yaml", "--size", "8x8", "-o", name)
-        assert (found.code, found.err) == (2, f"RG502 '{name}' is read by this very run; write to another file\n")
+        assert (found.code, found.err) == (2, f"RG502 '{name}' is also an input of this run; write to another file\n")
     assert (tmp_path / "wood.0001.png").read_bytes() == before
     assert cli("run", "forward", "--scene", "s.yaml", "--size", "8x8", "-o", "wood2.png").code == 0
 
@@ -207,9 +207,13 @@ def test_no_picture_takes_the_place_of_a_texture_that_is_read(cli: Any, tmp_path
     [
         (("run", "forward", "--asset-root", "none"), 3, "--asset-root: RG011 there is no folder 'none'"),
         (("check", "forward", "--asset-root", "file"), 3, "--asset-root: RG011 'file' is a file, a folder is needed"),
-        (("run", "forward", "--asset-root", ""), 2, "invalid value for '--asset-root': '' names no file"),
-        (("run", "forward", "--plugin", ""), 2, "invalid value for '--plugin': '' names no file"),
-        (("run", "forward", "--tap-all", ""), 2, "invalid value for '--tap-all': '' names no file and no folder"),
+        (("run", "forward", "--asset-root", ""), 2, "invalid value for '--asset-root': '' is not the name of a file"),
+        (("run", "forward", "--plugin", ""), 2, "invalid value for '--plugin': '' is not the name of a file"),
+        (
+            ("run", "forward", "--tap-all", ""),
+            2,
+            "invalid value for '--tap-all': '' is not the name of a file or folder",
+        ),
         (("run", "forward", "-p", ""), 2, "invalid value for '-p'"),
         (("graph", "forward", "-o", ""), 2, "invalid value for '-o'"),
         (("sweep", "forward", "-x", "shadows.taps=1", "-o", ""), 2, "invalid value for '-o'"),

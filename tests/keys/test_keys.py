@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from rendergraph.cli.explain import FILES, table_of
 from rendergraph.document import Source, Value, from_plain, parse
 from rendergraph.errors import InputError
 from rendergraph.keys import Codes, Form, Key, Later, Names, Naming, Table, Walk, as_markdown, file_schema, plain
@@ -31,6 +30,7 @@ from rendergraph.keys.forms import (
     version,
     whole,
 )
+from rendergraph.reference import FILE_KINDS, table_of
 from rendergraph.resources import shipped_scenes
 
 CODES = Codes("UNKNOWN", "WRONG", "NAME", "FILE")
@@ -170,7 +170,7 @@ def test_limits_in_words(form: Form, words: str) -> None:
     assert form.wanted == words
 
 
-@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("kind", FILE_KINDS)
 def test_every_key_of_every_file_is_documented_and_has_a_legal_default(kind: str) -> None:
     for _, keys in table_of(kind).sections():
         for key in keys:

@@ -10,11 +10,11 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.catalog import Catalog
-from rendergraph.cli.explain import error_page
 from rendergraph.declare import LightFacts
 from rendergraph.errors import InputError
 from rendergraph.link import Endpoint, Graph, endpoint, link
 from rendergraph.read import read
+from rendergraph.reference import error_page
 from rendergraph.resolve import resolve
 from rendergraph.resources import shipped_pipelines
 from rendergraph.textures import TextureDesc

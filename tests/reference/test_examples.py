@@ -10,13 +10,13 @@ import pytest
 import rendergraph as rg
 from rendergraph.api import Depth, DisplayColor, InOut, Input, Luminance, Node, Occlusion, Output, Radiance
 from rendergraph.catalog import Catalog
-from rendergraph.example import example
+from rendergraph.reference import example_file
 
 TYPES = Catalog.discover().names()
 
 
 def shown(name: str, catalog: Catalog) -> str:
-    text = example(catalog.get(name), catalog)
+    text = example_file(catalog.get(name), catalog)
     assert text is not None, name
     return text
 
@@ -136,4 +136,4 @@ outputs: {radiance: veil.radiance}
 def test_a_patch_is_put_together(cls: type[Node], text: str | None) -> None:
     standard: Any = {name: CATALOG.get(name).cls for name in TYPES}
     catalog = Catalog.of(cls, **standard)
-    assert example(catalog.get(cls.__name__.lower()), catalog) == text
+    assert example_file(catalog.get(cls.__name__.lower()), catalog) == text

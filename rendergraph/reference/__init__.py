@@ -1,0 +1,50 @@
+"""The offline manual as plain JSON values: node types, pipelines, scenes, programs, keys of files, error codes.
+
+`rendergraph explain` prints it, and the documentation's reference pages are generated from it. Everything is imported
+on first use: `--help` needs none of it, and most topics need little.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rendergraph.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from rendergraph.reference.assets import describe_pipeline, describe_scene, kind_of
+    from rendergraph.reference.examples import example_file, example_text
+    from rendergraph.reference.node_types import describe_node, input_facts, meaning, output_facts, summary, type_words
+    from rendergraph.reference.programs import describe_program, find_node_of_type
+    from rendergraph.reference.topics import FILE_KINDS, error_codes, error_page, file_keys, table_of
+
+__all__ = [
+    "FILE_KINDS",
+    "describe_node",
+    "describe_pipeline",
+    "describe_program",
+    "describe_scene",
+    "error_codes",
+    "error_page",
+    "example_file",
+    "example_text",
+    "file_keys",
+    "find_node_of_type",
+    "input_facts",
+    "kind_of",
+    "meaning",
+    "output_facts",
+    "summary",
+    "table_of",
+    "type_words",
+]
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "assets": ("describe_pipeline", "describe_scene", "kind_of"),
+        "examples": ("example_file", "example_text"),
+        "node_types": ("describe_node", "input_facts", "meaning", "output_facts", "summary", "type_words"),
+        "programs": ("describe_program", "find_node_of_type"),
+        "topics": ("FILE_KINDS", "error_codes", "error_page", "file_keys", "table_of"),
+    },
+)

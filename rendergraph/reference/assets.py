@@ -1,0 +1,109 @@
+"""A pipeline or a scene as plain JSON values."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from rendergraph.reference.node_types import summary
+from rendergraph.resources import opening, shipped_pipelines, shipped_scenes
+
+if TYPE_CHECKING:
+    from rendergraph.scene.model import Camera, Light, Scene
+    from rendergraph.session.values import Linked
+
+_MESHES = (".obj", ".gltf", ".glb")
+_YAML = (".yaml", ".yml")
+
+
+def kind_of(topic: str) -> Literal["pipeline", "scene"] | None:
+    """Return what a shipped name or a path stands for; None for neither."""
+    if topic in shipped_pipelines():
+        return "pipeline"
+    path = Path(topic)
+    if topic in shipped_scenes() or path.suffix.lower() in _MESHES:
+        return "scene"
+    if path.suffix.lower() not in _YAML or not path.is_file():
+        return None
+    from rendergraph.document import load  # most topics need no YAML
+
+    version = load(path, keep_going=True).root.get("scene")
+    return "scene" if version is not None and isinstance(version.data, int) else "pipeline"
+
+
+def describe_pipeline(name: str, linked: Linked) -> dict[str, Any]:
+    """Return what a pipeline is made of."""
+    path, graph, spec = linked.spec.path, linked.graph, linked.spec
+    assert path is not None  # it was named by a file
+    return {
+        "pipeline": graph.name,
+        "name": name,
+        "line": opening(path) or spec.description,
+        "file": str(path),
+        "text": path.read_text(encoding="utf-8"),
+        "scene": spec.scene.stem if spec.scene else None,
+        "size": list(graph.size),
+        "nodes": [
+            {"id": node.id, "type": node.type.name, "line": "" if node.type.missing else summary(node.type)}
+            for node in graph.nodes
+        ],
+        "parameters": {name: parameter.doc for name, parameter in spec.parameters.items()},
+        "outputs": {name: str(end) for name, end in graph.outputs.items()},
+    }
+
+
+def describe_scene(name: str, path: Path, scene: Scene) -> dict[str, Any]:
+    """Return what a scene file has, and what is added where it has none."""
+    from rendergraph.scene.animate import complete  # other topics need no scene
+
+    triangles = [mesh.indices.size // 3 for mesh in scene.meshes]
+    added = [] if scene.cameras else ["It has no camera: one is added in front, above and to the right."]
+    if not scene.lights and (lights := complete(scene).lights):
+        added.append(f"It has no light: {_light(lights[0])} is added.")
+    return {
+        "scene": scene.name,
+        "name": name,
+        "line": opening(path) if path.suffix.lower() in _YAML else "",
+        "file": str(path),
+        "triangles": sum(triangles[one.mesh] for one in scene.objects),
+        "objects": [
+            {
+                "name": one.name,
+                "triangles": triangles[one.mesh],
+                "material": scene.materials[one.material].name,
+                "casts_shadow": one.casts_shadow,
+            }
+            for one in scene.objects
+        ],
+        "lights": [{"name": light.name, "line": _light(light)} for light in scene.lights],
+        "cameras": [{"name": name, "line": _camera(camera)} for name, camera in scene.cameras.items()],
+        "added": added,
+        "moves": bool(scene.keyframes or scene.orbit),
+    }
+
+
+def _light(light: Light) -> str:
+    is_directional = light.type == "directional"
+    facts = [
+        light.type,
+        f"{light.intensity:g} {'lx' if is_directional else 'cd'}",
+        "" if tuple(light.color) == (1.0, 1.0, 1.0) else f"colour {_numbers(light.color)}",
+        "" if light.type == "point" else f"towards {_numbers(light.direction)}",
+        "" if is_directional else f"at {_numbers(light.position)}",
+        "" if light.casts_shadow else "casts no shadow",
+    ]
+    return ", ".join(filter(None, facts))
+
+
+def _camera(camera: Camera) -> str:
+    lens = {
+        "perspective": f"{math.degrees(camera.fov_y):.3g}° high",
+        "orthographic": f"orthographic, {camera.height:g} m high",
+        "frustum": "with its own frustum",
+    }[camera.type]
+    return f"{lens}, at {_numbers(camera.transform[:3, 3])}, {camera.near:g} to {camera.far:g} m"
+
+
+def _numbers(values: Any) -> str:
+    return "(" + ", ".join(f"{float(value):.3g}" for value in values) + ")"

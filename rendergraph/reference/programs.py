@@ -1,0 +1,117 @@
+"""The program of a step: what its shaders may use, and their final text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from msgspec.structs import replace
+
+from rendergraph.errors import InputError, Problem, UsageError, node_named, suggestion
+from rendergraph.reference.examples import example_file
+from rendergraph.resources import shipped_pipelines
+from rendergraph.session import stages
+
+if TYPE_CHECKING:
+    from rendergraph.catalog import Catalog, NodeType
+    from rendergraph.session import Selection
+    from rendergraph.session.values import Linked
+    from rendergraph.steps import Step
+
+_KINDS_WITH_PROGRAM = ("fullscreen", "geometry", "draw", "compute")
+
+
+def find_node_of_type(node_type: NodeType, catalog: Catalog, select: Callable[[str], Selection]) -> tuple[Linked, str]:
+    """Return the example of a node type, changed by the options in `select`, and the id of the type's node in it.
+
+    Raises:
+        InputError: there is no example, as no shipped pipeline has what the node needs.
+    """
+    import yaml  # other topics need no YAML
+
+    text = example_file(node_type, catalog)
+    if text is None:
+        text = f"no shipped pipeline shows '{node_type.name}'; name one that does with --pipeline, and the node's id"
+        raise InputError(Problem("RG511", text))
+    names = [name for name, file in shipped_pipelines().items() if file.read_text(encoding="utf-8") == text]
+    patch = {} if names else yaml.safe_load(text)
+    selection = select(names[0] if names else patch.pop("extends"))
+    selection = replace(selection, patches=(*([patch] if patch else []), *selection.patches))
+    for candidate in (selection, replace(selection, environment=selection.environment or Path("studio"))):
+        linked = stages.link(stages.resolve(candidate, catalog))
+        nodes = [node.id for node in linked.graph.nodes if node.type.name == node_type.name]
+        if nodes or not linked.graph.unlit:  # some nodes take part only where the scene has an environment
+            break
+    if not nodes:
+        raise InputError(Problem("RG511", f"these options leave no node of type '{node_type.name}'"))
+    return linked, nodes[0]
+
+
+def describe_program(linked: Linked, node: str, number: int | None) -> dict[str, Any]:
+    """Return what is in scope in a step of a node, and the final text of its shaders.
+
+    Args:
+        linked: the pipeline.
+        node: id of the node.
+        number: of the step, as `plan` counts; None for the first that has a program.
+
+    Raises:
+        InputError: no such node, or it has no program of its own.
+        UsageError: no such step, or it has no program.
+    """
+    from rendergraph.program import stage_texts  # most topics need no GLSL
+    from rendergraph.program.scope import annotated, in_scope  # likewise
+    from rendergraph.program.variants import variants  # likewise
+    from rendergraph.scene.pack import pack  # likewise
+
+    types = {one.id: one.type for one in linked.graph.nodes}
+    if node not in types:
+        text = f"pipeline '{linked.graph.name}' has no node '{node}'{suggestion(node, types)}"
+        raise InputError(Problem("RG511", text))
+    expansion = stages.expand(linked).expansion
+    steps = [step for step in expansion.steps if step.node == node and step.kind in _KINDS_WITH_PROGRAM]
+    if not steps:
+        callers = [step.node for step in expansion.steps if any(one.node == node for one in step.functions)]
+        idle = expansion.idle.get(node)
+        reason = f" here: {idle}" if idle else " here"
+        reason = f": its function is compiled into that of '{callers[0]}'" if callers else reason
+        raise InputError(Problem("RG511", f"{node_named(node, types[node].name)} has no program{reason}"))
+    step = next((one for one in steps if number in (one.index, None)), None)
+    if step is None:
+        listed = ", ".join(_step_name(one) for one in steps)
+        text = f"--step: '{node}' has no step {number} with a program; available: {listed}"
+        raise UsageError(Problem("RG500", text))
+    found = variants(step, linked.scene, pack(linked.scene), expansion.views)
+    macros = (found or [{}])[0]
+    texts = stage_texts(step, types, expansion.resources, expansion.views, defines=macros)
+    scope = in_scope(step, types, expansion.resources, expansion.views, macros, texts)
+    return {
+        "pipeline": linked.graph.name,
+        "node": node,
+        "type": types[node].name,
+        "step": step.index,
+        "shaders": dict(step.shaders),
+        "steps": [
+            {"step": one.index, "label": one.label, "kind": one.kind, "shaders": dict(one.shaders)} for one in steps
+        ],
+        "variants": len(found),
+        "differ": sorted({f"{k} {v}" for one in found for k, v in one.items() if any(o.get(k) != v for o in found)}),
+        "scope": [{"section": one.section, "name": one.name, "source": one.source} for one in scope],
+        "stages": {
+            stage: {"text": text.text, "annotated": annotated(text), "origins": _origins(text)}
+            for stage, text in texts.items()
+        },
+    }
+
+
+def _step_name(step: Step) -> str:
+    return f"{step.index} ({step.label or ', '.join(name for _, name in step.shaders)})"
+
+
+def _origins(text: Any) -> list[dict[str, Any]]:
+    """File and line of each line; a line that rendergraph writes has no file, but the reason in `made`."""
+    return [
+        {"file": str(one.file) if one.file is not None else None, "line": one.line, "made": one.made}
+        for one in text.source.origins
+    ]
