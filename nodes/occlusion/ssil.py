@@ -23,4 +23,5 @@ class SSIL(Combined):
 
     def record(self, steps: Steps) -> None:
         """Surfaces, light and occlusion, the neighbours' mean, full size; then what is made of it."""
-        self.look_at_both(steps, "ssil.frag", {})
+        # Arms reach far beyond the radius of occlusion: fewer arms with more steps leave enough steps within it.
+        self.look_at_both(steps, "ssil.frag", {"STEPS": min(max(self.samples // 2, 4), 16)})
