@@ -1,44 +1,31 @@
-"""Reading images: a scene's textures and environments, and pictures written earlier.
-
-Images are untrusted: only regular files of six kinds, told by their first bytes, are opened, and the header is held
-against limits before anything is decoded.
-"""
+"""Reading images: a scene's textures and environments, and pictures written earlier."""
 
 from __future__ import annotations
 
 import contextlib
-import os
-import stat
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
-from msgspec import Struct
+import numpy.typing as npt
 
-from rendergraph.errors import InputError, Place, Problem
-from rendergraph.images.encode import PREFIX
-from rendergraph.images.files import is_text
-from rendergraph.images.pixels import ImageLimits, Pixels, as_rgba, check_shape, finite, name_of, not_negative
-from rendergraph.images.view import from_srgb
-from rendergraph.scene.image_header import MOST_CHANNELS, READ, ChannelsError, colour_channels, image_kind
-from rendergraph.scene.model import ImageSource, MadeImage
+from rendergraph.declare import Added
+from rendergraph.declare.extension import ImageLoader
+from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.images.encode import HALF_MAX, PREFIX
+from rendergraph.images.viewable import from_srgb
+from rendergraph.scene.image_files import ImageError, ImageFile, open_image
+from rendergraph.scene.model import ImageSource, MadeImage, SceneLimits
 
-if TYPE_CHECKING:
-    import OpenImageIO as oiio
-
-_SUFFIXES = {"png": ".png", "jpeg": ".jpg", "exr": ".exr", "hdr": ".hdr", "bmp": ".bmp", "tga": ".tga"}
+Pixels: TypeAlias = npt.NDArray[Any]
+Warn: TypeAlias = Callable[[Problem], None]
 
 
 def decode(
-    source: ImageSource,
-    *,
-    srgb: bool,
-    warn: Callable[[Problem], None] | None = None,
-    limits: ImageLimits = ImageLimits(),
+    source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits: SceneLimits = SceneLimits()
 ) -> Pixels:
-    """A scene's image, ready to be uploaded.
+    """Decode a scene's image for upload.
 
     Grey becomes three equal channels and a missing alpha 1; alpha is not multiplied in. Integer images keep their
     encoding (`srgb` ones are uploaded to an sRGB format); images of more than 8 bits that are not sRGB become floats
@@ -48,7 +35,7 @@ def decode(
     Args:
         source: a file, or the bytes of one.
         srgb: whether the values are sRGB encoded.
-        warn: told what was replaced.
+        warn: receives a warning where values were replaced.
         limits: what the header may claim.
 
     Returns:
@@ -58,26 +45,19 @@ def decode(
         InputError: missing, of another kind, broken, or beyond a limit.
     """
     if source.loader is not None:
-        from rendergraph.images.plugin_image import decode_by_plugin  # for such images alone
-
-        return decode_by_plugin(source, source.loader, srgb=srgb, warn=warn, limits=limits)
+        return _decode_by_plugin(source, source.loader, warn, limits)
     with _opened(source, limits) as image:
-        light = image.kind in (".hdr", ".exr")
-        wide = image.spec.format.basesize() > 1
-        pixels = image.read(_color_channels(image), "half" if light or (wide and not srgb) else "uint8")
-        pixels = _in_display_window(image, pixels)
-    if light:
-        pixels = finite(image.source, pixels, warn)
-    return as_rgba(pixels)
+        is_light = image.kind in (".hdr", ".exr")
+        is_wide = image.spec.format.basesize() > 1
+        kind = "half" if is_light or (is_wide and not srgb) else "uint8"
+        pixels = _in_display_window(image, np.asarray(image.read(image.color_channels(), kind, limits)))
+    return _as_rgba(_finite(source, pixels, warn) if is_light else pixels)
 
 
 def decode_light(
-    source: ImageSource | MadeImage,
-    *,
-    warn: Callable[[Problem], None] | None = None,
-    limits: ImageLimits = ImageLimits(),
+    source: ImageSource | MadeImage, *, warn: Warn | None = None, limits: SceneLimits = SceneLimits()
 ) -> Pixels:
-    """The picture around a scene, ready to be uploaded: light, nowhere negative.
+    """Decode an environment map for upload: linear light without negative values.
 
     Returns:
         (height, width, 4), top row first, float16.
@@ -88,16 +68,21 @@ def decode_light(
     if isinstance(source, MadeImage):
         return source.make()
     pixels = decode(source, srgb=True, warn=warn, limits=limits)
-    check_shape(source, pixels, warn)
+    height, width = pixels.shape[:2]
+    if not 1.5 <= width / height <= 2.7 and (pixels != pixels[0, 0]).any():
+        text = f"it is {width}×{height}, but an environment map is twice as wide as high; it is stretched"
+        _warn(warn, "RG356", text, source)
     if pixels.dtype == np.uint8:
-        return np.concatenate([from_srgb(pixels[..., :3]), pixels[..., 3:] / np.float32(255)], axis=-1).astype(
-            np.float16
-        )
-    return not_negative(source, pixels, warn)
+        colors = from_srgb(pixels[..., :3])
+        return np.concatenate([colors, pixels[..., 3:] / np.float32(255)], axis=-1).astype(np.float16)
+    negative = (pixels[..., :3] < 0).any(axis=-1)
+    if negative.any():
+        _warn(warn, "RG355", f"{_counted(int(negative.sum()))} negative, replaced by 0", source)
+    return np.maximum(pixels, 0)
 
 
 def read(path: Path | str) -> Pixels:
-    """A picture's values as they are: uint8, uint16, float16 or float32, top row first.
+    """Read a picture's values as they are: uint8, uint16, float16 or float32, top row first.
 
     Returns:
         (height, width, channels) in the order `R,G,B,A`, or (layers, height, width, channels) where channels are named
@@ -106,9 +91,10 @@ def read(path: Path | str) -> Pixels:
     Raises:
         InputError: missing, of another kind, broken, or beyond a limit.
     """
-    with _opened(ImageSource(Path(path)), ImageLimits()) as image:
+    limits = SceneLimits()
+    with _opened(ImageSource(Path(path)), limits) as image:
         names = list(image.spec.channelnames)
-        pixels = image.read(range(len(names)), None)
+        pixels = np.asarray(image.read(range(len(names)), None, limits))
     order = sorted(range(len(names)), key=lambda i: _channel_order(names[i]))
     pixels = pixels[..., order]
     layers = {name.partition(".")[0] for name in names if "." in name}
@@ -119,214 +105,44 @@ def read(path: Path | str) -> Pixels:
 
 
 def read_metadata(path: Path | str) -> dict[str, str]:
-    """The texts `write` put into an EXR or PNG file; empty where there are none.
+    """Read the texts `write` put into an EXR or PNG file; empty if there are none.
 
     Raises:
         InputError: missing, not an image, or broken.
     """
-    with _opened(ImageSource(Path(path)), ImageLimits()) as image:
-        found = [(entry.name, entry.value) for entry in image.spec.extra_attribs]
-    return {name[len(PREFIX) :]: text for name, text in found if name.startswith(PREFIX) and isinstance(text, str)}
-
-
-# --- opening ---------------------------------------------------------------------------------------------------------
-
-
-class _Image(Struct):
-    source: ImageSource
-    kind: str
-    path: str
-    size: int
-    handle: oiio.ImageInput
-    spec: oiio.ImageSpec
-    limits: ImageLimits
-
-    def read(self, channels: range, kind: str | None) -> Pixels:
-        """Decoded pixels of these channels, as `kind` or as the file holds them."""
-        import OpenImageIO as oiio  # loaded with the first picture read
-
-        wanted = oiio.TypeDesc(kind) if kind else self.spec.format
-        _check_size(self, len(channels), wanted.basesize())
-        with _hush:
-            pixels = self.handle.read_image(0, 0, channels.start, channels.stop, wanted)
-        problem = _error_of(self.handle)
-        if pixels is None or problem:
-            _broken(self, problem)
-        return np.asarray(pixels)
+    with _opened(ImageSource(Path(path)), SceneLimits()) as image:
+        attributes = [(entry.name, entry.value) for entry in image.spec.extra_attribs]
+    return {name[len(PREFIX) :]: text for name, text in attributes if name.startswith(PREFIX) and isinstance(text, str)}
 
 
 @contextlib.contextmanager
-def _opened(source: ImageSource, limits: ImageLimits) -> Iterator[_Image]:
-    import OpenImageIO as oiio  # loaded with the first picture read
-
-    start, size = _beginning(source)
-    kind = _kind_of(source, start)
-    with contextlib.ExitStack() as stack:
-        path = os.path.abspath(source.path)
-        if source.data is not None or Path(path).suffix.lower() != kind or not is_text(path):
-            # OpenImageIO chooses the decoder by the extension and reads no memory, and takes texts for names: give the
-            # file the name it deserves.
-            import tempfile  # for such images alone
-
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rendergraph-"))
-            named = Path(folder, f"image{kind}")
-            if source.data is not None:
-                named.write_bytes(source.data)
-            else:
-                named.symlink_to(path)
-            path = str(named)
-        config = oiio.ImageSpec()
-        config.attribute("oiio:UnassociatedAlpha", 1)
-        with _hush:
-            handle = oiio.ImageInput.open(path, config)
-        if handle is None:
-            _refuse(source, "RG352", f"the image is broken: {_plain(_error_of(oiio), path)}")
-        stack.callback(handle.close)
-        image = _Image(source, kind, path, size, handle, handle.spec(), limits)
-        if handle.format_name() != _FORMAT_NAMES[kind]:
-            _refuse(source, "RG351", f"the image is not what it claims to be; {READ}")
-        if image.spec.deep:
-            _refuse(source, "RG354", "the image is deep (several samples a pixel); flatten it first")
-        if image.spec.nchannels > MOST_CHANNELS:
-            _refuse(source, "RG353", f"the image has {image.spec.nchannels} channels; {MOST_CHANNELS} are the limit")
-        _check_size(image, 1, 1)
-        yield image
-
-
-_FORMAT_NAMES = {
-    ".png": "png",
-    ".jpg": "jpeg",
-    ".exr": "openexr",
-    ".hdr": "hdr",
-    ".bmp": "bmp",
-    ".tga": "targa",
-}
-
-
-def _beginning(source: ImageSource) -> tuple[bytes, int]:
-    """The first bytes and the length of the encoded image."""
-    if source.data is not None:
-        return source.data[:16], len(source.data)
+def _opened(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
     try:
-        mode = os.stat(source.path)
-        if not stat.S_ISREG(mode.st_mode):
-            what = "a folder" if stat.S_ISDIR(mode.st_mode) else "not a regular file"
-            _refuse(source, "RG350", f"the image cannot be read: it is {what}")
-        with open(source.path, "rb") as file:
-            return file.read(16), mode.st_size
-    except FileNotFoundError:
-        _refuse(source, "RG350", "there is no such image")
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        _refuse(source, "RG350", f"the image cannot be read: {reason}")
-
-
-def _kind_of(source: ImageSource, start: bytes) -> str:
-    if not start:
-        _refuse(source, "RG352", "the image is broken: the file is empty")
-    kind = image_kind(start, "" if source.data is not None else source.path.suffix)
-    if kind is None:
-        _refuse(source, "RG351", f"this is no image of a known kind; {READ}")
-    return _SUFFIXES[kind]
-
-
-def _check_size(image: _Image, channels: int, item: int) -> None:
-    spec, limits = image.spec, image.limits
-    width, height = max(spec.width, spec.full_width), max(spec.height, spec.full_height)
-    if max(width, height) > limits.side or spec.depth > 1:
-        depth = f"×{spec.depth}" if spec.depth > 1 else ""
-        text = f"the image is {width}×{height}{depth} pixels; the limit is {limits.side} a side"
-        _refuse(image.source, "RG353", text)
-    decoded = width * height * max(4, channels) * item
-    if decoded > limits.bytes:
-        text = f"the image takes {decoded >> 20} MiB decoded; the limit is {limits.bytes >> 20} MiB"
-        _refuse(image.source, "RG353", text)
-    if decoded > limits.ratio_from and decoded > limits.ratio * image.size:
-        text = (
-            f"the image claims {decoded >> 20} MiB in a file of {image.size} bytes; "
-            f"above {limits.ratio_from >> 20} MiB the limit is {limits.ratio}:1"
-        )
-        _refuse(image.source, "RG353", text)
+        with open_image(source, limits) as image:
+            yield image
+    except ImageError as error:
+        _refuse(source, error.code, f"the image {error.text}")
 
 
 def _refuse(source: ImageSource, code: str, text: str) -> NoReturn:
-    raise InputError(Problem(code, text, Place(name_of(source))))
+    raise InputError(Problem(code, text, Place(_name_of(source)))) from None
 
 
-def _broken(image: _Image, problem: str) -> NoReturn:
-    _refuse(image.source, "RG352", f"the image is broken: {_plain(problem, image.path)}")
+def _name_of(source: ImageSource) -> str:
+    return source.label or str(source.path)
 
 
-def _error_of(thing: Any) -> str:
-    """OpenImageIO's words; they may quote the file's own bytes, which need not be text."""
-    try:
-        return str(thing.geterror())
-    except UnicodeDecodeError as error:
-        return bytes(error.object).decode("ascii", "replace")
+def _warn(warn: Warn | None, code: str, text: str, source: ImageSource) -> None:
+    if warn:
+        warn(Problem(code, text, Place(_name_of(source)), severity="warning"))
 
 
-def _plain(problem: str, path: str) -> str:
-    lines = [line for line in problem.splitlines() if line.strip()] or ["it cannot be decoded"]
-    line = lines[0].replace(path, "the file").replace(f'"{os.path.basename(path)}"', "the file")
-    return "".join(c if c.isprintable() else "?" for c in line)[:200]
+def _counted(count: int) -> str:
+    return f"{count} pixels are" if count != 1 else "1 pixel is"
 
 
-class _Hush:
-    """Keeps libpng from writing to stderr beside our message: it does so itself, past Python.
-
-    Images are decoded in several threads; the first one in redirects, the last one out restores.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._inside = 0
-        self._kept = -1
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._inside += 1
-            if self._inside > 1:
-                return
-            try:
-                self._kept = os.dup(2)
-            except OSError:  # no stderr at all
-                return
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, 2)
-            os.close(nowhere)
-
-    def __exit__(self, *problem: object) -> None:
-        with self._lock:
-            self._inside -= 1
-            if self._inside == 0 and self._kept >= 0:
-                os.dup2(self._kept, 2)
-                os.close(self._kept)
-                self._kept = -1
-
-
-_hush = _Hush()
-
-
-# --- pixels ----------------------------------------------------------------------------------------------------------
-
-
-def _color_channels(image: _Image) -> range:
-    """The channels that are the colour, side by side as OpenImageIO sorts them."""
-    names = [name.upper() for name in image.spec.channelnames]
-    if image.kind != ".exr":
-        return range(min(len(names), 4))
-    try:
-        wanted = list(colour_channels(image.spec.channelnames))
-    except ChannelsError as problem:
-        _refuse(image.source, "RG354", f"the image {problem}")
-    first = names.index(wanted[0])
-    if names[first : first + len(wanted)] != wanted:
-        _refuse(image.source, "RG354", "the image's channels R, G, B, A are not side by side")
-    return range(first, first + len(wanted))
-
-
-def _in_display_window(image: _Image, pixels: Pixels) -> Pixels:
-    """An EXR may hold a part of its picture, or more than it."""
+def _in_display_window(image: ImageFile, pixels: Pixels) -> Pixels:
+    """Place the stored part of an EXR file in its display window; the rest is 0."""
     spec = image.spec
     window = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     if image.kind != ".exr" or window == (spec.x, spec.y, spec.width, spec.height):
@@ -345,3 +161,63 @@ def _channel_order(name: str) -> tuple[str, int, str]:
     layer, dot, channel = name.rpartition(".")
     known = "RGBAYZ"
     return layer if dot else "", known.find(channel) if channel in known else len(known), channel
+
+
+def _finite(source: ImageSource, pixels: Pixels, warn: Warn | None) -> Pixels:
+    """Replace NaN and infinity, with a warning that counts the pixels."""
+    if np.isfinite(pixels).all():
+        return pixels
+    unknown = int((np.isnan(pixels) | np.isneginf(pixels)).any(axis=-1).sum())
+    large = int(np.isposinf(pixels).any(axis=-1).sum())
+    texts = [f"{_counted(unknown)} NaN or -inf, replaced by 0"] if unknown else []
+    texts += [f"{_counted(large)} infinite or beyond {HALF_MAX:.0f}, replaced by {HALF_MAX:.0f}"] if large else []
+    _warn(warn, "RG355", "; ".join(texts), source)
+    return np.nan_to_num(pixels, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+
+
+def _as_rgba(pixels: Pixels) -> Pixels:
+    """Four channels from one to four: grey three times, and an alpha of one."""
+    height, width, count = pixels.shape
+    one = 255 if pixels.dtype == np.uint8 else 1
+    rgba = np.full((height, width, 4), one, dtype=pixels.dtype)
+    if count <= 2:
+        rgba[..., :3] = pixels[..., :1]
+        rgba[..., 3:] = pixels[..., 1:] if count == 2 else one
+    else:
+        rgba[..., :count] = pixels
+    return rgba
+
+
+def _decode_by_plugin(
+    source: ImageSource, loader: Added[ImageLoader], warn: Warn | None, limits: SceneLimits
+) -> Pixels:
+    try:
+        data = source.path.read_bytes()
+    except OSError as error:
+        _refuse(source, "RG350", f"the image cannot be read: {error.strerror}")
+    what = f"image '{source.label}'"
+    pixels = loader.run("RG497", f"{what} cannot be read", data)
+    mistake = _plugin_mistake(pixels, limits)
+    if mistake:
+        text = f"{what} cannot be read: the loader of plugin '{loader.plugin}' returned {mistake}"
+        raise InputError(Problem("RG498", text, Place(shown_file(loader.file))))
+    pixels = pixels.reshape(*pixels.shape[:2], -1)
+    if pixels.dtype == np.uint8:
+        return _as_rgba(pixels)
+    with np.errstate(over="ignore"):  # what a half float cannot hold becomes infinite, and is reported
+        light = pixels.astype(np.float16)
+    return _as_rgba(_finite(source, light, warn))
+
+
+def _plugin_mistake(pixels: object, limits: SceneLimits) -> str:
+    if not isinstance(pixels, np.ndarray):
+        return f"{type(pixels).__name__}, not an array"
+    if pixels.ndim not in (2, 3) or not all(pixels.shape) or (pixels.ndim == 3 and pixels.shape[2] > 4):
+        return f"an array of shape {pixels.shape}, not (height, width) or (height, width, 1 to 4)"
+    if pixels.dtype != np.uint8 and not np.issubdtype(pixels.dtype, np.floating):
+        return f"{pixels.dtype} values, not uint8 or floats"
+    height, width = pixels.shape[:2]
+    if max(height, width) > limits.image_side or height * width * 8 > limits.image_bytes:
+        megabytes = limits.image_bytes >> 20
+        return f"{width}×{height} pixels; the limit is {limits.image_side} a side and {megabytes} MiB"
+    return ""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import struct
 import warnings
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -13,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.images.files import failed, is_text, staged
-from rendergraph.images.png import png
-from rendergraph.images.view import from_srgb, to_bytes, to_srgb
+from rendergraph.images.files import failed, staged
+from rendergraph.images.viewable import from_srgb, to_bytes, to_srgb
+from rendergraph.scene.image_files import is_text
 
 Pixels: TypeAlias = npt.NDArray[Any]
 Encoding: TypeAlias = Literal["linear", "display", "data"]
@@ -30,6 +32,11 @@ _NAMES = {1: ("Y",), 2: ("R", "G"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 _EXACT_INTEGER = 1 << 24
 # OpenEXR stamps the time of writing; equal pictures shall be equal files.
 _NO_DATE = "1970:01:01 00:00:00"
+_PNG_COLOR_TYPES = {1: 0, 3: 2, 4: 6}
+"""Grey, RGB and RGBA by their number of channels (PNG specification, 11.2.1)."""
+_PNG_LEFT = 1
+"""The filter that leaves the difference to the pixel on the left; to choose one row by row costs more than it saves."""
+_PNG_LEVEL = 4
 
 
 def write(
@@ -128,7 +135,7 @@ def _write_file(
     if kind == "uint8" and path.suffix.lower() == ".png":
         try:
             with open(part, "wb") as file:
-                file.writelines(png(pixels, texts))
+                file.writelines(_png(pixels, texts))
         except OSError as error:
             raise failed(path, error.strerror or str(error)) from error
         return
@@ -183,3 +190,32 @@ def _safe_place(path: Path, part: Path) -> Iterator[str]:
             raise failed(path, error.strerror or str(error)) from error
     finally:
         os.close(memory)
+
+
+def _png(pixels: npt.NDArray[np.uint8], texts: Mapping[str, str]) -> Iterator[bytes]:
+    """The parts of a PNG file of 8 bits, in half of OpenImageIO's time, and without the time to import it.
+
+    Args:
+        pixels: (height, width, 1, 3 or 4 channels), top row first, sRGB-encoded; alpha is not multiplied in.
+        texts: metadata by keyword: 1 to 79 letters of ASCII.
+    """
+    height, width, count = pixels.shape
+    yield b"\x89PNG\r\n\x1a\n"
+    yield _png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, _PNG_COLOR_TYPES[count], 0, 0, 0))
+    yield _png_chunk(b"sRGB", b"\0")
+    for keyword, text in texts.items():
+        yield _png_chunk(b"iTXt", keyword.encode("ascii") + b"\0\0\0\0\0" + text.encode())
+    yield _png_chunk(b"IDAT", zlib.compress(_png_filtered(pixels.reshape(height, width * count), count).data, _PNG_LEVEL))
+    yield _png_chunk(b"IEND", b"")
+
+
+def _png_filtered(rows: npt.NDArray[np.uint8], count: int) -> npt.NDArray[np.uint8]:
+    filtered = np.empty((rows.shape[0], rows.shape[1] + 1), np.uint8)
+    filtered[:, 0] = _PNG_LEFT
+    filtered[:, 1 : count + 1] = rows[:, :count]
+    np.subtract(rows[:, count:], rows[:, :-count], out=filtered[:, count + 1 :])
+    return filtered
+
+
+def _png_chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(data, zlib.crc32(kind)))

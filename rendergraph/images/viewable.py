@@ -16,6 +16,7 @@ One channel is grey, two are red and green, a fourth is left out; layers lie in 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -30,6 +31,10 @@ _UNIT = frozenset({"display_color", "visibility", "occlusion", "material"})
 _NAN_COLOR = (255, 0, 255)
 # Black through purple and orange to pale yellow: brightness alone gives the order.
 _HEAT = np.array([(0, 0, 4), (81, 18, 124), (183, 55, 121), (252, 137, 97), (252, 253, 191)], np.float64)
+_TILE_WIDTH, _TILE_HEIGHT = 320, 180
+_TILE_GAP, _LINE_HEIGHT = 12, 18
+_FONT_SIZE = 14
+_BACKGROUND, _NAME_GREY, _NOTE_GREY = 32, 0.95, 0.6
 
 
 def to_srgb(linear: Pixels) -> npt.NDArray[np.float32]:
@@ -150,3 +155,47 @@ def _grid(layers: Bytes) -> Bytes:
         top, left = index // columns * height, index % columns * width
         sheet[top : top + height, left : left + width] = layers[index]
     return sheet
+
+
+def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:
+    """Pictures in rows, as many columns as make the sheet about as wide as high, each as large as 320×180 takes it.
+
+    Args:
+        pictures: (height, width, 1 or 3) each, with a name and a note that are written beneath. Where OpenImageIO has
+            no font they stand there without words.
+
+    Returns:
+        (height, width, 3).
+    """
+    import OpenImageIO as oiio  # loaded with the first picture written
+
+    columns = max(1, math.ceil(math.sqrt(len(pictures) * _TILE_HEIGHT / _TILE_WIDTH)))
+    rows = math.ceil(len(pictures) / columns)
+    across, down = _TILE_WIDTH + _TILE_GAP, _TILE_HEIGHT + 2 * _LINE_HEIGHT + _TILE_GAP
+    sheet = np.full((rows * down + _TILE_GAP, columns * across + _TILE_GAP, 3), _BACKGROUND, np.uint8)
+    places = [(_TILE_GAP + number // columns * down, _TILE_GAP + number % columns * across) for number in range(len(pictures))]
+    for (top, left), (picture, _, _) in zip(places, pictures, strict=True):
+        small = _fit_tile(picture)
+        y, x = top + (_TILE_HEIGHT - small.shape[0]) // 2, left + (_TILE_WIDTH - small.shape[1]) // 2
+        sheet[y : y + small.shape[0], x : x + small.shape[1]] = small
+    written = oiio.ImageBuf(sheet)
+    for (top, left), (_, name, note) in zip(places, pictures, strict=True):
+        for line, (text, grey) in enumerate(((name, _NAME_GREY), (note, _NOTE_GREY)), start=1):
+            oiio.ImageBufAlgo.render_text(written, left, top + _TILE_HEIGHT + line * _LINE_HEIGHT - 4, text, _FONT_SIZE, "", (grey,) * 3)
+    written.geterror()  # without a font; an error that nobody fetches is printed at the end
+    return np.asarray(written.get_pixels(oiio.UINT8), np.uint8)
+
+
+def _fit_tile(picture: Bytes) -> Bytes:
+    """As large as a tile takes it: averaged where it shrinks, texels as squares where it grows."""
+    import OpenImageIO as oiio  # loaded with the first picture written
+
+    height, width = picture.shape[:2]
+    scale = min(_TILE_WIDTH / width, _TILE_HEIGHT / height)
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    if scale >= 1:
+        rows, columns = (np.arange(new) * old // new for new, old in ((size[1], height), (size[0], width)))
+        return np.ascontiguousarray(picture[rows][:, columns])
+    region = oiio.ROI(0, size[0], 0, size[1], 0, 1, 0, picture.shape[2])
+    shrunk = oiio.ImageBufAlgo.resize(oiio.ImageBuf(np.ascontiguousarray(picture)), roi=region)
+    return np.asarray(shrunk.get_pixels(oiio.UINT8), np.uint8)

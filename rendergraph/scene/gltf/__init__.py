@@ -1,0 +1,9 @@
+"""glTF 2.0 files (.gltf and .glb) as scenes.
+
+Everything in a file is checked, whether its scene uses it or not: `schema` has the JSON as structs, `buffers` the arrays,
+`materials` and `primitives` what they are made into, `reader` the nodes.
+"""
+
+from rendergraph.scene.gltf.reader import read_gltf
+
+__all__ = ["read_gltf"]

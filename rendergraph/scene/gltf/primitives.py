@@ -1,0 +1,152 @@
+"""Primitives of a glTF file as meshes: every one checked, used by a node or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.errors import InputError
+from rendergraph.projection import unit
+from rendergraph.scene.geometry import Indices, fan_triangles, filled_normals, flat, strip_triangles
+from rendergraph.scene.gltf.buffers import Buffers
+from rendergraph.scene.gltf.schema import Accessor, Primitive
+from rendergraph.scene.model import FARTHEST, Floats, Mesh, extremes
+from rendergraph.scene.reading import Reading, UniqueNames
+
+_FLOAT = (5126,)
+_SMALL = (5126, 5121, 5123)
+_SIGNED = (5126, 5120, 5122)
+_QUANTIZED = (5126, 5120, 5121, 5122, 5123)
+_UNSIGNED = (5121, 5123, 5125)
+_READ = ("POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0")
+_MODES = ("points", "lines", "line loops", "line strips", "triangles", "triangle strips", "triangle fans")
+
+
+class Primitives:
+    """Builds a `Mesh` of each primitive; equal ones (same accessors, same mode) are one mesh."""
+
+    def __init__(self, buffers: Buffers, reading: Reading, quantized: bool) -> None:
+        self._buffers, self._reading, self._quantized = buffers, reading, quantized
+        self._names = UniqueNames()
+        self._mesh_of: dict[tuple[object, ...], int | None] = {}
+        self._bytes = 0
+        self.meshes: list[Mesh] = []
+
+    def mesh(self, primitive: Primitive, name: str, where: str) -> int | None:
+        """Return the index of the primitive's mesh in `meshes`; None for points, lines and without positions."""
+        key = (tuple(sorted(primitive.attributes.items())), primitive.indices, primitive.mode)
+        if key not in self._mesh_of:
+            mesh = self._build(primitive, name, where)
+            self._mesh_of[key] = None if mesh is None else len(self.meshes)
+            if mesh is not None:
+                self.meshes.append(mesh)
+        return self._mesh_of[key]
+
+    def _build(self, primitive: Primitive, name: str, where: str) -> Mesh | None:
+        attributes, mode = primitive.attributes, primitive.mode
+        accessors = {key: self._attribute(key, number, where) for key, number in attributes.items()}
+        if len({accessor.count for accessor in accessors.values()}) > 1:
+            raise self._error(f"{where}: its attributes have different counts")
+        if "POSITION" not in accessors:
+            self._reading.warn("RG333", "no-position", f"{where}: primitives without POSITION are left out")
+            return None
+        count = accessors["POSITION"].count
+        self._add_bytes(where, count * 96)
+        corners = self._corners(where, primitive.indices, count)
+        if mode < 4:
+            text = f"{where}: {_MODES[mode]} are left out; only triangles are drawn"
+            self._reading.warn("RG333", _MODES[mode], text)
+            return None
+        if mode == 4:
+            if len(corners) % 3:
+                raise self._error(f"{where}: {len(corners)} corners are not a multiple of 3")
+            triangles = np.ascontiguousarray(corners.reshape(-1, 3))
+        elif len(corners) < 3:
+            raise self._error(f"{where}: {len(corners)} corners are fewer than a triangle has")
+        else:
+            triangles = strip_triangles(corners) if mode == 5 else fan_triangles(corners)
+        if not len(triangles):
+            self._reading.warn("RG332", "empty", f"{where}: a primitive without any triangle of area is left out")
+            return None
+        self._check_bounds(attributes["POSITION"])
+        return self._assemble(where, attributes, triangles, self._names.unique(name, "mesh"))
+
+    def _error(self, text: str) -> InputError:
+        return self._reading.error("RG304", text)
+
+    def _assemble(self, where: str, attributes: dict[str, int], triangles: Indices, name: str) -> Mesh:
+        positions, normals, tangents, uv0, uv1, colors = (
+            self._buffers.floats(attributes[key]) if key in attributes else None for key in _READ
+        )
+        assert positions is not None  # the caller has looked
+        if np.abs(positions).max() > FARTHEST:
+            raise self._reading.error("RG306", f"{where}: a vertex lies beyond {FARTHEST:g} m")
+        if colors is not None:
+            colors = self._clamped_colors(where, colors)
+        if normals is None:  # glTF: without normals the client computes flat ones and ignores tangents
+            self._add_bytes(where, triangles.size * 64)
+            return flat(Mesh(name, positions, triangles, positions, None, uv0, uv1, colors))
+        filled, missing = filled_normals(positions, triangles, normals.astype(np.float64))
+        if missing:
+            text = f"{where}: {missing} normals of length zero are computed from faces"
+            self._reading.warn("RG332", "normals", text)
+        if tangents is not None:
+            hand = np.where(tangents[:, 3:] < 0, -1.0, 1.0)
+            tangents = np.concatenate([unit(tangents[:, :3]), hand], axis=1).astype(np.float32)
+        return Mesh(name, positions, triangles, filled, tangents, uv0, uv1, colors)
+
+    def _attribute(self, key: str, number: int, where: str) -> Accessor:
+        """The accessor of an attribute, whose type must be one of those that the attribute may have."""
+        quantized, use = self._quantized, f"{where}.{key}"
+        if key not in _READ and not key.startswith(("_", "JOINTS_", "WEIGHTS_")):
+            self._reading.warn("RG333", f"attribute {key}", f"{where}: attribute '{key}' is left out")
+        if key == "POSITION":
+            return self._buffers.check_use(number, use, ("VEC3",), _QUANTIZED if quantized else _FLOAT)
+        if key in ("NORMAL", "TANGENT"):
+            types = ("VEC3",) if key == "NORMAL" else ("VEC4",)
+            return self._buffers.check_use(number, use, types, _SIGNED if quantized else _FLOAT, normalized=True)
+        if key.startswith("TEXCOORD_"):
+            components = _QUANTIZED if quantized else _SMALL
+            return self._buffers.check_use(number, use, ("VEC2",), components, normalized=not quantized)
+        if key.startswith("COLOR_"):
+            return self._buffers.check_use(number, use, ("VEC3", "VEC4"), _SMALL, normalized=True)
+        return self._buffers.accessor(number, use)
+
+    def _corners(self, where: str, indices: int, count: int) -> Indices:
+        if indices < 0:
+            return np.arange(count, dtype=np.uint32)
+        accessor = self._buffers.check_use(indices, f"{where}.indices", ("SCALAR",), _UNSIGNED)
+        if accessor.normalized:
+            raise self._error(f"{where}: 'indices' must not be normalized")
+        self._add_bytes(where, accessor.count * 4)
+        corners = self._buffers.array(indices).reshape(-1).astype(np.uint32)
+        high = int(corners.max())
+        if high >= count:
+            raise self._reading.error("RG305", f"{where}: index {high} is out of range; there are {count} vertices")
+        return corners
+
+    def _check_bounds(self, number: int) -> None:
+        """Warn if positions are outside their declared bounds."""
+        accessor, positions = self._buffers.accessors[number], self._buffers.floats(number)
+        if not accessor.min or not accessor.max or accessor.component_type != 5126:
+            return
+        slack = 1e-4 * max(1e-30, float(np.abs(positions).max()))
+        low, high = extremes(positions)
+        if (low < np.float32(accessor.min) - slack).any() or (high > np.float32(accessor.max) + slack).any():
+            text = f"accessors[{number}]: positions exceed 'min' or 'max'; the data is used"
+            self._reading.warn("RG332", "bounds", text)
+
+    def _clamped_colors(self, where: str, colors: Floats) -> Floats:
+        if ((colors < 0) | (colors > 1)).any():
+            self._reading.warn("RG332", "colors", f"{where}: vertex colours outside 0 to 1 are clamped")
+        full: npt.NDArray[np.float32] = np.ones((len(colors), 4), np.float32)
+        full[:, : colors.shape[1]] = np.clip(colors, 0, 1)
+        return full
+
+    def _add_bytes(self, where: str, size: int) -> None:
+        """Count the memory of meshes, so that primitives that use the same bytes over and over end here."""
+        self._bytes += size
+        if self._bytes > 64 * self._buffers.total + self._reading.limits.memory_bytes:
+            raise self._reading.over(f"{where}: meshes need {self._bytes:,} bytes", "memory_bytes")
+        if size // 96 > self._reading.limits.vertices:
+            raise self._reading.over(f"{where} has {size // 96:,} vertices", "vertices")

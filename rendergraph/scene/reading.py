@@ -1,0 +1,229 @@
+"""One scene or mesh file being read: where its paths may lead, what it may contain, and the warnings so far.
+
+Scene files are untrusted data. A path found in one is resolved, links followed, and checked against the root rule
+before anything is opened; only regular files are read, and only up to a limit.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from msgspec import Struct, field
+
+from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
+from rendergraph.document import shown
+from rendergraph.errors import InputError, Place, Problem
+from rendergraph.scene.model import ImageSource, Material, Mesh, SceneLimits
+from rendergraph.stamps import look
+
+CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
+"""The root rule: returns the resolved path, or raises InputError if it leaves every root."""
+
+_MOST_WARNINGS = 50
+_UNAVAILABLE = ("RG011", "RG301")
+"""Codes of the root rule for a path that leads nowhere."""
+_NOT_A_FILE = {"missing": "does not exist", "other": "is not a regular file", "unreadable": "cannot be read"}
+
+
+def inside(folder: Path) -> CheckPath:
+    """Return the root rule that keeps everything under one folder, links followed."""
+
+    def check(path: Path, place: Place | None) -> Path:
+        root, resolved = folder.resolve(), path.resolve()
+        if not resolved.is_relative_to(root):
+            text = f"'{shown(str(path))}' leaves the folder {root}; add its folder with --asset-root"
+            raise InputError(Problem("RG302", text, place))
+        return resolved
+
+    return check
+
+
+def printable(text: str) -> str:
+    """A name from a file with a replacement character for each character that cannot be printed."""
+    return "".join(c if c.isprintable() else "\ufffd" for c in text)
+
+
+class UniqueNames:
+    """Returns names that are unique within a file: `Box`, `Box_1`, `Box_2`."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set()
+        self._next: dict[str, int] = {}
+
+    def unique(self, name: str, fallback: str) -> str:
+        """`name`, or `fallback` if it is empty, with a number if it is taken."""
+        base = printable(name) or fallback
+        name, number = base, self._next.get(base, 1)
+        while name in self._taken:
+            name = f"{base}_{number}"
+            number += 1
+        self._next[base] = number
+        self._taken.add(name)
+        return name
+
+
+class Reading(Struct):
+    """One file being read. `file` in its methods is another file on whose behalf it is read, such as an MTL's."""
+
+    path: Path
+    check_path: CheckPath
+    limits: SceneLimits = SceneLimits()
+    extensions: Extensions = NO_EXTENSIONS
+    _warnings: dict[tuple[str, str, str], Problem] = field(default_factory=dict)
+    _images: dict[Path, ImageSource] = field(default_factory=dict)
+
+    # Mistakes ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What was left out, replaced or clamped, in the order of discovery."""
+        return tuple(self._warnings.values())
+
+    def warn(self, code: str, kind: str, text: str, *, line: int = 0, file: Path | None = None) -> None:
+        """Add a warning, unless there is one of the same kind about the same file, or there are too many."""
+        if len(self._warnings) >= _MOST_WARNINGS:
+            return
+        place = self._place(line, file)
+        self._warnings.setdefault((code, kind, place.file), Problem(code, text, place, severity="warning"))
+
+    def add_warnings(self, problems: Iterable[Problem]) -> None:
+        """Add the warnings of another file's reader."""
+        for problem in problems:
+            self._warnings.setdefault((problem.code, problem.text, str(problem.place)), problem)
+
+    def warn_unmapped(self, name: str, material: Material, mesh: Mesh) -> None:
+        """Warn if a material has textures, and the mesh no coordinates for them."""
+        for slot, texture in material.textures.items():
+            if (mesh.uv1 if texture.uv else mesh.uv0) is None:
+                text = f"'{shown(name)}' has no coordinates for its {slot} texture, whose first texel is everywhere"
+                self.warn("RG333", "unmapped", text)
+
+    def error(self, code: str, text: str, *, line: int = 0, file: Path | None = None) -> InputError:
+        """Return an error in this file, to be raised by the caller."""
+        return InputError(Problem(code, text, self._place(line, file)))
+
+    def over(self, what: str, limit: str) -> InputError:
+        """Return the error for an exceeded limit."""
+        return self.error("RG307", self.limits.exceeded(what, limit))
+
+    def _place(self, line: int, file: Path | None) -> Place:
+        return Place(str(file or self.path), line, 1 if line else 0)
+
+    def _name(self, path: Path) -> str:
+        """A path for messages: relative to this file's folder if it lies below."""
+        folder = self.path.parent.resolve()
+        return shown(str(path.relative_to(folder) if path != self.path and path.is_relative_to(folder) else path))
+
+    # Paths and bytes --------------------------------------------------------------------------------------------------
+
+    def resolve(self, name: str, *, line: int = 0, file: Path | None = None) -> Path:
+        """Resolve a name in this file to a path inside the roots; the path need not exist.
+
+        Raises:
+            InputError: it is a URL, contains a NUL, or leaves the roots.
+        """
+        if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name) or "\0" in name:
+            text = f"'{shown(name)}' is not a file path; only local files can be loaded"
+            raise self.error("RG302", text, line=line, file=file)
+        try:
+            return self.check_path((file or self.path).parent / name, self._place(line, file))
+        except (OSError, ValueError, RuntimeError) as problem:
+            text = f"'{shown(name)}' cannot be followed: {_reason(problem)}"
+            raise self.error("RG301", text, line=line, file=file) from None
+
+    def find(self, name: str, *, line: int = 0, file: Path | None = None) -> Path | None:
+        """`resolve` for a file that may be missing: None if there is none."""
+        try:
+            path = self.resolve(name, line=line, file=file)
+        except InputError as error:
+            if error.problems[0].code not in _UNAVAILABLE:
+                raise
+            return None
+        return path if file_kind(path) == "file" else None
+
+    def read(self, path: Path, what: str) -> bytes:
+        """Return the bytes of a regular file within `file_bytes`.
+
+        Raises:
+            InputError: it is missing, unreadable, not a regular file, or too large.
+        """
+        self.check_file(path, what)
+        try:
+            self.check_bytes(path, what)
+            return path.read_bytes()
+        except (OSError, ValueError) as problem:
+            raise self.error("RG301", f"{what} '{self._name(path)}' cannot be read: {_reason(problem)}") from None
+
+    def check_file(self, path: Path, what: str) -> None:
+        """Check that a path is a regular file."""
+        kind = file_kind(path)
+        if kind != "file":
+            text = f"{what} '{self._name(path)}' {_NOT_A_FILE[kind]}"
+            raise InputError(Problem("RG301", text)) if path == self.path else self.error("RG301", text)
+
+    def check_bytes(self, path: Path, what: str) -> None:
+        """Check a file's length against `file_bytes`."""
+        size = path.stat().st_size
+        if size > self.limits.file_bytes:
+            raise self.over(f"{what} '{self._name(path)}' has {size:,} bytes", "file_bytes")
+
+    # Images -----------------------------------------------------------------------------------------------------------
+
+    def image(self, path: Path, what: str, *, line: int = 0) -> ImageSource:
+        """Return an image file whose header is valid; a file is opened once.
+
+        Raises:
+            InputError: it is missing, not an image, or exceeds a limit.
+        """
+        if path not in self._images:
+            look(path)
+            source = ImageSource(path, None, shown(path.name))
+            loader = None if path.suffix.lower() in ("", *READ_IMAGES) else self.extensions.image_loader(path.suffix)
+            if loader is None:
+                source = self._checked(source, f"{what} '{self._name(path)}'", line)
+            elif (kind := file_kind(path)) != "file":
+                raise self.error("RG350", f"{what} '{self._name(path)}' {_NOT_A_FILE[kind]}", line=line)
+            else:
+                self.check_bytes(path, what)
+                source = ImageSource(path, None, source.label, loader)
+            self._images[path] = source
+        return self._images[path]
+
+    def embedded_image(self, data: bytes, what: str) -> ImageSource:
+        """Return an image inside this file whose header is valid.
+
+        Raises:
+            InputError: it is not an image, or exceeds a limit.
+        """
+        return self._checked(ImageSource(self.path, data, f"{what} in {shown(self.path.name)}"), what, 0)
+
+    def _checked(self, source: ImageSource, what: str, line: int) -> ImageSource:
+        from rendergraph.scene.image_files import ImageError, open_image  # for scenes with images alone
+
+        try:
+            with open_image(source, self.limits) as image:
+                channels = len(image.color_channels())
+                return ImageSource(source.path, source.data, source.label, None, image.size, channels)
+        except ImageError as error:
+            raise self.error(error.code, f"{what} {error.text}", line=line) from None
+
+
+def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
+    """Return what is at a path, links followed."""
+    look(path)
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return "missing"
+    except (OSError, ValueError):
+        return "unreadable"
+    return "file" if stat.S_ISREG(mode) else "other"
+
+
+def _reason(problem: Exception) -> str:
+    """The operating system's text without path and number."""
+    return getattr(problem, "strerror", None) or shown(str(problem))
