@@ -26,7 +26,7 @@ from rendergraph.gl.saved_state import settle
 from rendergraph.link import Graph, GraphNode
 from rendergraph.ports import Count
 from rendergraph.projection import shifted
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Scene
 from rendergraph.steps import Step, ViewMatrices
 from rendergraph.steps.checks import argument, own_port

@@ -27,7 +27,11 @@ def test_who_lacks_it_is_told_and_still_sees_the_graph(capsys: pytest.CaptureFix
     out, err = capsys.readouterr()
     assert code == 3
     assert "RG130 the pipeline needs the plugin 'rendergraph-sketch', which is not installed: pip install" in err
-    for said in ("RG102 there is no node type 'outline'", "RG104 'light.shading'", "RG303 'gear.stl' is no mesh file"):
+    for said in (
+        "RG102 there is no node type 'outline'",
+        "RG104 'light.shading'",
+        "RG303 'gear.stl' is not a mesh file",
+    ):
         assert said in err
     for said in ("outline", "← radiance        light.radiance", "gbuffer", "display.color"):
         assert said in out

@@ -9,7 +9,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.api import Facts, LightFacts, Node, ObjectFacts, Output, Radiance, SceneError, Steps, casting_lights
-from rendergraph.scene.objects import object_facts
+from rendergraph.scene.facts import object_facts
 
 LIGHTS = (
     LightFacts("fill", "directional", casts_shadow=False),

@@ -15,7 +15,8 @@ from rendergraph.compare.axes import MOST_RUNS
 from rendergraph.glsl import MAX_BYTES, expansion, source
 from rendergraph.reference import file_keys
 from rendergraph.resolve import flatten
-from rendergraph.scene import files, image_header
+from rendergraph.scene.image_files import MOST_CHANNELS
+from rendergraph.scene.model import SceneLimits
 from rendergraph.steps import MOST_STEPS
 from rendergraph.textures import MOST_SIDE
 
@@ -65,10 +66,10 @@ def _default(row: dict[str, Any]) -> str:
 def _limits() -> str:
     rows = [
         *_documented("a YAML file", "yaml", document.YamlLimits),
-        *_documented("a scene", "scene", files.SceneLimits),
+        *_documented("a scene", "scene", SceneLimits),
     ]
     rows += [
-        ("an image", "channels of an EXR", image_header.MOST_CHANNELS, ""),
+        ("an image", "channels of an EXR", MOST_CHANNELS, ""),
         ("a pipeline", "nodes, those of sub-pipelines included", flatten.MOST_NODES, ""),
         ("a pipeline", "sub-pipelines inside each other", flatten.MOST_NESTED, ""),
         ("a pipeline", "steps", MOST_STEPS, ""),

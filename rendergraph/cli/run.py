@@ -258,7 +258,7 @@ def _with_sheet(files: Sequence[Saved], targets: Sequence[Target], path: Path) -
             file = file._replace(pixels=images.viewable_as(file.pixels, file.info), info=viewed)
             tiles.append((file.pixels, f"{target.path.name.partition('-')[0]} {target.name}", note))
         done.append(file)
-    from rendergraph.images.contact import contact_sheet
+    from rendergraph.images.viewable import contact_sheet
 
     return [*done, images.Saved(path, contact_sheet(tiles), viewed)]
 

@@ -23,7 +23,7 @@ from rendergraph.gl.programs import Program
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.program.variants import light_macros, scene_macros, storage_blocks
 from rendergraph.scene import pack
-from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture
+from rendergraph.scene.model import ImageSource, MadeImage, Scene, Texture, changed_objects
 from rendergraph.scene.pack import PackedScene, Records
 from rendergraph.textures import TextureDesc, full_mip_count
 
@@ -163,7 +163,7 @@ class GpuScene(Struct, eq=False, dict=True):
                 self._blocks[block][0].write(now.tobytes())
                 self.changes[block] += 1
         if packed.instances is not self.packed.instances:
-            moved = np.array(pack.changed_objects(self.scene, scene), np.int64)
+            moved = np.array(changed_objects(self.scene, scene), np.int64)
             moved = moved[packed.instances[moved] != self.packed.instances[moved]]
             if len(moved):
                 write_records(self._instances, packed.instances, moved)

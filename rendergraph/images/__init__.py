@@ -1,12 +1,11 @@
-"""Pictures on disk: the only module that meets OpenImageIO, which is imported on first use.
+"""Pictures on disk. OpenImageIO is imported on first use.
 
-`decode` makes a scene's image ready for the GPU, `write` and `read` are the plain ends, `viewable` turns any texture
-into something an eye can read, and `save_outputs` says what of a frame goes into which kind of file.
+`decode` prepares a scene's image for the GPU, `write` and `read` are the plain functions, `viewable` turns any texture
+into a picture that an eye can read, and `save_outputs` chooses what of a frame goes into which kind of file.
 """
 
 from rendergraph.images.decode import decode, decode_light, read, read_metadata
 from rendergraph.images.encode import EXTENSIONS, write
-from rendergraph.images.pixels import ImageLimits
 from rendergraph.images.saving import (
     PictureInfo,
     Saved,
@@ -21,11 +20,10 @@ from rendergraph.images.saving import (
     stands_for,
     viewable_as,
 )
-from rendergraph.images.view import from_srgb, heat_map, to_srgb, viewable
+from rendergraph.images.viewable import from_srgb, heat_map, to_srgb, viewable
 
 __all__ = [
     "EXTENSIONS",
-    "ImageLimits",
     "PictureInfo",
     "Saved",
     "channel_names",

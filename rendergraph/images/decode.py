@@ -22,9 +22,7 @@ Pixels: TypeAlias = npt.NDArray[Any]
 Warn: TypeAlias = Callable[[Problem], None]
 
 
-def decode(
-    source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits: SceneLimits = SceneLimits()
-) -> Pixels:
+def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits: SceneLimits = SceneLimits()) -> Pixels:
     """Decode a scene's image for upload.
 
     Grey becomes three equal channels and a missing alpha 1; alpha is not multiplied in. Integer images keep their

@@ -205,7 +205,8 @@ def _png(pixels: npt.NDArray[np.uint8], texts: Mapping[str, str]) -> Iterator[by
     yield _png_chunk(b"sRGB", b"\0")
     for keyword, text in texts.items():
         yield _png_chunk(b"iTXt", keyword.encode("ascii") + b"\0\0\0\0\0" + text.encode())
-    yield _png_chunk(b"IDAT", zlib.compress(_png_filtered(pixels.reshape(height, width * count), count).data, _PNG_LEVEL))
+    rows = _png_filtered(pixels.reshape(height, width * count), count)
+    yield _png_chunk(b"IDAT", zlib.compress(rows.data, _PNG_LEVEL))
     yield _png_chunk(b"IEND", b"")
 
 

@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from rendergraph.errors import InputError, Place, Problem, UsageError, suggestion
 from rendergraph.images.encode import EXTENSIONS, Job, write_all
-from rendergraph.images.view import Bytes, viewable
+from rendergraph.images.viewable import Bytes, viewable
 from rendergraph.textures import FORMATS
 
 Pixels: TypeAlias = npt.NDArray[Any]
@@ -164,8 +164,8 @@ def output_for(path: Path, outputs: Collection[str]) -> str:
             return name
     known = sorted(outputs)
     if not known:
-        raise InputError(Problem("RG505", f"'{path}' takes the output '{wanted[0]}', but the pipeline has no outputs"))
-    text = f"'{path}' takes the output '{wanted[0]}', which the pipeline lacks; name one: -o {known[0]}={path}"
+        raise InputError(Problem("RG505", f"'{path}' needs the output '{wanted[0]}', but the pipeline has no outputs"))
+    text = f"'{path}' needs the output '{wanted[0]}', which the pipeline lacks; name one: -o {known[0]}={path}"
     text += f" (available: {', '.join(known)})" if len(known) > 1 else ""
     raise InputError(Problem("RG505", text))
 
@@ -200,7 +200,7 @@ def check_target(path: Path) -> None:
     target = Path(os.path.realpath(path))
     folder, shown = target.parent, path.parent
     if not folder.is_dir():
-        reason = f"there is no folder '{shown}'" if not folder.exists() else f"'{shown}' is no folder"
+        reason = f"there is no folder '{shown}'" if not folder.exists() else f"'{shown}' is not a folder"
     elif target.is_dir():
         reason = "it is a folder"
     elif target.exists() and not target.is_file():

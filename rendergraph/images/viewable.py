@@ -173,15 +173,17 @@ def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:
     rows = math.ceil(len(pictures) / columns)
     across, down = _TILE_WIDTH + _TILE_GAP, _TILE_HEIGHT + 2 * _LINE_HEIGHT + _TILE_GAP
     sheet = np.full((rows * down + _TILE_GAP, columns * across + _TILE_GAP, 3), _BACKGROUND, np.uint8)
-    places = [(_TILE_GAP + number // columns * down, _TILE_GAP + number % columns * across) for number in range(len(pictures))]
-    for (top, left), (picture, _, _) in zip(places, pictures, strict=True):
+    corners = [divmod(number, columns) for number in range(len(pictures))]
+    corners = [(_TILE_GAP + row * down, _TILE_GAP + column * across) for row, column in corners]
+    for (top, left), (picture, _, _) in zip(corners, pictures, strict=True):
         small = _fit_tile(picture)
         y, x = top + (_TILE_HEIGHT - small.shape[0]) // 2, left + (_TILE_WIDTH - small.shape[1]) // 2
         sheet[y : y + small.shape[0], x : x + small.shape[1]] = small
     written = oiio.ImageBuf(sheet)
-    for (top, left), (_, name, note) in zip(places, pictures, strict=True):
+    for (top, left), (_, name, note) in zip(corners, pictures, strict=True):
         for line, (text, grey) in enumerate(((name, _NAME_GREY), (note, _NOTE_GREY)), start=1):
-            oiio.ImageBufAlgo.render_text(written, left, top + _TILE_HEIGHT + line * _LINE_HEIGHT - 4, text, _FONT_SIZE, "", (grey,) * 3)
+            y = top + _TILE_HEIGHT + line * _LINE_HEIGHT - 4
+            oiio.ImageBufAlgo.render_text(written, left, y, text, _FONT_SIZE, "", (grey,) * 3)
     written.geterror()  # without a font; an error that nobody fetches is printed at the end
     return np.asarray(written.get_pixels(oiio.UINT8), np.uint8)
 

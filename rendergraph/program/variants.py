@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from rendergraph.expand import CAMERA, ViewTable
 from rendergraph.scene import pack
+from rendergraph.scene.facts import selected
 from rendergraph.scene.model import Material, Scene, Texture
-from rendergraph.scene.objects import selected
 from rendergraph.scene.pack import PackedScene
 from rendergraph.steps import Step
 

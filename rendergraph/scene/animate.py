@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Option, Place, Problem, suggestion
 from rendergraph.projection import unit
-from rendergraph.scene import scene_build
+from rendergraph.scene import scene_values
+from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.environments import shipped
-from rendergraph.scene.framing import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.geometry import rigid, vec3
 from rendergraph.scene.model import Camera, Light, Matrix, Scene
 
@@ -113,11 +113,11 @@ def _with_camera(scene: Scene, camera: Camera) -> Scene:
 
 
 def _change_camera(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    return _with_camera(scene, _mended(scene, "cameras", name, scene_build.camera, values))
+    return _with_camera(scene, _mended(scene, "cameras", name, scene_values.camera, values))
 
 
 def _change_light(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    light = _mended(scene, "lights", name, scene_build.light, values)
+    light = _mended(scene, "lights", name, scene_values.light, values)
     return replace(scene, lights=tuple(light if entry.name == name else entry for entry in scene.lights))
 
 
@@ -131,7 +131,8 @@ def _mended(scene: Scene, section: str, name: str, make: Any, values: Mapping[st
 
 def _change_material(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
     materials = tuple(
-        scene_build.material(name, values, entry.textures) if entry.name == name else entry for entry in scene.materials
+        scene_values.material(name, values, entry.textures) if entry.name == name else entry
+        for entry in scene.materials
     )
     return replace(scene, materials=materials)
 
@@ -146,13 +147,13 @@ def _change_environment(scene: Scene, name: str, values: Mapping[str, Any]) -> S
 def _change_object(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
     if name not in scene.placements:
         return scene
-    world: Matrix = scene_build.placed(values)
+    world: Matrix = scene_values.placed(values)
     placed = scene.placements[name]
     objects, lights, cameras = list(scene.objects), list(scene.lights), dict(scene.cameras)
     for index, local in placed.objects:
         objects[index] = replace(objects[index], transform=world @ local)
     for index, local in placed.lights:
-        lights[index] = scene_build.moved_light(lights[index], world @ local)
+        lights[index] = scene_values.moved_light(lights[index], world @ local)
     for word, local in placed.cameras:
         cameras[word] = replace(cameras[word], transform=rigid(world @ local))
     return replace(scene, objects=tuple(objects), lights=tuple(lights), cameras=cameras)

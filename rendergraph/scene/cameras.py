@@ -1,12 +1,24 @@
-"""Cameras as matrices, in float64, and what is known of lights and environment before the schedule."""
+"""Cameras as matrices in float64, and the camera of a scene without one: as near as everything drawn allows."""
 
 from __future__ import annotations
 
+import math
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
 from rendergraph import projection
-from rendergraph.declare import LightFacts
-from rendergraph.scene.model import Camera, Matrix, Scene
+from rendergraph.scene.geometry import vec3
+from rendergraph.scene.model import Camera, Matrix, Scene, Vec3
 from rendergraph.steps import ViewMatrices
-from rendergraph.textures import TextureDesc, full_mip_count
+
+FRAMING_DIRECTION = (1.0, 0.6, 1.5)
+FRAMING_FOV = math.radians(45.0)
+WIDE = 16 / 9
+_MARGIN = 0.94
+"""How much of the picture is filled where something touches it."""
+_BLOCK = 1 << 16
 
 
 def view_matrices(camera: Camera, size: tuple[int, int]) -> ViewMatrices:
@@ -35,15 +47,71 @@ def projection_matrix(camera: Camera, aspect: float) -> Matrix:
     return projection.perspective(camera.fov_y, aspect, near, far)
 
 
-def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
-    """What is known of every light before the schedule, in the scene's order."""
-    return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)
+def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
+    """Centre and radius of a sphere around everything drawn."""
+    low, high = (np.array(corner) for corner in scene.bounds)
+    return vec3((low + high) / 2), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
 
 
-def environment_facts(scene: Scene) -> TextureDesc | None:
-    """The texture that a scene's environment becomes; None where it has none."""
-    if scene.environment is None:
-        return None
-    size = scene.environment.size
-    assert size is not None  # whoever reads a scene has seen to that
-    return TextureDesc("texture2d", "rgba16f", *size, mips=full_mip_count(*size))
+def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = 1 << 24) -> Camera:
+    """Everything drawn seen from (1, 0.6, 1.5), 45° high, from as near as its own points allow.
+
+    The camera looks along that direction, aside of the middle where that brings it nearer. What each side of the view
+    has to keep inside is one number, the farthest that any point reaches against the side's plane.
+
+    Args:
+        scene: what is seen.
+        aspect: width over height of the picture.
+        most_points: number of placed vertices above which the boxes of their meshes are framed.
+    """
+    center, radius = bounding_sphere(scene)
+    axes = _axes()
+    tall = math.tan(FRAMING_FOV / 2) * _MARGIN
+    wide = tall * aspect
+    # Outward normals of the view's four sides, then the way to the viewer: in the camera's axes, then the world's.
+    sides = np.array([[1, 0, wide], [-1, 0, wide], [0, 1, tall], [0, -1, tall], [0, 0, 1]]) @ axes
+    right, left, top, bottom, front = _reaches(scene, sides, np.array(center), most_points).tolist()
+    away = max((right + left) / (2 * wide), (top + bottom) / (2 * tall))
+    nearest = max(away - front, 1e-3 * radius)  # depth of the foremost point
+    away = front + nearest
+    transform = np.eye(4)
+    transform[:3, :3] = axes.T
+    transform[:3, 3] = eye = np.array([(right - left) / 2, (top - bottom) / 2, away]) @ axes + center
+    target = vec3(eye - axes[2] * away)
+    near = min(0.1 * radius, 0.5 * nearest)
+    return Camera("default", transform, fov_y=FRAMING_FOV, near=near, far=20 * radius, target=target)
+
+
+@cache
+def _axes() -> npt.NDArray[np.float64]:
+    """Of the framing camera, as rows: right, up, towards the viewer."""
+    return projection.look_at(FRAMING_DIRECTION, (0.0, 0.0, 0.0))[:3, :3].T
+
+
+def _reaches(
+    scene: Scene, directions: npt.NDArray[np.float64], center: npt.NDArray[np.float64], most_points: int
+) -> npt.NDArray[np.float64]:
+    """The farthest extent of everything drawn along each of some directions, (n, 3), from a centre."""
+    shown = [entry for entry in scene.objects if not entry.hidden]
+    most = np.full(len(directions), -np.inf if shown else 0.5)
+    by_mesh: dict[int, list[npt.NDArray[np.float64]]] = {}
+    for entry in shown:
+        by_mesh.setdefault(entry.mesh, []).append(entry.transform)
+    many = sum(len(scene.meshes[mesh].positions) * len(placed) for mesh, placed in by_mesh.items()) > most_points
+    for mesh, placed in by_mesh.items():
+        points = np.asarray(scene.meshes[mesh].positions, np.float64)
+        if many:
+            low, high = (corner.astype(np.float64) for corner in scene.meshes[mesh].box)
+            corners = np.array(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"))
+            points = corners.reshape(3, -1).T
+        transforms = np.array(placed)
+        turned = np.einsum("di,nij->ndj", directions, transforms[:, :3, :3])
+        moved = (transforms[:, :3, 3] - center) @ directions.T
+        step = max(1, _BLOCK // len(points))
+        for first in range(0, len(placed), step):
+            some = turned[first : first + step]
+            reach = np.full(some.shape[:2], -np.inf)
+            for start in range(0, len(points), _BLOCK):
+                np.maximum(reach, (some @ points[start : start + _BLOCK].T).max(axis=-1), out=reach)
+            np.maximum(most, (reach + moved[first : first + step]).max(axis=0), out=most)
+    return most

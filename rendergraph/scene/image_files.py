@@ -115,7 +115,7 @@ def _color_names(names: Sequence[str]) -> tuple[str, ...]:
     """`R`, `G`, `B` and perhaps `A`, or `Y`."""
     upper = [name.upper() for name in names]
     if "RY" in upper or "BY" in upper:
-        raise ImageError("RG354", "holds luminance and chroma; convert it to R, G, B")
+        raise ImageError("RG354", "contains luminance and chroma; convert it to R, G, B")
     needed = ("R", "G", "B") if "R" in upper else ("Y",)
     if not all(name in upper for name in needed):
         text = f"has the channels {', '.join(names[:8])}; R, G, B (and A) or Y are needed"

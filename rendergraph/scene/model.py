@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
+from itertools import compress, count
+from operator import is_not
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, TypeVar
 
@@ -111,20 +113,50 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return find_edges(self.positions, self.indices)
 
 
+class SceneLimits(Struct, frozen=True):
+    """How much a scene may ask for.
+
+    Attributes:
+        file_bytes: bytes of one mesh or buffer file.
+        vertices: vertices of one scene, before and after corners are split.
+        objects: placed objects of one scene.
+        memory_bytes: memory for what a file declares without containing it, such as accessors without a view.
+        image_side: texels along one side of an image.
+        image_bytes: decoded bytes of one image.
+        image_ratio: decoded bytes for each byte of the file, if an image is above 64 MiB.
+    """
+
+    file_bytes: int = 2 << 30
+    vertices: int = 100_000_000
+    objects: int = 500_000
+    memory_bytes: int = 256 << 20
+    image_side: int = 16384
+    image_bytes: int = 2 << 30
+    image_ratio: int = 1000
+
+    def exceeded(self, what: str, limit: str) -> str:
+        """Return the text of a mistake for an exceeded limit, with the option that raises it."""
+        return f"{what}, the limit is {getattr(self, limit):,}; --limit scene-{limit.replace('_', '-')}=N allows more"
+
+
 class ImageSource(Struct, frozen=True):
     """An image not yet decoded: a file, or bytes inside another file.
 
     Attributes:
-        path: the file it comes from (also where `data` holds its bytes, for messages).
-        data: the encoded bytes where the image is embedded, else None.
-        label: how messages name it.
-        loader: the plugin's function that decodes it, None where we do.
+        path: the file it comes from, also if `data` has its bytes.
+        data: the encoded bytes of an embedded image.
+        label: its name in messages.
+        loader: the plugin's function that decodes it.
+        size: width and height of the decoded image; None if only decoding tells.
+        channels: in the file; 0 if unknown.
     """
 
     path: Path
     data: bytes | None = None
     label: str = ""
     loader: Added[ImageLoader] | None = None
+    size: tuple[int, int] | None = None
+    channels: int = 0
 
 
 class MadeImage(Struct, frozen=True):
@@ -387,3 +419,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return (
             f"<Scene {self.name}: {len(self.objects)} objects, {len(self.lights)} lights, {len(self.cameras)} cameras>"
         )
+
+
+def changed_objects(before: Scene, scene: Scene) -> list[int]:
+    """The objects that are not the very same in two scenes that share their meshes."""
+    return list(compress(count(), map(is_not, before.objects, scene.objects)))

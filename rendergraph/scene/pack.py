@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import compress, count
-from operator import is_not
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from rendergraph.scene.edges import find_edges
-from rendergraph.scene.model import Environment, Floats, Light, Material, Matrix, Mesh, Scene
+from rendergraph.scene.model import Environment, Floats, Light, Material, Matrix, Mesh, Scene, changed_objects
 from rendergraph.scene.pack_order import first_use, ordered
 from rendergraph.scene.phong import dielectric_f0, phong_of
 from rendergraph.steps import ViewMatrices
@@ -231,11 +229,6 @@ def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:
     if scene.objects is not before.objects:
         changed |= _moved(packed, before, scene)
     return replace(packed, **changed)
-
-
-def changed_objects(before: Scene, scene: Scene) -> list[int]:
-    """The objects that are not the very same in two scenes that share their meshes."""
-    return list(compress(count(), map(is_not, before.objects, scene.objects)))
 
 
 def _moved(packed: PackedScene, before: Scene, scene: Scene) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.scene.model import ImageSource, Material, Mesh, SceneLimits
-from rendergraph.stamps import look
+from rendergraph.stamps import record_read
 
 CheckPath: TypeAlias = Callable[[Path, Place | None], Path]
 """The root rule: returns the resolved path, or raises InputError if it leaves every root."""
@@ -180,7 +180,7 @@ class Reading(Struct):
             InputError: it is missing, not an image, or exceeds a limit.
         """
         if path not in self._images:
-            look(path)
+            record_read(path)
             source = ImageSource(path, None, shown(path.name))
             loader = None if path.suffix.lower() in ("", *READ_IMAGES) else self.extensions.image_loader(path.suffix)
             if loader is None:
@@ -214,7 +214,7 @@ class Reading(Struct):
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
     """Return what is at a path, links followed."""
-    look(path)
+    record_read(path)
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

@@ -17,9 +17,8 @@ from msgspec import Struct
 from rendergraph.keys import Key
 from rendergraph.keys.forms import number, vector, whole
 from rendergraph.projection import unit
-from rendergraph.scene.geometry import translation
+from rendergraph.scene.geometry import clip_ears, translation
 from rendergraph.scene.model import Matrix, Mesh
-from rendergraph.scene.polygons import clip_ears
 
 Doubles = npt.NDArray[np.float64]
 

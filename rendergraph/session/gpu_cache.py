@@ -14,7 +14,7 @@ from rendergraph.images import decode, decode_light
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene
 from rendergraph.session.executables import ExecutableCache, key_of
-from rendergraph.session.scenes import image_limits
+from rendergraph.session.scenes import scene_limits
 from rendergraph.session.values import Expanded, Linked, Planned
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class GpuCache:
         if self._scene is not None and self._scene[0] is linked.scene:
             return self._scene[1]
         self._forget()
-        limits = image_limits(linked.selection)
+        limits = scene_limits(linked.selection)
         warnings: list[Problem] = []
 
         def decoded(source: ImageSource, srgb: bool) -> npt.NDArray[Any]:

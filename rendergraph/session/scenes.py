@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakValueDictionary
 
 from msgspec.structs import replace
@@ -13,16 +13,12 @@ from rendergraph import stamps
 from rendergraph.declare import Extensions
 from rendergraph.scene.animate import complete
 from rendergraph.scene.environments import named
-from rendergraph.scene.files import Reading, SceneLimits
 from rendergraph.scene.load import load
-from rendergraph.scene.model import Environment, ImageSource, Scene
+from rendergraph.scene.model import Environment, ImageSource, Scene, SceneLimits
+from rendergraph.scene.reading import Reading
 from rendergraph.session.selection import Selection
 from rendergraph.session.values import Resolved
 
-if TYPE_CHECKING:
-    from rendergraph.images import ImageLimits
-
-_IMAGE_LIMITS = {"image_side": "side", "image_bytes": "bytes", "image_ratio": "ratio"}
 _IN_USE: WeakValueDictionary[tuple[Any, ...], Scene] = WeakValueDictionary()
 
 
@@ -33,7 +29,7 @@ def scene_of(resolved: Resolved) -> Scene:
         InputError: a file of it is missing or wrong.
     """
     selection, spec, extensions = resolved.selection, resolved.spec, resolved.catalog.extensions
-    limits = SceneLimits(**selection.allowed("scene"))
+    limits = scene_limits(selection)
     roots = spec.roots.folders if spec.scene is not None else ()
     key = (Path.cwd(), spec.scene, selection.environment, selection.camera, roots, limits, selection.plugins)
     # One camera serves pictures of about one shape, such as a viewer's smaller ones.
@@ -47,18 +43,15 @@ def scene_of(resolved: Resolved) -> Scene:
             scene = load(spec.scene, check_path=spec.roots.check, limits=limits, extensions=extensions)
         if selection.environment is not None:
             scene = replace(scene, environment=_environment(selection.environment, scene, limits, extensions))
-        scene = _measured(scene, resolved)
+        scene = _measured(scene, limits)
     framed = () if scene.cameras else (shape,)
     _IN_USE[(*key, *framed)] = made = replace(complete(scene, selection.camera, shape), files=files)
     return made
 
 
-def image_limits(selection: Selection) -> ImageLimits:
-    """What the scene's images may claim."""
-    from rendergraph.images import ImageLimits  # for scenes with images alone
-
-    allowed = selection.allowed("scene")
-    return ImageLimits(**{own: allowed[name] for name, own in _IMAGE_LIMITS.items() if name in allowed})
+def scene_limits(selection: Selection) -> SceneLimits:
+    """Return the limits of the scene and its images."""
+    return SceneLimits(**selection.allowed("scene"))
 
 
 def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Extensions) -> Environment:
@@ -67,16 +60,16 @@ def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Exte
     if found is not None:
         return found
     reading = Reading(path, lambda path, place: path, limits, extensions)
-    image, header = reading.image_with_header(path, "environment")
-    return Environment(image, header.size)
+    image = reading.image(path, "environment")
+    return Environment(image, image.size)
 
 
-def _measured(scene: Scene, resolved: Resolved) -> Scene:
-    """The scene with its environment's size, which only decoding tells of some files."""
+def _measured(scene: Scene, limits: SceneLimits) -> Scene:
+    """The scene with its environment's size, which only decoding tells of a plugin's files."""
     environment = scene.environment
     if environment is None or environment.size is not None or not isinstance(environment.image, ImageSource):
         return scene
     from rendergraph.images import decode  # for such files alone
 
-    height, width = decode(environment.image, srgb=True, limits=image_limits(resolved.selection)).shape[:2]
+    height, width = decode(environment.image, srgb=True, limits=limits).shape[:2]
     return replace(scene, environment=replace(environment, size=(width, height)))

@@ -84,7 +84,7 @@ def _pair(size: Any) -> tuple[int, int]:
 def _limit_names() -> dict[str, dict[str, str]]:
     """What each kind of file has limits of: the name on the command line to the field."""
     from rendergraph.document import YamlLimits
-    from rendergraph.scene.files import SceneLimits
+    from rendergraph.scene.model import SceneLimits
 
     names = {
         kind: {f"{kind}-{name.replace('_', '-')}": name for name in limits.__struct_fields__}

@@ -23,9 +23,8 @@ from rendergraph.catalog import Catalog
 from rendergraph.document import Document, YamlLimits
 from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.scene.animate import complete
-from rendergraph.scene.cameras import environment_facts, light_facts
+from rendergraph.scene.facts import environment_facts, light_facts, object_facts
 from rendergraph.scene.model import Scene
-from rendergraph.scene.objects import object_facts
 from rendergraph.session.made import Made, is_picture, made
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection

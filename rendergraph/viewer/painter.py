@@ -24,7 +24,7 @@ from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 from rendergraph.metrics import measure
 from rendergraph.resolve.merge import diff
 from rendergraph.resolve.write import to_yaml
-from rendergraph.scene.framing import bounding_sphere
+from rendergraph.scene.cameras import bounding_sphere
 from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
 from rendergraph.session.frame import Frame, OutputInfo

@@ -46,7 +46,7 @@ SETS = {
 LATE = (
     "glcontext.egl",
     "yaml",
-    "rendergraph.scene.scene_yaml",
+    "rendergraph.scene.scene_file",
     "rendergraph.scene.shapes",
     "rendergraph.nodes.display.tonemap",
     "rendergraph.nodes.geometry.gbuffer",

@@ -398,10 +398,10 @@ def test_a_plugins_texture(gl: rg.Session, loaders: Path, tmp_path: Path) -> Non
 
 def test_without_the_plugin_its_files_are_nothing(loaders: Path, tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match=r"RG303 'a\.tri' is no scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb$"
+        InputError, match=r"RG303 'a\.tri' is not a scene; a scene ends in \.yaml, \.yml, \.obj, .*, \.glb$"
     ):
         rg.load("forward", scene=tmp_path / "a.tri").check()
-    with pytest.raises(InputError, match=r"s\.yaml:3:\d+: RG303 'a\.tri' is no mesh file; a mesh ends in \.obj"):
+    with pytest.raises(InputError, match=r"s\.yaml:3:\d+: RG303 'a\.tri' is not a mesh file; a mesh ends in \.obj"):
         rg.load("forward", scene=tmp_path / "s.yaml").check()
     (tmp_path / "a.try").write_text(TRI)
     with pytest.raises(InputError, match=r"a mesh ends in .*, \.tri$|a scene ends in .*, \.tri$"):
@@ -423,8 +423,8 @@ def test_a_loader_that_raises_is_named_with_its_line(loaders: Path, tmp_path: Pa
 @pytest.mark.parametrize(
     ("gives", "said"),
     [
-        ("None", "gave NoneType, not MeshData or a list of it"),
-        ("[1]", "gave list, not MeshData or a list of it"),
+        ("None", "returned NoneType, not MeshData or a list of it"),
+        ("[1]", "returned list, not MeshData or a list of it"),
         ("MeshData([[0, 0]], [[0, 0, 0]])", r"whose positions have the shape \(1, 2\), not \(n, 3\)"),
         ("MeshData([[0, 0, float('nan')]], [[0, 0, 0]])", "whose positions are not all finite"),
         ("MeshData([], [])", r"whose positions have the shape \(0,\)"),
@@ -446,11 +446,11 @@ def test_what_a_mesh_loader_gives_is_checked(loaders: Path, tmp_path: Path, give
 @pytest.mark.parametrize(
     ("gives", "said"),
     [
-        ("None", "RG498 .* gave NoneType, not an array"),
-        ("np.zeros(3)", r"RG498 .* gave an array of shape \(3,\)"),
-        ("np.zeros((2, 2, 5))", r"RG498 .* gave an array of shape \(2, 2, 5\)"),
-        ("np.zeros((2, 2), int)", "RG498 .* gave int64 values, not uint8 or floats"),
-        ("np.zeros((1, 20000), np.uint8)", "RG498 .* gave 20000×1 pixels; the limit is 16384"),
+        ("None", "RG498 .* returned NoneType, not an array"),
+        ("np.zeros(3)", r"RG498 .* returned an array of shape \(3,\)"),
+        ("np.zeros((2, 2, 5))", r"RG498 .* returned an array of shape \(2, 2, 5\)"),
+        ("np.zeros((2, 2), int)", "RG498 .* returned int64 values, not uint8 or floats"),
+        ("np.zeros((1, 20000), np.uint8)", "RG498 .* returned 20000×1 pixels; the limit is 16384"),
         ("1 / 0", r"loaders\.py:\d+:1: RG497 image 'sky\.raw' cannot be read: ZeroDivisionError"),
     ],
 )

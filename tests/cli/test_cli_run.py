@@ -73,7 +73,7 @@ def test_a_pipeline_without_the_output_is_told(cli: Any, fake: Any) -> None:
     fake.graph.outputs = {"ao": None}
     result = cli("run", "x")
     assert result.code == 3
-    assert result.err == ("RG505 'x.png' takes the output 'image', which the pipeline lacks; name one: -o ao=x.png\n")
+    assert result.err == ("RG505 'x.png' needs the output 'image', which the pipeline lacks; name one: -o ao=x.png\n")
     assert not fake.calls
 
 
@@ -100,7 +100,7 @@ def test_frames_are_numbered(cli: Any, fake: Any, tmp_path: Path) -> None:
             "RG503 9 frames do not fit one file 'a.png'; number them: 'a.####.png'",
         ),
         (["-o", "no/a.png"], 3, "no/a.png: RG504 cannot be written: there is no folder 'no'"),
-        (["-o", "sky.hdr/a.png"], 3, "RG504 cannot be written: 'sky.hdr' is no folder"),
+        (["-o", "sky.hdr/a.png"], 3, "RG504 cannot be written: 'sky.hdr' is not a folder"),
         (["--tap", "n.p=folder.exr"], 3, "folder.exr: RG504 cannot be written: it is a folder"),
     ],
 )

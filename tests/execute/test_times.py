@@ -12,7 +12,7 @@ from rendergraph.api import Any as AnyTexel
 from rendergraph.api import Frame, Input, Internal, Node, Output, Steps, View, Views
 from rendergraph.execute import FrameTimes, StepTime, median_times
 from rendergraph.gl.queries import Timer
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 
 SHADERS = {
     "show.frag": "layout(std430) readonly buffer numbers { vec4 four; }; out vec4 color; void main() { color = four; }",
@@ -100,13 +100,13 @@ class Asks(Node):
 )
 def test_what_does_not_move_is_found_once(bench: Any, monkeypatch: pytest.MonkeyPatch, moving: str, found: int) -> None:
     asked: list[FrameScene] = []
-    bounds = FrameScene._bounds.func  # type: ignore[attr-defined]  # a cached property
+    bounds = FrameScene.bounds.func  # type: ignore[attr-defined]  # a cached property
 
     def ask(scene: FrameScene) -> object:
         asked.append(scene)
         return bounds(scene)
 
-    monkeypatch.setattr(FrameScene._bounds, "func", ask)
+    monkeypatch.setattr(FrameScene.bounds, "func", ask)
     values = "{0: 1, 1: 2}" if "intensity" in moving else "{0: [0, 0, 3], 1: [30, 0, 3]}"
     scene = "objects: {box: {shape: box}}\ncameras: {c: {eye: [0, 0, 4]}}\nlights: {l: {type: point}}\n"
     scene += f"keyframes: {{{moving}: {values}}}\n" if moving != "nothing" else ""

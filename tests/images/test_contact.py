@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rendergraph.images.contact import contact_sheet
+from rendergraph.images.viewable import contact_sheet
 
 
 @pytest.mark.slow

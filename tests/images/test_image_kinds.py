@@ -10,8 +10,8 @@ import pytest
 
 from rendergraph.errors import InputError
 from rendergraph.images import decode
-from rendergraph.scene.files import Reading, inside
 from rendergraph.scene.model import ImageSource
+from rendergraph.scene.reading import Reading, inside
 
 KINDS = {
     ".png": "uint8",

@@ -22,7 +22,6 @@ import pytest
 
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.images import (
-    ImageLimits,
     PictureInfo,
     Saved,
     check_target,
@@ -40,7 +39,7 @@ from rendergraph.images import (
     viewable,
     write,
 )
-from rendergraph.scene.model import ImageSource
+from rendergraph.scene.model import ImageSource, SceneLimits
 
 TEXT = "ambient: 0.03  # é 漢字 𝄞\n\t'quoted' \"twice\" \\ back\n" * 500
 
@@ -245,7 +244,7 @@ def test_the_extension_chooses_the_output(name: str, outputs: list[str], expecte
 
 
 def test_a_missing_output_is_said_with_a_way_out() -> None:
-    with pytest.raises(InputError, match=r"RG505 'a.png' takes the output 'image', .*: -o ao=a.png \(available: ao, "):
+    with pytest.raises(InputError, match=r"RG505 'a.png' needs the output 'image', .*: -o ao=a.png \(available: ao, "):
         output_for(Path("a.png"), ["ao", "radiance"])
     with pytest.raises(UsageError, match=r"RG501 '.gif' files are not written; available: \.exr"):
         output_for(Path("a.gif"), ["image"])
@@ -265,7 +264,7 @@ def test_targets_are_checked_before_rendering(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(InputError, match=r"RG504 cannot be written: there is no folder '.*no'"):
         check_target(tmp_path / "no" / "a.png")
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         check_target(tmp_path / "file" / "a.png")
     with pytest.raises(InputError, match="it is a folder"):
         check_target(tmp_path)
@@ -429,7 +428,7 @@ def test_broken_values_are_replaced_and_counted(tmp_path: Path) -> None:
     assert found[0, 0].tolist() == [0, 0, 0, 1]
     assert found[0, 1, :2].tolist() == [1, 65504]
     assert [str(problem) for problem in said] == [
-        "sky: warning: RG355 1 pixel is NaN or -inf, taken as 0; 4 pixels are infinite or beyond 65504, taken as 65504"
+        "sky: warning: RG355 1 pixel is NaN or -inf, replaced by 0; 4 pixels are infinite or beyond 65504, replaced by 65504"
     ]
 
 
@@ -442,7 +441,7 @@ def test_a_picture_that_is_not_all_around_is_said(tmp_path: Path, size: tuple[in
     said: list[Problem] = []
     for name in ("a", "even"):
         decode_light(ImageSource(tmp_path / f"{name}.exr", label=name), warn=said.append)
-    wanted = f"a: warning: RG356 it is {width}×{height}, but a picture of everything around is twice as wide as high; "
+    wanted = f"a: warning: RG356 it is {width}×{height}, but an environment map is twice as wide as high; "
     assert [str(problem) for problem in said] == ([f"{wanted}it is stretched"] if warned else [])
 
 
@@ -476,10 +475,10 @@ def test_what_is_no_image_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.png").write_text("hello")
     (tmp_path / "empty.png").write_bytes(b"")
     for name, text in (
-        ("none.png", "RG350 there is no such image"),
-        (".", "RG350 .* it is a folder"),
-        ("pipe.png", "RG350 .* it is not a regular file"),
-        ("text.png", "RG351 this is no image of a known kind; PNG"),
+        ("none.png", "RG350 the image does not exist"),
+        (".", "RG350 the image is not a regular file"),
+        ("pipe.png", "RG350 the image is not a regular file"),
+        ("text.png", "RG351 the image has an unknown format; PNG"),
         ("empty.png", "RG352 .* the file is empty"),
         ("a\0b.png", "RG350 the image cannot be read"),
     ):
@@ -546,8 +545,8 @@ def png(width: int, height: int, data: bytes = b"") -> bytes:
     ("width", "height", "text"),
     [
         (2**31 - 1, 2**31 - 1, "RG352"),
-        (16385, 1, "RG353 the image is 16385×1 pixels; the limit is 16384 a side"),
-        (16000, 16000, "RG353 the image claims 976 MiB in a file of"),
+        (16385, 1, "RG353 the image is 16385×1 pixels, the limit is 16,384; --limit scene-image-side=N"),
+        (16000, 16000, "RG353 the image takes 1,024,000,000 bytes decoded and"),
         (100, 100, "RG352"),
     ],
 )
@@ -596,15 +595,15 @@ def test_threads_decode_together_and_stderr_comes_back(tmp_path: Path, capfd: py
 
 def test_limits_can_be_set(tmp_path: Path) -> None:
     write(tmp_path / "a.png", np.zeros((20, 30, 3), np.uint8))
-    decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=ImageLimits(side=30))
-    with pytest.raises(InputError, match="RG353 the image is 30×20 pixels; the limit is 29 a side"):
-        decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=ImageLimits(side=29))
+    decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=SceneLimits(image_side=30))
+    with pytest.raises(InputError, match="RG353 the image is 30×20 pixels, the limit is 29; --limit"):
+        decode(ImageSource(tmp_path / "a.png"), srgb=False, limits=SceneLimits(image_side=29))
 
 
 @pytest.mark.slow
 def test_a_bomb_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.png").write_bytes(png(8000, 8000, bytes(8000 * 32001)))
-    assert "above 64 MiB the limit is 1000:1" in refused(tmp_path / "a.png", capfd)
+    assert "the limit is 1,000; --limit scene-image-ratio=N" in refused(tmp_path / "a.png", capfd)
 
 
 def test_shared_images_decode(shared: Path) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rendergraph.errors import InputError
-from rendergraph.scene import animate, framing
-from rendergraph.scene.cameras import view_matrices
+from rendergraph.scene import animate
+from rendergraph.scene.cameras import framing_camera, view_matrices
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
 
@@ -115,11 +115,9 @@ def test_framing_is_as_near_as_points_allow(tmp_path: Path, aspect: float) -> No
     assert np.allclose(aimed / np.linalg.norm(aimed), -camera.transform[:3, 2]), "an orbit starts without a jump"
 
 
-def test_many_placed_vertices_are_framed_by_their_boxes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_placed_vertices_are_framed_by_their_boxes(tmp_path: Path) -> None:
     scene = read(tmp_path, SHAPES)
-    near = framing.framing_camera(scene)
-    monkeypatch.setattr(framing, "_MOST_POINTS", 0)
-    away = framing.framing_camera(scene)
+    near, away = framing_camera(scene), framing_camera(scene, most_points=0)
     distances = [float(np.linalg.norm(c.transform[:3, 3] - np.array([5, 5, 5]))) for c in (near, away)]
     assert distances[0] < distances[1] < 1.3 * distances[0]
 

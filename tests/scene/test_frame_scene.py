@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from msgspec.structs import replace
 
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Mesh, Object, Scene
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], np.float32)

@@ -13,9 +13,8 @@ import pytest
 
 from rendergraph.errors import InputError
 from rendergraph.images import write
-from rendergraph.scene.files import SceneLimits
 from rendergraph.scene.load import load
-from rendergraph.scene.model import Scene
+from rendergraph.scene.model import Scene, SceneLimits
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 
@@ -346,29 +345,32 @@ BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "buffer shorter": (gltf(buffers=[{"byteLength": 99, "uri": uri(b"abc")}]), "truncated: 'byteLength' is 99"),
     "accessor unused": (
         gltf(accessors=[*gltf()["accessors"], {"componentType": 1, "type": "VEC3", "count": 1}]),
-        r"accessors\[2\]: 'componentType' 1",
+        r"Invalid enum value 1 - at `\$\.accessors\[2\]\.componentType",
     ),
     "misaligned": (gltf(accessors=[gltf()["accessors"][0] | {"byteOffset": 2, "count": 2}]), "not aligned"),
     "stride": (gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 8}]), "stride of 8"),
     "min": (gltf(accessors=[gltf()["accessors"][0] | {"min": [0]}]), "'min' must be 3 numbers"),
-    "wrong type": (gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 1}}]}]), "POSITION takes VEC3"),
+    "wrong type": (gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 1}}]}]), "POSITION must be VEC3"),
     "cycle": (gltf(nodes=[{"children": [1]}, {"children": [0]}], scenes=[{"nodes": []}]), "RG309 .*own ancestor"),
     "two parents": (gltf(nodes=[{"children": [2]}, {"children": [2]}, {}]), "RG309 .*two parents"),
     "not a root": (gltf(nodes=[{"children": [1]}, {}], scenes=[{"nodes": [1]}]), "RG309 .*has a parent"),
     "zero rotation": (gltf(nodes=[{"rotation": [0, 0, 0, 0]}]), "length zero"),
     "matrix": (gltf(nodes=[{"matrix": [1] * 16}]), "not affine"),
-    "no such mesh": (gltf(nodes=[{"mesh": 3}]), "'mesh' is 3, but there are 1 meshes"),
+    "no such mesh": (gltf(nodes=[{"mesh": 3}]), "mesh is 3, but there are 1 meshes"),
     "missing buffer": (gltf(buffers=[{"byteLength": 3, "uri": "a.bin"}]), "RG301 buffer 'a.bin' does not exist"),
     "missing image": (gltf(images=[{"uri": "a.png"}]), "RG350 image 'a.png' does not exist"),
     "escape": (gltf(buffers=[{"byteLength": 3, "uri": "../../a.bin"}]), "RG302"),
     "encoded escape": (gltf(buffers=[{"byteLength": 3, "uri": "%2e%2e/%2e%2e/a.bin"}]), "RG302"),
     "absolute": (gltf(buffers=[{"byteLength": 3, "uri": "/etc/passwd"}]), "RG302"),
-    "address": (gltf(buffers=[{"byteLength": 3, "uri": "http://localhost/a"}]), "RG302 .*only files are read"),
+    "address": (
+        gltf(buffers=[{"byteLength": 3, "uri": "http://localhost/a"}]),
+        "RG302 .*only local files can be loaded",
+    ),
     "zero byte": (gltf(buffers=[{"byteLength": 3, "uri": "a%00"}]), "RG302"),
     "base64": (gltf(buffers=[{"byteLength": 3, "uri": "data:;base64,####"}]), "broken base64"),
     "camera": (gltf(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 0}}]), "0 < znear"),
     "old": (gltf(asset={"version": "1.0"}), "RG303 .*version '1.0'"),
-    "null": (gltf(meshes=None), "'meshes' is null"),
+    "null": (gltf(meshes=None), "got `null` - at `.*meshes"),
     "infinite place": (gltf(nodes=[{"scale": [1e308] * 3, "children": [1]}, {"scale": [1e308] * 3}]), "RG306"),
     "many": (gltf(accessors=[{"componentType": 5126, "type": "VEC3", "count": 4_000_000_000}]), "RG307 .*48,000,"),
 }
@@ -386,14 +388,14 @@ def test_broken_file_is_one_clear_error(tmp_path: Path, case: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"asset": {"version": "2.0"}, "asset": {}}', "key 'asset' stands twice"),
+        ('{"asset": {"version": "2.0"}, "asset": {}}', "duplicate key 'asset'"),
         ('{"asset": {"version": "2.0"}, "x": NaN}', "NaN is not allowed"),
         ('{"asset": {"version": "2.0"}, "x": 1e999}', "number 1e999 is out of range"),
-        ('{"asset": {"version": "2.0"}, "x": ' + "9" * 5000 + "}", "is out of range"),
+        ('{"asset": {"version": "2.0"}, "x": ' + "9" * 5000 + "}", "Exceeds the limit"),
         ('{"asset": ' + "[" * 100_000, "nested too deeply"),
-        ('{"asset": {"version": "2.0"}', "malformed at line 1"),
-        ("[]", "no object"),
-        ("", "malformed"),
+        ('{"asset": {"version": "2.0"}', "delimiter: line 1"),
+        ("[]", "Expected `object`, got `array`"),
+        ("", "invalid JSON: Expecting value"),
     ],
 )
 def test_json_is_strict(tmp_path: Path, text: str, message: str) -> None:
@@ -403,7 +405,7 @@ def test_json_is_strict(tmp_path: Path, text: str, message: str) -> None:
 
 def test_json_is_utf8(tmp_path: Path) -> None:
     (tmp_path / "a.gltf").write_bytes(b'{"asset": "\xff"}')
-    with pytest.raises(InputError, match="not UTF-8 at byte 11"):
+    with pytest.raises(InputError, match="can't decode byte 0xff in position 11"):
         load(tmp_path / "a.gltf")
 
 
@@ -413,7 +415,7 @@ def test_nan_in_any_accessor_is_found(tmp_path: Path) -> None:
         (np.array([np.nan], np.float32), "SCALAR", 5126, {}),
         meshes=[{"primitives": [{"attributes": {"POSITION": 0}}]}],
     )
-    with pytest.raises(InputError, match=r"RG306 accessors\[1\] holds NaN"):
+    with pytest.raises(InputError, match=r"RG306 accessors\[1\] contains NaN"):
         read(tmp_path, top)
 
 

@@ -13,10 +13,11 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.errors import InputError, Problem
-from rendergraph.scene import obj_text
+from rendergraph.scene.geometry import clip_ears, triangulate
 from rendergraph.scene.load import load
 from rendergraph.scene.model import Scene
-from rendergraph.scene.polygons import clip_ears, triangulate
+from rendergraph.scene.obj.parser import parse
+from rendergraph.scene.reading import Reading, inside
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
@@ -293,7 +294,7 @@ def test_what_is_left_out_is_said_once(tmp_path: Path, text: str, code: str, say
     [
         ("map_Kd gone.png", "'gone.png' cannot be read"),
         ("map_Kd C:\\textures\\gone.png", "cannot be read"),
-        ("map_Kd a.obj", "is no image"),
+        ("map_Kd a.obj", "has an unknown format"),
         ("Kd x", "no value that can be read"),
         ("Kd 2 0 0", "'Kd' outside 0 to 1 is clamped"),
         ("blah 1", "unknown statement 'blah'"),
@@ -315,21 +316,21 @@ def test_what_an_mtl_lacks_is_said(tmp_path: Path, mtl: str, says: str) -> None:
         ("f 0 1 2\n", "RG305 index 0"),
         ("f 1/1 2/1 3/1\n", "RG305 index 1 is out of range; there are 0 texture coordinates"),
         ("f 1 2 99999999999999999999999\n", "RG30"),
-        ("f 1 2\n", "RG304 a face takes at least 3 corners, here are 2"),
-        ("f 1 2 x\n", "RG304 'x' is no corner"),
-        ("f 1 2 3/4/5/6\n", "RG304 '3/4/5/6' is no corner"),
-        ("f 1.5 2 3\n", "RG304 '1.5' is no corner"),
-        ("f /1 2 3\n", "RG304 '/1' is no corner"),
-        ("v 1 2\n", "RG304 'v' takes 3 to 7 numbers, here are 2"),
-        ("v 1 2 3 4 5\n", "RG304 .*here are 5"),
-        ("v 1 2 1,5\n", "RG304 '1,5' is no number"),
-        ("v 1 2 1-5\n", "RG304 '1-5' is no number"),
+        ("f 1 2\n", "RG304 a face takes at least 3 corners, got 2"),
+        ("f 1 2 x\n", "RG304 'x' is not a corner"),
+        ("f 1 2 3/4/5/6\n", "RG304 '3/4/5/6' is not a corner"),
+        ("f 1.5 2 3\n", "RG304 '1.5' is not a corner"),
+        ("f /1 2 3\n", "RG304 '/1' is not a corner"),
+        ("v 1 2\n", "RG304 'v' takes 3 to 7 numbers, got 2"),
+        ("v 1 2 3 4 5\n", "RG304 .*got 5"),
+        ("v 1 2 1,5\n", "RG304 '1,5' is not a number"),
+        ("v 1 2 1-5\n", "RG304 '1-5' is not a number"),
         ("v 1 2 nan\n", "RG306 '1 2 nan' is not finite"),
         ("v 1 2 inf\n", "RG306"),
         ("v 1 2 1e39\n", "RG306"),
         ("v 1 2 1e999\n", "RG306"),
         ("vn 1 2\n", "RG304 'vn' takes 3 to 3"),
-        ("vt x\n", "RG304 'x' is no number"),
+        ("vt x\n", "RG304 'x' is not a number"),
         ("mtllib ../../a.mtl\n", "RG302"),
     ],
 )
@@ -351,17 +352,16 @@ def test_map_outside_the_root_is_an_error(tmp_path: Path) -> None:
             read(inner, "mtllib a.mtl\n" + TRIANGLE + "f 1 2 3\n", f"newmtl m\nmap_Kd {name}\n")
 
 
-def test_blocks_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_join_without_a_seam(tmp_path: Path) -> None:
     text = "".join(f"v {k} 0 0\nv {k} 1 0\nv {k} 0 1\nvt {k} 0\no n{k % 3}\nf -3/-1 -2/-1 -1/-1\n" for k in range(200))
-    whole = read(tmp_path, text)
-    monkeypatch.setattr(obj_text, "BLOCK_BYTES", 100)
-    parts = read(tmp_path, text)
-    assert [entry.name for entry in whole.objects] == [entry.name for entry in parts.objects] == ["n0", "n1", "n2"]
-    for a, b in zip(whole.meshes, parts.meshes, strict=True):
-        assert np.array_equal(a.positions, b.positions)
-        assert np.array_equal(a.indices, b.indices)
+    reading = Reading(tmp_path / "a.obj", inside(tmp_path))
+    whole, parts = parse(text.encode(), reading), parse(text.encode(), reading, block_bytes=100)
+    assert whole.names[0] == ["", "n0", "n1", "n2"]
+    for field in ("positions", "uvs", "corners", "sizes", "lines", "states"):
+        assert np.array_equal(getattr(whole, field), getattr(parts, field)), field
+    assert whole.names == parts.names
     with pytest.raises(InputError, match=":1201:1: RG304 'y'"):
-        read(tmp_path, text + "v 0 0 y\n")
+        parse(f"{text}v 0 0 y\n".encode(), reading, block_bytes=100)
 
 
 def test_every_length_of_a_truncated_file_is_an_error_or_a_smaller_mesh(tmp_path: Path, shared: Path) -> None:

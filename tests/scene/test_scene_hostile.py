@@ -6,10 +6,13 @@ import contextlib
 import copy
 import json
 import resource
+import struct
 import subprocess
 import sys
 import time
+import zlib
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +22,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rendergraph.errors import InputError, Problem
-from rendergraph.scene import animate, image_header, pack
-from rendergraph.scene.files import Reading, inside
+from rendergraph.scene import animate, pack
 from rendergraph.scene.load import load
+from rendergraph.scene.reading import Reading, inside
 
 CALM = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
@@ -109,11 +112,14 @@ def test_any_bytes(tmp_path: Path, name: str, data: bytes) -> None:
 @CALM
 @given(
     data=st.binary(max_size=120),
-    head=st.sampled_from([b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8", b"#?RADIANCE", b"\x76\x2f\x31\x01\x02\0\0\0"]),
+    head=st.sampled_from(
+        [b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"BM", b"#?RADIANCE", b"\x76\x2f\x31\x01\x02\0\0\0"]
+    ),
 )
-def test_any_image_header(data: bytes, head: bytes) -> None:
-    with contextlib.suppress(ValueError):
-        image_header.read(head + data)
+def test_any_image_header(tmp_path: Path, capfd: pytest.CaptureFixture[str], data: bytes, head: bytes) -> None:
+    with contextlib.suppress(InputError):
+        Reading(tmp_path / "a.glb", inside(tmp_path)).embedded_image(head + data, "image")
+    assert capfd.readouterr().err == ""
 
 
 BASE: dict[str, Any] = {
@@ -277,46 +283,73 @@ def test_no_name_leads_out(tmp_path: Path, name: str) -> None:
     (tmp_path / "x").write_text("secret")
     reading = Reading(inner / "a.gltf", inside(inner))
     with pytest.raises(InputError, match=r"RG30[12]"):
-        reading.read(reading.beside(name), "buffer")
+        reading.read(reading.resolve(name), "buffer")
+
+
+def chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
 def big_png(width: int, height: int) -> bytes:
-    return b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + width.to_bytes(4) + height.to_bytes(4) + bytes([8, 6, 0, 0, 0])
+    head = struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+
+
+def compressed_bmp(width: int, height: int) -> bytes:
+    """A BMP of runs, which OpenImageIO decodes while it opens it."""
+    head = struct.pack("<IiiHHIIiiII", 40, width, height, 1, 8, 1, 0, 0, 0, 0, 0)
+    return struct.pack("<2sIHHI", b"BM", 1080, 0, 0, 1078) + head + bytes(1024) + b"\0\1"
 
 
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "RG352 .*is empty"),
-        (b"hello", "RG351 .*is no image of a known kind; PNG, JPEG"),
+        (b"", "RG352 image 'a.png' is broken: the file is empty"),
+        (b"hello", "RG351 image 'a.png' has an unknown format; PNG, JPEG"),
         (b"GIF89a" + bytes(20), "RG351"),
-        (big_png(4, 4)[:20], "RG352 .*ends inside its header"),
-        (big_png(20_000, 4), "RG353 .*20000×4 texels.*16,384"),
-        (big_png(0, 4), "RG352 .*is 0×4 texels"),
+        (big_png(4, 4)[:20], "RG352 .*is broken: Read error"),
+        (big_png(20_000, 4), "RG353 .*20000×4 pixels, the limit is 16,384; --limit scene-image-side=N allows more"),
+        (big_png(0, 4), "RG352 .*is broken"),
         (big_png(16_000, 16_000), "RG353 .*1,024,000,000 bytes"),
-        (b"\xff\xd8\xff\xd9\0\0", "RG352 .*without a size"),
-        (b"#?RADIANCE\n\n-Y 5 -Y 5\n", "RG352 .*broken HDR"),
+        (compressed_bmp(16_000, 16_000), "RG353 .*1,024,000,000 bytes"),
+        (b"\xff\xd8\xff\xd9\0\0", "RG352 .*is broken: Bad JPEG header"),
+        (b"#?RADIANCE\n\n-Y 5 -Y 5\n", "RG352 .*is broken"),
         (b"\x76\x2f\x31\x01\x02\0\0\0\0", "RG352 .*EXR"),
     ],
 )
-def test_images_are_looked_into_before_they_are_decoded(tmp_path: Path, data: bytes, message: str) -> None:
+def test_images_are_checked_before_they_are_decoded(
+    tmp_path: Path, data: bytes, message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "a.png").write_bytes(data)
     (tmp_path / "a.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "a.png"}]}))
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(InputError, match=message) as error:
         load(tmp_path / "a.gltf")
+    assert "\n" not in error.value.problems[0].text
+    assert capfd.readouterr().err == "", "libpng writes to stderr by itself"
+
+
+def test_a_scene_with_images_needs_openimageio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "OpenImageIO", None)
+    (tmp_path / "a.png").write_bytes(big_png(4, 4))
+    for images in ([], [{"uri": "a.png"}]):
+        (tmp_path / "a.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "images": images}))
+        with pytest.raises(InputError, match=r"RG350 .*OpenImageIO is not available") if images else nullcontext():
+            load(tmp_path / "a.gltf")
 
 
 def test_headers_of_real_images(shared: Path) -> None:
+    assets = shared / "assets"
+    reading = Reading(assets / "a.gltf", inside(assets))
     found = {
-        path.suffix: image_header.read(path.read_bytes()[: image_header.HEAD_BYTES], path.suffix)
+        path.suffix: reading.image(path, "image")
         for folder in ("hdri", "sponza/textures")
-        for path in sorted((shared / "assets" / folder).iterdir())
+        for path in sorted((assets / folder).iterdir())
         if path.is_file()
     }
     assert {".hdr", ".exr", ".png", ".jpg"} <= set(found)
-    assert (found[".exr"].width, found[".exr"].height, found[".exr"].channels) == (512, 256, 3)
-    assert (found[".hdr"].width, found[".hdr"].height) == (1024, 512)
-    assert all(header.width for header in found.values())
+    assert (found[".exr"].size, found[".exr"].channels) == ((512, 256), 3)
+    assert found[".hdr"].size == (1024, 512)
+    assert all(image.size for image in found.values())
 
 
 BALLOONS = {

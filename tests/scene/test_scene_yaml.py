@@ -11,9 +11,8 @@ import pytest
 
 from rendergraph.errors import InputError
 from rendergraph.resources import shipped_scenes
-from rendergraph.scene.files import SceneLimits
 from rendergraph.scene.load import load
-from rendergraph.scene.model import Scene
+from rendergraph.scene.model import Scene, SceneLimits
 
 EXAMPLE = """
 scene: 1
@@ -141,7 +140,7 @@ WRONG = {
     "objects: {a: }": "2:11: RG321 object 'a' needs either 'shape' or 'file'",
     "objects: {a: {shape: box, file: a.glb}}": "2:11: RG321 object 'a' needs either",
     "objects: {a: {file: a.glb}}": "2:21: RG301 file 'a.glb' does not exist",
-    "objects: {a: {file: a.yaml}}": "2:21: RG303 'a.yaml' is no mesh file",
+    "objects: {a: {file: a.yaml}}": "2:21: RG303 'a.yaml' is not a mesh file",
     "objects: {a: {shape: plane, size: [10, -1]}}": "2:35: RG321 'size' takes 2 numbers above 0, this is [10, -1]",
     "objects: {a: {shape: box, hidden: yes}}": "2:35: RG321 'hidden' takes true or false, this is 'yes'",
     "objects: {a: {shape: box, at: [0, .nan, 0]}}": "RG321 'at' takes 3 numbers, this is [0, nan, 0]",
@@ -167,7 +166,7 @@ WRONG = {
     "keyframes: {camera.m.eye: {0: 1}}": "keyframes name no section 'camera'; did you mean 'cameras'?",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eyes: {0: 1}}": "3:13: RG322 keyframes: cameras have no moving key 'eyes'",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {0: 1}}": "3:32: RG321 'eye' takes 3 numbers, this is 1",
-    "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {a: [1, 2, 3]}}": "'a' is no time in seconds",
+    "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {a: [1, 2, 3]}}": "'a' is not a time in seconds",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {}}": "are empty, not a mapping of seconds to values",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {1: null}}": "keyframe 1 s of 'cameras.m.eye' has no value",
 }

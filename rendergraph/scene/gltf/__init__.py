@@ -1,7 +1,7 @@
 """glTF 2.0 files (.gltf and .glb) as scenes.
 
-Everything in a file is checked, whether its scene uses it or not: `schema` has the JSON as structs, `buffers` the arrays,
-`materials` and `primitives` what they are made into, `reader` the nodes.
+Everything in a file is checked, whether its scene uses it or not: `schema` has the JSON as structs, `buffers` the
+arrays, `materials` and `primitives` the parts of a scene, `reader` its nodes.
 """
 
 from rendergraph.scene.gltf.reader import read_gltf

@@ -24,7 +24,15 @@ _COMPONENTS: dict[int, np.dtype[np.generic]] = {
     5125: np.dtype("<u4"),
     5126: np.dtype("<f4"),
 }
-_SHAPES = {"SCALAR": (1, 1), "VEC2": (1, 2), "VEC3": (1, 3), "VEC4": (1, 4), "MAT2": (2, 2), "MAT3": (3, 3), "MAT4": (4, 4)}
+_SHAPES = {
+    "SCALAR": (1, 1),
+    "VEC2": (1, 2),
+    "VEC3": (1, 3),
+    "VEC4": (1, 4),
+    "MAT2": (2, 2),
+    "MAT3": (3, 3),
+    "MAT4": (4, 4),
+}
 """Columns and rows of an element."""
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 

@@ -130,7 +130,9 @@ class Materials:
             metallic=clamped("metallicFactor", pbr.metallic_factor),
             roughness=clamped("roughnessFactor", pbr.roughness_factor),
             emissive=(r * strength, g * strength, b * strength),
-            occlusion_strength=clamped("strength", material.occlusion_texture.strength if material.occlusion_texture else 1.0),
+            occlusion_strength=clamped(
+                "strength", material.occlusion_texture.strength if material.occlusion_texture else 1.0
+            ),
             normal_scale=material.normal_texture.scale if material.normal_texture else 1.0,
             alpha_mode="mask" if mode == "MASK" else "blend" if mode == "BLEND" else "opaque",
             alpha_cutoff=max(0.0, material.alpha_cutoff),

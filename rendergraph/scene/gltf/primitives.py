@@ -131,8 +131,9 @@ class Primitives:
         if not accessor.min or not accessor.max or accessor.component_type != 5126:
             return
         slack = 1e-4 * max(1e-30, float(np.abs(positions).max()))
+        least, most = np.array(accessor.min, np.float32) - slack, np.array(accessor.max, np.float32) + slack
         low, high = extremes(positions)
-        if (low < np.float32(accessor.min) - slack).any() or (high > np.float32(accessor.max) + slack).any():
+        if (low < least).any() or (high > most).any():
             text = f"accessors[{number}]: positions exceed 'min' or 'max'; the data is used"
             self._reading.warn("RG332", "bounds", text)
 

@@ -11,7 +11,7 @@ from rendergraph.nodes.shadows._light_views import light_views
 import rendergraph as rg
 from rendergraph.api import projection
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 
 Floats = npt.NDArray[np.float64]
 SIZE = (96, 72)

@@ -16,7 +16,7 @@ from rendergraph.nodes.shadows._light_views import light_views
 import rendergraph as rg
 from rendergraph.resources import folder
 from rendergraph.scene.cameras import view_matrices
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 
 Floats = npt.NDArray[np.float64]
 SHADERS = folder("rendergraph.shaders") / "shadows"

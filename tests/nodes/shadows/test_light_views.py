@@ -15,7 +15,7 @@ from rendergraph.nodes.shadows.shadow_map import ShadowMapNode
 from rendergraph.api import SceneError
 from rendergraph.api.projection import box_corners, look_at, visible_part
 from rendergraph.scene.cameras import projection_matrix
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Camera, Light, Mesh, Object, Scene
 from rendergraph.steps import ViewMatrices
 

@@ -16,7 +16,7 @@ from rendergraph.nodes.shadows.shadow_cascaded import ShadowCascaded
 
 import rendergraph as rg
 from rendergraph.api import ViewMatrices, projection
-from rendergraph.scene.frame_scene import FrameScene
+from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Scene
 
 Floats = npt.NDArray[np.float64]

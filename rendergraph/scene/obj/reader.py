@@ -16,13 +16,11 @@ import numpy.typing as npt
 
 from rendergraph.document import shown
 from rendergraph.projection import unit
-from rendergraph.scene.files import Reading, UniqueNames, named
-from rendergraph.scene.geometry import Doubles, face_normals, mean_normals
+from rendergraph.scene.geometry import MOST_CORNERS, Doubles, face_normals, mean_normals, newell, triangulate
 from rendergraph.scene.model import Floats, Material, Mesh, Object, Scene
-from rendergraph.scene.mtl import read_mtl
-from rendergraph.scene.obj_block import ABSENT, Ints
-from rendergraph.scene.obj_text import Statements, statements
-from rendergraph.scene.polygons import MOST_CORNERS, newell, triangulate
+from rendergraph.scene.obj.mtl import read_mtl
+from rendergraph.scene.obj.parser import ABSENT, Ints, Statements, parse
+from rendergraph.scene.reading import Reading, UniqueNames, printable
 
 _DEFAULT = "default"
 _MOST_LIBRARIES = 256
@@ -34,26 +32,26 @@ def read_obj(path: Path, reading: Reading) -> Scene:
     Raises:
         InputError: the file is missing or malformed, an index out of range, a vertex not finite, or a limit passed.
     """
-    found = statements(reading.read(path, "scene file"), reading)
-    _check_indices(found, reading)
-    library = _libraries(found, reading)
-    if not len(found.sizes):
-        reading.warn("RG332", "empty", "holds no face; nothing is drawn")
+    parsed = parse(reading.read(path, "scene file"), reading)
+    _check_indices(parsed, reading)
+    library = _libraries(parsed, reading)
+    if not len(parsed.sizes):
+        reading.warn("RG332", "empty", "contains no face; nothing is drawn")
         return Scene(path.stem, path)
     try:
-        places, faces = triangulate(found.positions, found.corners[:, 0], found.sizes)
+        places, faces = triangulate(parsed.positions, parsed.corners[:, 0], parsed.sizes)
     except ValueError as problem:
-        line = int(found.lines[problem.args[0]])
+        line = int(parsed.lines[problem.args[0]])
         text = f"a concave face has more than {MOST_CORNERS} corners; cut it into smaller ones"
         raise reading.error("RG307", text, line=line) from None
-    distinct = _distinct(found.corners[:, 0][places])
+    distinct = _distinct(parsed.corners[:, 0][places])
     if not distinct.all():
-        line = int(found.lines[faces[np.flatnonzero(~distinct)[0]]])
+        line = int(parsed.lines[faces[np.flatnonzero(~distinct)[0]]])
         number = int((~distinct).sum())
         reading.warn("RG332", "degenerate", f"{number} triangles with a repeated corner are left out", line=line)
         places, faces = places[distinct], faces[distinct]
-    normals, normal_of = _normals(found, reading)
-    return _assemble(path, found, library, places, faces, normals, normal_of, reading)
+    normals, normal_of = _normals(parsed, reading)
+    return _assemble(path, parsed, library, places, faces, normals, normal_of, reading)
 
 
 def _distinct(triangles: Ints) -> npt.NDArray[np.bool_]:
@@ -62,30 +60,34 @@ def _distinct(triangles: Ints) -> npt.NDArray[np.bool_]:
     return result
 
 
-def _check_indices(found: Statements, reading: Reading) -> None:
+def _check_indices(parsed: Statements, reading: Reading) -> None:
     for column, (count, what) in enumerate(
-        ((len(found.positions), "vertices"), (len(found.uvs), "texture coordinates"), (len(found.normals), "normals"))
+        (
+            (len(parsed.positions), "vertices"),
+            (len(parsed.uvs), "texture coordinates"),
+            (len(parsed.normals), "normals"),
+        )
     ):
-        values = found.corners[:, column]
+        values = parsed.corners[:, column]
         wrong = ((values < 0) | (values >= count)) & (values != ABSENT)
         if wrong.any():
             corner = int(np.flatnonzero(wrong)[0])
-            face = int(np.searchsorted(np.cumsum(found.sizes), corner, side="right"))
+            face = int(np.searchsorted(np.cumsum(parsed.sizes), corner, side="right"))
             index = int(values[corner])
             text = f"index {index + 1 if index >= 0 else index - count} is out of range; there are {count} {what}"
-            raise reading.error("RG305", text, line=int(found.lines[face]))
+            raise reading.error("RG305", text, line=int(parsed.lines[face]))
 
 
-def _libraries(found: Statements, reading: Reading) -> dict[str, Material]:
+def _libraries(parsed: Statements, reading: Reading) -> dict[str, Material]:
     """Materials of every `mtllib`; a missing library is a warning."""
     library: dict[str, Material] = {}
-    if len(found.libraries) > _MOST_LIBRARIES:
+    if len(parsed.libraries) > _MOST_LIBRARIES:
         raise reading.error("RG307", f"names more than {_MOST_LIBRARIES} material libraries")
-    for text, line in found.libraries:
-        whole = reading.beside_if_there(text, line=line)
+    for text, line in parsed.libraries:
+        whole = reading.find(text, line=line)
         names = [text] if whole is not None else re.split(r"\s+(?=\S)", text)
         for name in names:
-            path = whole or reading.beside_if_there(name.replace("\\", "/"), line=line)
+            path = whole or reading.find(name.replace("\\", "/"), line=line)
             if path is not None:
                 library |= {key: value for key, value in read_mtl(path, reading).items() if key not in library}
             else:
@@ -94,11 +96,11 @@ def _libraries(found: Statements, reading: Reading) -> dict[str, Material]:
     return library
 
 
-def _normals(found: Statements, reading: Reading) -> tuple[Doubles, Ints]:
+def _normals(parsed: Statements, reading: Reading) -> tuple[Doubles, Ints]:
     """Unit normals, and which one each corner has: the file's, or computed ones behind them."""
-    normals = unit(found.normals)
-    corner_face = np.repeat(np.arange(len(found.sizes)), found.sizes)
-    chosen = found.corners[:, 2].copy()
+    normals = unit(parsed.normals)
+    corner_face = np.repeat(np.arange(len(parsed.sizes)), parsed.sizes)
+    chosen = parsed.corners[:, 2].copy()
     used = chosen[chosen != ABSENT]
     zero = np.asarray(~normals.any(axis=1))
     if used.size and zero[used].any():
@@ -108,13 +110,13 @@ def _normals(found: Statements, reading: Reading) -> tuple[Doubles, Ints]:
     lacking = chosen == ABSENT
     if not lacking.any():
         return normals, chosen
-    faces = _polygon_normals(found)
+    faces = _polygon_normals(parsed)
     corners = np.flatnonzero(lacking)
-    face, vertex = corner_face[corners], found.corners[corners, 0]
-    group = found.states[face, 2]
-    flat = (group == 0) & found.smoothed
+    face, vertex = corner_face[corners], parsed.corners[corners, 0]
+    group = parsed.states[face, 2]
+    flat = (group == 0) & parsed.has_smoothing
     # Flat corners share one normal for each face; smooth ones one for each vertex, smoothing group and object.
-    key = np.stack([np.where(flat, -1 - face, vertex), group, found.states[face, 0]], axis=1)
+    key = np.stack([np.where(flat, -1 - face, vertex), group, parsed.states[face, 0]], axis=1)
     vertices = _numbered(key)
     mean = mean_normals(faces, vertices, face, int(vertices.max()) + 1)
     mean[~mean.any(axis=1)] = (0.0, 0.0, 1.0)
@@ -122,17 +124,17 @@ def _normals(found: Statements, reading: Reading) -> tuple[Doubles, Ints]:
     return np.concatenate([normals, mean]), chosen
 
 
-def _polygon_normals(found: Statements) -> Doubles:
+def _polygon_normals(parsed: Statements) -> Doubles:
     """Unit normals of whole polygons, however they are cut."""
-    result = np.zeros((len(found.sizes), 3))
-    starts = np.cumsum(found.sizes) - found.sizes
-    for size in np.unique(found.sizes):
-        rows = np.flatnonzero(found.sizes == size)
-        corners = found.corners[:, 0][starts[rows, None] + np.arange(size)]
+    result = np.zeros((len(parsed.sizes), 3))
+    starts = np.cumsum(parsed.sizes) - parsed.sizes
+    for size in np.unique(parsed.sizes):
+        rows = np.flatnonzero(parsed.sizes == size)
+        corners = parsed.corners[:, 0][starts[rows, None] + np.arange(size)]
         if size == 3:
-            result[rows] = face_normals(found.positions, corners)
+            result[rows] = face_normals(parsed.positions, corners)
         else:
-            points = found.positions[corners]
+            points = parsed.positions[corners]
             result[rows] = unit(newell(points - points[:, :1]))
     return result
 
@@ -150,7 +152,7 @@ def _numbered(columns: Ints) -> Ints:
 
 def _assemble(
     path: Path,
-    found: Statements,
+    parsed: Statements,
     library: dict[str, Material],
     places: Ints,
     faces: Ints,
@@ -159,19 +161,21 @@ def _assemble(
     reading: Reading,
 ) -> Scene:
     """Objects and meshes: one for each object, group and material, in the order of first use."""
-    states = found.states[faces][:, [0, 1, 3]]
+    states = parsed.states[faces][:, [0, 1, 3]]
     part, owners = _in_order(_numbered(states), states)
     if len(owners) > reading.limits.objects:
         raise reading.over(f"has {len(owners):,} objects", "objects")
     corners, corner_part = places.reshape(-1), np.repeat(part, 3)
-    uv = found.corners[corners, 1]
-    key = np.stack([corner_part, found.corners[corners, 0], np.where(uv == ABSENT, -1, uv), normal_of[corners]], axis=1)
+    uv = parsed.corners[corners, 1]
+    key = np.stack(
+        [corner_part, parsed.corners[corners, 0], np.where(uv == ABSENT, -1, uv), normal_of[corners]], axis=1
+    )
     vertex = _numbered(key)  # keeps the order of its first column: the vertices of a part lie behind each other
     count = int(vertex.max(initial=-1)) + 1
     if count > reading.limits.vertices:
         raise reading.over(f"has {count:,} vertices", "vertices")
     key = key[_firsts(vertex, count)]
-    columns = _Columns(found, key, normals, reading)
+    columns = _Columns(parsed, key, normals, reading)
     vertex_starts = np.searchsorted(key[:, 0], np.arange(len(owners) + 1))
     order = np.argsort(part, kind="stable")
     triangles = vertex.reshape(-1, 3)[order]
@@ -179,16 +183,16 @@ def _assemble(
     names, parts_of = UniqueNames(), Counter[str]()
     materials: dict[str, tuple[int, Material]] = {}
     meshes, objects = [], []
-    for k, (node, hidden, casts) in enumerate(_owners(found, owners)):
-        word = found.names[3][owners[k, 2]]
+    for k, (node, hidden, casts) in enumerate(_owners(parsed, owners)):
+        word = parsed.names[3][owners[k, 2]]
         if word not in materials:
-            materials[word] = (len(materials), _material(word, library, found, reading))
+            materials[word] = (len(materials), _material(word, library, parsed, reading))
         a, b = int(vertex_starts[k]), int(vertex_starts[k + 1])
         indices = (triangles[triangle_starts[k] : triangle_starts[k + 1]] - a).astype(np.uint32)
         name = names.unique(f"{node}#{parts_of[node]}" if parts_of[node] else node, "object")
         parts_of[node] += 1
         meshes.append(columns.mesh(name, a, b, indices))
-        reading.say_unmapped(name, materials[word][1], meshes[-1])
+        reading.warn_unmapped(name, materials[word][1], meshes[-1])
         objects.append(Object(name, k, materials[word][0], np.eye(4), casts, hidden, node))
     listed = tuple(material for _, material in materials.values())
     return Scene(path.stem, path, tuple(objects), tuple(meshes), listed, warnings=reading.warnings)
@@ -210,7 +214,7 @@ def _in_order(part: Ints, states: Ints) -> tuple[Ints, Ints]:
     return rank[part], states[first[order]]
 
 
-def _owners(found: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
+def _owners(parsed: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
     """For each part its node's name, whether it is hidden, and whether it casts shadows.
 
     The name is the object's, or the group's where there is no object; an object of several groups gives `object/group`.
@@ -220,7 +224,7 @@ def _owners(found: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
         groups.setdefault(number, set()).add(group)
     result = []
     for number, group, _ in owners.tolist():
-        words = [named(found.names[0][number]), named(found.names[1][group])]
+        words = [printable(parsed.names[0][number]), printable(parsed.names[1][group])]
         given = [word for word in words if word]
         node = words[0] if words[0] and len(groups[number]) == 1 else "/".join(given)
         casts = not any(word.endswith("NS") for word in given)
@@ -228,30 +232,30 @@ def _owners(found: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
     return result
 
 
-def _material(word: str, library: dict[str, Material], found: Statements, reading: Reading) -> Material:
-    if named(word) in library:
-        return library[named(word)]
+def _material(word: str, library: dict[str, Material], parsed: Statements, reading: Reading) -> Material:
+    if printable(word) in library:
+        return library[printable(word)]
     if word:
-        kind = f"usemtl {word}" if found.libraries else "usemtl"  # where none is named, once for all
+        kind = f"usemtl {word}" if parsed.libraries else "usemtl"  # where none is named, once for all
         text = f"material '{shown(word)}' is in no material library; it is the default one"
         reading.warn("RG330", kind, text)
-    return Material(named(word) or _DEFAULT, base_color=(0.8, 0.8, 0.8, 1.0))
+    return Material(printable(word) or _DEFAULT, base_color=(0.8, 0.8, 0.8, 1.0))
 
 
 class _Columns:
     """The attributes of all vertices, to be cut into meshes; NaN where a vertex lacks one."""
 
-    def __init__(self, found: Statements, key: Ints, normals: Doubles, reading: Reading) -> None:
+    def __init__(self, parsed: Statements, key: Ints, normals: Doubles, reading: Reading) -> None:
         place, uv, normal = key[:, 1], key[:, 2], key[:, 3]
-        self.positions = found.positions[place].astype(np.float32)
+        self.positions = parsed.positions[place].astype(np.float32)
         self.normals = normals[normal].astype(np.float32)
         self.uvs: Floats | None = None
         self.colors: Floats | None = None
         if (uv >= 0).any():
-            self.uvs = (found.uvs[uv] * (1, -1) + (0, 1)).astype(np.float32)
+            self.uvs = (parsed.uvs[uv] * (1, -1) + (0, 1)).astype(np.float32)
             self.uvs[uv < 0] = np.nan
-        if not np.isnan(found.colors).all():
-            colors = found.colors[place]
+        if not np.isnan(parsed.colors).all():
+            colors = parsed.colors[place]
             if ((colors < 0) | (colors > 1)).any():
                 reading.warn("RG332", "colors", "vertex colours outside 0 to 1 are clamped")
             self.colors = np.ones((len(place), 4), np.float32)

@@ -16,11 +16,10 @@ from msgspec.structs import replace
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import Key, Walk, plain
-from rendergraph.scene import scene_build, scene_keys
+from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.environments import named
-from rendergraph.scene.files import Reading
 from rendergraph.scene.geometry import rigid
-from rendergraph.scene.meshes import MESHES, read_mesh
+from rendergraph.scene.load import MESHES, read_mesh
 from rendergraph.scene.model import (
     Camera,
     Environment,
@@ -33,6 +32,7 @@ from rendergraph.scene.model import (
     Scene,
     Texture,
 )
+from rendergraph.scene.reading import Reading
 from rendergraph.scene.shapes import SHAPES, ShapePart, build
 
 _DEFAULT = Material("default", base_color=(0.8, 0.8, 0.8, 1.0))
@@ -143,13 +143,13 @@ class _Reader:
                     textures[slot] = Texture(image, slot in _SRGB)
         self.recipe["materials", name] = values
         self.made.numbers[name] = len(self.made.materials)
-        self.made.materials.append(scene_build.material(name, values, textures))
+        self.made.materials.append(scene_values.material(name, values, textures))
 
     def _image(self, entry: Value, key: str, name: str) -> Any:
         place = entry.get(key)
         assert place is not None  # its value was just read
         try:
-            return self.reading.image(self.reading.beside(name, line=place.line), "image", line=place.line)
+            return self.reading.image(self.reading.resolve(name, line=place.line), "image", line=place.line)
         except InputError as problem:
             self._take(problem, place)
             return None
@@ -166,7 +166,7 @@ class _Reader:
         self.recipe["lights", name] = values
         if "type" in values:
             try:
-                self.made.lights.append(scene_build.light(name, values))
+                self.made.lights.append(scene_values.light(name, values))
             except ValueError as problem:
                 self.walk.say(entry, "RG321", f"light '{shown(name)}': {problem}", key=True)
 
@@ -174,10 +174,10 @@ class _Reader:
         values = plain(entry, scene_keys.CAMERA)
         self.recipe["cameras", name] = values
         try:
-            self.made.cameras[name] = scene_build.camera(name, values)
+            self.made.cameras[name] = scene_values.camera(name, values)
         except ValueError as problem:
             self.walk.say(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
-            self.made.cameras[name] = scene_build.camera(name, {})
+            self.made.cameras[name] = scene_values.camera(name, {})
 
     def _orbit(self, entry: Value | None) -> Orbit | None:
         if entry is None or entry.data is None:
@@ -200,9 +200,9 @@ class _Reader:
         try:
             found = named(values["file"], self.made.lights, values)
             if found is None:
-                path = self.reading.beside(values["file"], line=place.line)
-                image, header = self.reading.image_with_header(path, "image", line=place.line)
-                found = Environment(image, header.size)
+                path = self.reading.resolve(values["file"], line=place.line)
+                image = self.reading.image(path, "image", line=place.line)
+                found = Environment(image, image.size)
         except InputError as problem:
             self._take(problem, place)
             return None
@@ -241,7 +241,7 @@ class _Reader:
             made.shapes[key] = len(made.meshes), parts
             made.meshes.append(parts[0].mesh)  # all parts of a shape share it
         mesh, parts = made.shapes[key]
-        world, base = scene_build.placed(values), self._material_index(values.get("material"))
+        world, base = scene_values.placed(values), self._material_index(values.get("material"))
         placed = []
         for part in parts:
             material = base
@@ -272,7 +272,7 @@ class _Reader:
         except InputError as problem:
             self._take(problem, place)
             return
-        made, scene, world = self.made, found.scene, scene_build.placed(values)
+        made, scene, world = self.made, found.scene, scene_values.placed(values)
         overrides = self._overrides(_entries(entry, "overrides"), name, scene, materials)
         objects, lights, cameras = [], [], []
         for part in scene.objects:
@@ -291,9 +291,9 @@ class _Reader:
                 )
             )
         for light in scene.lights:
-            local = scene_build.light_matrix(light)
+            local = scene_values.light_matrix(light)
             lights.append((len(made.lights), local))
-            made.lights.append(scene_build.moved_light(replace(light, name=f"{name}/{light.name}"), world @ local))
+            made.lights.append(scene_values.moved_light(replace(light, name=f"{name}/{light.name}"), world @ local))
         for camera in scene.cameras.values():
             word = f"{name}/{camera.name}"
             cameras.append((word, camera.transform))
@@ -302,13 +302,13 @@ class _Reader:
         self._count_objects(entry)
 
     def _read_file(self, name: str, file: str, place: Value) -> _File:
-        path = self.reading.beside(file, line=place.line)
+        path = self.reading.resolve(file, line=place.line)
         if path in self.made.files:
             return self.made.files[path]
         if path.suffix.lower() in MESHES:
-            self.reading.exists(path, "file")
+            self.reading.check_file(path, "file")
         inner = Reading(path, self.reading.check_path, self.reading.limits, self.reading.extensions)
-        unknown = Problem("RG303", f"'{shown(file)}' is no mesh file; a mesh ends in")
+        unknown = Problem("RG303", f"'{shown(file)}' is not a mesh file; a mesh ends in")
         scene = read_mesh(path, inner, unknown)
         self.reading.add_warnings(inner.warnings)
         made = self.made
@@ -355,9 +355,8 @@ class _Reader:
             frames = []
             for time, value in entry.items():
                 if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
-                    self.walk.say(
-                        value, "RG321", f"keyframes of '{shown(path)}': '{shown(time)}' is no time in seconds", key=True
-                    )
+                    text = f"keyframes of '{shown(path)}': '{shown(time)}' is not a time in seconds"
+                    self.walk.say(value, "RG321", text, key=True)
                     continue
                 if value.data is None:
                     self.walk.say(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")

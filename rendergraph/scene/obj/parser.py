@@ -1,22 +1,23 @@
-"""One block of lines of an OBJ file: words are found, lines sorted by statement, each kind parsed at once.
+"""The statements of an OBJ file as arrays, parsed in blocks of lines.
 
-Vertices and faces are turned into numbers by one vectorised parse; lines that this cannot take are halved until the one
-with the mistake is found.
+In a block the words are found, lines sorted by statement, and each kind is parsed at once: vertices and faces become
+numbers by one vectorised call. Lines that it cannot take are halved until the one with the mistake is found.
 """
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct, field
 
 from rendergraph.document import shown
-from rendergraph.scene.files import Reading
 from rendergraph.scene.model import FARTHEST
+from rendergraph.scene.reading import Reading
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -24,31 +25,95 @@ Bytes = npt.NDArray[np.uint8]
 
 ABSENT = 9_999_999_999
 """Stands for a texture coordinate or normal that a corner does not have."""
-_ARRAYS = (b"v", b"vt", b"vn", b"f")
+_BLOCK_BYTES = 8 << 20  # large enough that a call for each costs nothing, small enough for the memory of its word table
 _STATES = (b"o", b"g", b"s", b"usemtl")
 _SILENT = (b"vp", b"mg", b"lod", b"bevel", b"c_interp", b"d_interp", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
 _CORNER = re.compile(rb"[-+]?[0-9]+(/([-+]?[0-9]+)?(/([-+]?[0-9]+)?)?)?\Z")
 _BLANKS = np.zeros(256, bool)
 _BLANKS[[9, 11, 12, 13, 32]] = True
+_COLUMNS: dict[str, npt.NDArray[Any]] = {
+    "positions": np.zeros((0, 3)),
+    "colors": np.zeros((0, 3)),
+    "uvs": np.zeros((0, 2)),
+    "normals": np.zeros((0, 3)),
+    "corners": np.zeros((0, 3), np.int64),
+    "sizes": np.zeros(0, np.int64),
+    "lines": np.zeros(0, np.int64),
+    "states": np.zeros((0, 4), np.int64),
+}
 
 
-@dataclass
-class Growing:
-    """What has been read so far; state words are numbered as they come."""
+class Statements(Struct, eq=False):
+    """The content of an OBJ file.
 
-    positions: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
-    colors: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
-    uvs: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 2))])
-    normals: list[Doubles] = field(default_factory=lambda: [np.zeros((0, 3))])
-    corners: list[Ints] = field(default_factory=lambda: [np.zeros((0, 3), np.int64)])
-    sizes: list[Ints] = field(default_factory=lambda: [np.zeros(0, np.int64)])
-    lines: list[Ints] = field(default_factory=lambda: [np.zeros(0, np.int64)])
-    states: list[Ints] = field(default_factory=lambda: [np.zeros((0, 4), np.int64)])
+    Attributes:
+        positions: (v, 3); `colors` (v, 3), NaN if a vertex has none.
+        uvs: (t, 2) as written, v upwards.
+        normals: (n, 3).
+        corners: (c, 3) position, texture coordinate and normal of each corner, from 0, `ABSENT` if there is none.
+        sizes: corners of each face; `lines` its line.
+        states: for each face, columns object, group, smoothing group and material as numbers into `names`.
+        names: the words behind the numbers; smoothing groups are kept as they are, 0 for off.
+        libraries: `mtllib` arguments with their lines.
+        has_smoothing: whether there is an `s` statement at all.
+    """
+
+    positions: Doubles
+    colors: Doubles
+    uvs: Doubles
+    normals: Doubles
+    corners: Ints
+    sizes: Ints
+    lines: Ints
+    states: Ints
+    names: list[list[str]]
+    libraries: list[tuple[str, int]]
+    has_smoothing: bool
+
+
+class _Parsed(Struct):
+    """The statements so far, an array for each block; state words are numbered as they come."""
+
+    columns: dict[str, list[npt.NDArray[Any]]] = field(default_factory=lambda: {k: [v] for k, v in _COLUMNS.items()})
     counts: list[int] = field(default_factory=lambda: [0, 0, 0])
     numbers: tuple[dict[str, int], ...] = field(default_factory=lambda: ({"": 0}, {"": 0}, {"": 0}, {"": 0}))
     current: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
     libraries: dict[str, int] = field(default_factory=dict)
-    smoothed: bool = False
+    has_smoothing: bool = False
+
+
+def parse(data: bytes, reading: Reading, block_bytes: int = _BLOCK_BYTES) -> Statements:
+    """Parse a whole file.
+
+    Raises:
+        InputError: a statement is malformed, a number not finite, or a limit exceeded.
+    """
+    if data.startswith(b"\xef\xbb\xbf"):
+        data = data[3:]
+    if b"\0" in data[:4096]:
+        raise reading.error("RG303", "is not an OBJ text: it contains zero bytes")
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
+    parsed = _Parsed()
+    for block, first_line in _blocks(data, block_bytes):
+        _Block(block, first_line, parsed, reading).read()
+    arrays: dict[str, Any] = {name: np.concatenate(parts) for name, parts in parsed.columns.items()}
+    names, libraries = [list(table) for table in parsed.numbers], list(parsed.libraries.items())
+    return Statements(**arrays, names=names, libraries=libraries, has_smoothing=parsed.has_smoothing)
+
+
+def _blocks(data: bytes, block_bytes: int) -> Iterator[tuple[bytes, int]]:
+    """Blocks that end at a line's end, with their first line's number."""
+    at, line = 0, 1
+    while at < len(data):
+        end = data.find(b"\n", min(len(data), at + block_bytes))
+        while end > 0 and (data[end - 1 : end] == b"\\" or data[end - 2 : end] == b"\\\r"):
+            end = data.find(b"\n", end + 1)
+        end = len(data) if end < 0 else end + 1
+        block = data[at:end]
+        yield block, line
+        line += block.count(b"\n")
+        at = end
 
 
 def text_of(raw: bytes) -> str:
@@ -59,11 +124,11 @@ def text_of(raw: bytes) -> str:
         return raw.decode("latin-1")
 
 
-class Block:
+class _Block:
     """One block of lines: finds words, sorts lines by statement, and parses each kind at once."""
 
-    def __init__(self, block: bytes, first_line: int, grown: Growing, reading: Reading) -> None:
-        self.grown, self.reading, self.first_line = grown, reading, first_line
+    def __init__(self, block: bytes, first_line: int, parsed: _Parsed, reading: Reading) -> None:
+        self.parsed, self.reading, self.first_line = parsed, reading, first_line
         self.original = block
         self._newlines: Ints | None = None
         if b"\\" in block:  # a continued line becomes one; byte offsets, and so line numbers, stay
@@ -99,29 +164,31 @@ class Block:
         return np.searchsorted(self._newlines, offsets)
 
     def read(self) -> None:
-        """Add everything in the block to what is grown."""
+        """Add everything in the block to what is parsed."""
         kinds = self._kinds()
         rows = [np.flatnonzero(kinds == kind) for kind in range(4)]
         limit = self.reading.limits.vertices
         for kind, what in enumerate(("positions", "texture coordinates", "normals")):
-            if self.grown.counts[kind] + len(rows[kind]) > limit:
+            if self.parsed.counts[kind] + len(rows[kind]) > limit:
                 raise self.reading.over(f"more than {limit:,} {what}", "vertices")
         self._faces(rows, kinds)
         self._vertices(rows[0])
-        for kind, least, target in ((1, 1, self.grown.uvs), (2, 3, self.grown.normals)):
+        for kind, name, least, width in ((1, "uvs", 1, 2), (2, "normals", 3, 3)):
             if len(rows[kind]):
                 values, counts, at = self._numbers(rows[kind], least, 3)
-                width = 2 if kind == 1 else 3
                 table = np.zeros((len(rows[kind]), width))
                 for column in range(width):
                     has = counts > column
                     table[has, column] = values[at[has] + column]
-                target.append(table)
+                self._add(name, table)
         for kind in range(3):
-            self.grown.counts[kind] += len(rows[kind])
+            self.parsed.counts[kind] += len(rows[kind])
+
+    def _add(self, name: str, values: npt.NDArray[Any]) -> None:
+        self.parsed.columns[name].append(values)
 
     def _kinds(self) -> npt.NDArray[np.int8]:
-        """For each line its place in `_ARRAYS`, 4 for a change of state or library, -1 for nothing to read."""
+        """For each line 0 to 3 for v, vt, vn and f, 4 for a change of state, -1 if there is nothing to read."""
         kinds = np.full(len(self.starts), -1, np.int8)
         used = np.flatnonzero(self.word_counts)
         first = self.first_word[used]
@@ -146,7 +213,7 @@ class Block:
         if word in _STATES:
             return 4
         if word == b"mtllib":
-            self.grown.libraries.setdefault(text_of(self._rest(row)), self.line(row))
+            self.parsed.libraries.setdefault(text_of(self._rest(row)), self.line(row))
         elif word in (b"l", b"p"):
             what = "lines" if word == b"l" else "points"
             self.reading.warn("RG333", what, f"{what} are left out; only faces are drawn", line=self.line(row))
@@ -195,7 +262,7 @@ class Block:
         for row in rows[(counts < least) | (counts > most)][:1]:
             name = text_of(self.block[self.words[self.first_word[row]] : self.word_ends[self.first_word[row]]])
             count = self.word_counts[row] - 1
-            raise self._wrong(int(row), f"'{name}' takes {least} to {most} numbers, here are {count}")
+            raise self._wrong(int(row), f"'{name}' takes {least} to {most} numbers, got {count}")
         values = self._parse(self._text(rows), np.float64, int(counts.sum()))
         if values is None:
             row = self._first_bad(
@@ -206,8 +273,8 @@ class Block:
             )
             for word in self._rest(row).split():
                 if self._parse(word, np.float64, 1) is None:
-                    raise self._wrong(row, f"'{shown(text_of(word), 30)}' is no number")
-            raise self._wrong(row, "its numbers cannot be told apart")
+                    raise self._wrong(row, f"'{shown(text_of(word), 30)}' is not a number")
+            raise self._wrong(row, "its numbers cannot be separated")
         at = np.cumsum(counts) - counts
         bad = ~(np.abs(values) <= FARTHEST)
         if bad.any():
@@ -234,13 +301,13 @@ class Block:
             return
         values, counts, at = self._numbers(rows, 3, 7)
         for row in rows[counts == 5][:1]:
-            raise self._wrong(int(row), "'v' takes 3, 4, 6 or 7 numbers, here are 5")
-        self.grown.positions.append(values[at[:, None] + np.arange(3)])
+            raise self._wrong(int(row), "'v' takes 3, 4, 6 or 7 numbers, got 5")
+        self._add("positions", values[at[:, None] + np.arange(3)])
         colors = np.full((len(rows), 3), np.nan)
         colored = counts >= 6
         if colored.any():
             colors[colored] = values[(at + counts - 3)[colored, None] + np.arange(3)]
-        self.grown.colors.append(colors)
+        self._add("colors", colors)
 
     # Faces ------------------------------------------------------------------------------------------------------------
 
@@ -251,9 +318,9 @@ class Block:
             return
         sizes = self.word_counts[faces] - 1
         for row in faces[sizes < 3][:1]:
-            raise self._wrong(int(row), f"a face takes at least 3 corners, here are {self.word_counts[row] - 1}")
+            raise self._wrong(int(row), f"a face takes at least 3 corners, got {self.word_counts[row] - 1}")
         corners = self._corners(faces, sizes)
-        seen = np.stack([np.cumsum(kinds == kind)[faces] + self.grown.counts[kind] for kind in range(3)], axis=1)
+        seen = np.stack([np.cumsum(kinds == kind)[faces] + self.parsed.counts[kind] for kind in range(3)], axis=1)
         seen = np.repeat(seen, sizes, axis=0)
         zero = corners == 0
         if zero.any():
@@ -261,10 +328,10 @@ class Block:
             line = self.line(int(faces[face]))
             raise self.reading.error("RG305", "index 0 is out of range; indices start at 1", line=line)
         corners = np.where(corners < 0, corners + seen, np.where(corners == ABSENT, ABSENT, corners - 1))
-        self.grown.corners.append(corners)
-        self.grown.sizes.append(sizes.astype(np.int64))
-        self.grown.lines.append(self.lines_before(self.starts[faces]) + self.first_line)
-        self.grown.states.append(states)
+        self._add("corners", corners)
+        self._add("sizes", sizes.astype(np.int64))
+        self._add("lines", self.lines_before(self.starts[faces]) + self.first_line)
+        self._add("states", states)
 
     def _corners(self, faces: Ints, sizes: Ints) -> Ints:
         """Indices of every corner as written, `ABSENT` for missing ones."""
@@ -292,25 +359,25 @@ class Block:
         row = self._first_bad(faces, good)
         for word in self._rest(row).split():
             if not _CORNER.match(word):
-                raise self._wrong(row, f"'{shown(text_of(word), 40)}' is no corner; write v, v/vt, v//vn or v/vt/vn")
-        raise self._wrong(row, "its corners cannot be told apart")
+                raise self._wrong(row, f"'{shown(text_of(word), 40)}' is not a corner; write v, v/vt, v//vn or v/vt/vn")
+        raise self._wrong(row, "its corners cannot be separated")
 
     def _states(self, faces: Ints, changes: Ints) -> Ints:
         """Numbers of object, group, smoothing group and material in force at each face."""
-        grown = self.grown
-        table = [list(grown.current)]
+        parsed = self.parsed
+        table = [list(parsed.current)]
         for row in changes:
             start, end = self.words[self.first_word[row]], self.word_ends[self.first_word[row]]
             column = _STATES.index(self.block[start:end])
             name = text_of(self._rest(int(row)))
             if column == 2:
-                grown.smoothed = True
+                parsed.has_smoothing = True
                 name = "" if name.lower() in ("off", "0") else name
-            numbers = grown.numbers[column]
-            grown.current[column] = numbers.setdefault(name, len(numbers))
+            numbers = parsed.numbers[column]
+            parsed.current[column] = numbers.setdefault(name, len(numbers))
             if column == 0:  # a new object starts without a group
-                grown.current[1] = 0
-            table.append(list(grown.current))
+                parsed.current[1] = 0
+            table.append(list(parsed.current))
         return np.array(table, np.int64)[np.searchsorted(changes, faces)]
 
 

@@ -13,10 +13,10 @@ from typing import Any
 
 from rendergraph.document import shown
 from rendergraph.errors import InputError
-from rendergraph.scene.files import Reading, named
 from rendergraph.scene.model import Material, Texture, Vec3
-from rendergraph.scene.obj_block import text_of
+from rendergraph.scene.obj.parser import text_of
 from rendergraph.scene.phong import dielectric_f0, roughness_of
+from rendergraph.scene.reading import Reading, printable
 
 _MAPS = {
     b"map_kd": "base_color",
@@ -29,34 +29,17 @@ _MAPS = {
     b"map_pr": "roughness",
     b"map_pm": "metallic",
 }
-_NUMBERS = {
-    b"ns": "Ns",
-    b"ni": "Ni",
-    b"d": "d",
-    b"tr": "Tr",
-    b"illum": "illum",
-    b"pr": "Pr",
-    b"pm": "Pm",
-    b"aniso": "aniso",
-    b"anisor": "anisor",
-}
-_COLORS = {b"ka": "Ka", b"kd": "Kd", b"ks": "Ks", b"ke": "Ke"}
+_NUMBERS = {name.lower().encode(): name for name in ("Ns", "Ni", "d", "Tr", "illum", "Pr", "Pm", "aniso", "anisor")}
+_COLORS = {name.lower().encode(): name for name in ("Ka", "Kd", "Ks", "Ke")}
 _SILENT = (b"tf", b"ps", b"pc", b"pcr", b"sharpness", b"map_aat")
 _OPTIONS = {
-    b"-bm": 1,
-    b"-blendu": 1,
-    b"-blendv": 1,
-    b"-boost": 1,
-    b"-cc": 1,
-    b"-clamp": 1,
-    b"-imfchan": 1,
-    b"-texres": 1,
-    b"-type": 1,
+    **dict.fromkeys(
+        (b"-bm", b"-blendu", b"-blendv", b"-boost", b"-cc", b"-clamp", b"-imfchan", b"-texres", b"-type"), 1
+    ),
     b"-mm": 2,
-    b"-o": 3,
-    b"-s": 3,
-    b"-t": 3,
+    **dict.fromkeys((b"-o", b"-s", b"-t"), 3),
 }
+"""Options of maps with the number of their values."""
 _SWITCHES = {b"on": 1.0, b"off": 0.0}
 
 
@@ -85,7 +68,7 @@ def read_mtl(path: Path, reading: Reading) -> dict[str, Material]:
             continue
         key, rest = words[0].lower(), words[1].strip() if len(words) > 1 else b""
         if key == b"newmtl":
-            name = named(text_of(rest))
+            name = printable(text_of(rest))
             entry = entries.setdefault(name, _Entry(name))
         elif entry is None:
             reading.warn("RG331", "early", "statements before the first 'newmtl' are left out", line=number, file=path)
@@ -130,14 +113,14 @@ def _map(entry: _Entry, key: bytes, rest: bytes, line: int, path: Path, reading:
     if file is None:
         return
     try:
-        image, facts = reading.image_with_header(file, "map", line=line)
+        image = reading.image(file, "map", line=line)
     except InputError as problem:
         if problem.problems[0].code in ("RG302", "RG353"):
             raise
         reading.warn("RG330", f"map {file}", f"{problem.problems[0].text}; it is left out", line=line, file=path)
         return
     if slot == "bump":
-        if facts.channels < 3:
+        if image.channels < 3:
             reading.warn(
                 "RG333", "height map", "height maps are left out; only normal maps are read", line=line, file=path
             )
@@ -177,7 +160,7 @@ def _options(rest: bytes) -> tuple[dict[bytes, list[float]], bytes]:
 def _follow(name: str, path: Path, line: int, reading: Reading) -> Path | None:
     """The file a map names; Windows' separators are understood; None with a warning where it does not exist."""
     for candidate in dict.fromkeys((name, name.replace("\\", "/"))):
-        if (found := reading.beside_if_there(candidate, line=line, file=path)) is not None:
+        if (found := reading.find(candidate, line=line, file=path)) is not None:
             return found
     reading.warn("RG330", f"map {name}", f"map '{shown(name)}' cannot be read; it is left out", line=line, file=path)
     return None

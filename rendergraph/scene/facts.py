@@ -1,0 +1,126 @@
+"""What stages before the GPU and a node's `update` know of a scene: facts of its parts, and the scene of a frame."""
+
+from __future__ import annotations
+
+from functools import cached_property, partial
+from operator import attrgetter
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rendergraph.declare import LightFacts
+from rendergraph.facts import SELECTIONS, ObjectFacts
+from rendergraph.scene.model import Mesh, Object, Scene, Vec3, changed_objects
+from rendergraph.textures import TextureDesc, full_mip_count
+
+Corners: TypeAlias = npt.NDArray[np.float64]
+
+
+def selected(scene: Scene, name: str) -> list[int]:
+    """Indices of the objects that a selection takes in, in the scene's order."""
+    takes = SELECTIONS[name]
+    return [
+        number
+        for number, placed in enumerate(scene.objects)
+        if not placed.hidden and takes(placed.casts_shadow, scene.materials[placed.material].alpha_mode == "blend")
+    ]
+
+
+def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
+    """What is known of the objects, in the scene's order."""
+    facts = []
+    for placed in scene.objects:
+        mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
+        facts.append(
+            ObjectFacts(
+                placed.name,
+                len(mesh.indices),
+                len(mesh.positions),
+                placed.casts_shadow,
+                material.alpha_mode == "blend",
+                material.double_sided,
+                placed.hidden,
+                scene.has_grain(material),
+                scene.emits(material),
+                scene.reflects(material),
+                mesh.name,
+                partial(attrgetter("edges.gap"), mesh),
+                partial(attrgetter("plane"), mesh),
+                partial(attrgetter("convex"), mesh),
+            )
+        )
+    return tuple(facts)
+
+
+def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
+    """What is known of every light before the schedule, in the scene's order."""
+    return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)
+
+
+def environment_facts(scene: Scene) -> TextureDesc | None:
+    """The texture that a scene's environment becomes; None where it has none."""
+    if scene.environment is None:
+        return None
+    size = scene.environment.size
+    assert size is not None  # whoever reads a scene has seen to that
+    return TextureDesc("texture2d", "rgba16f", *size, mips=full_mip_count(*size))
+
+
+class FrameScene:
+    """The scene of a frame, the same for as long as no object moves; `steps.FrameScene` describes its properties.
+
+    Attributes:
+        scene: of this frame.
+        placed: of the frame in which the objects came to where they are.
+    """
+
+    def __init__(self, scene: Scene, before: FrameScene | None = None) -> None:
+        """Share with the scene of the frames until now what has not changed."""
+        self.scene = self.placed = scene
+        self.lights, self.objects = scene.lights, scene.objects
+        self.materials, self.meshes = scene.materials, scene.meshes
+        if before is None or "corners" not in vars(before) or before.placed.meshes is not scene.meshes:
+            return
+        moved = changed_objects(before.placed, scene)
+        self.corners = before.corners.copy()
+        self.corners[moved] = corners_of(self.meshes, [self.objects[number] for number in moved])
+        if all(_flags(before.placed.objects[number]) == _flags(self.objects[number]) for number in moved):
+            self.shown, self.casting = before.shown, before.casting
+
+    @cached_property
+    def corners(self) -> Corners:
+        """World-space corners of the objects' boxes, (n, 8, 3), z fastest."""
+        return corners_of(self.meshes, self.objects)
+
+    @cached_property
+    def shown(self) -> npt.NDArray[np.bool_]:
+        return np.array([not entry.hidden for entry in self.objects], bool)
+
+    @cached_property
+    def casting(self) -> npt.NDArray[np.bool_]:
+        return np.array([entry.casts_shadow and not entry.hidden for entry in self.objects], bool)
+
+    @cached_property
+    def bounds(self) -> tuple[Vec3, Vec3]:
+        shown = self.corners if self.shown.all() else self.corners[self.shown]
+        if not len(shown):
+            return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
+        (x, y, z), (u, v, w) = shown.min(axis=(0, 1)).tolist(), shown.max(axis=(0, 1)).tolist()
+        return (x, y, z), (u, v, w)
+
+
+def corners_of(meshes: tuple[Mesh, ...], objects: tuple[Object, ...] | list[Object]) -> Corners:
+    """World-space corners of objects' boxes, (n, 8, 3)."""
+    used = {number: place for place, number in enumerate(dict.fromkeys(entry.mesh for entry in objects))}
+    boxes = np.array([meshes[number].box for number in used], np.float64).reshape(-1, 2, 3)
+    transforms = np.array([entry.transform for entry in objects]).reshape(-1, 4, 4)
+    low, high = boxes[[used[entry.mesh] for entry in objects]].reshape(-1, 2, 3).swapaxes(0, 1)
+    far = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], bool)
+    local = np.where(far, high[:, None], low[:, None])
+    placed: Corners = local @ transforms[:, :3, :3].swapaxes(1, 2) + transforms[:, None, :3, 3]
+    return placed
+
+
+def _flags(entry: Object) -> tuple[bool, bool]:
+    return entry.hidden, entry.casts_shadow
