@@ -119,7 +119,7 @@ def _opened(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
         with open_image(source, limits) as image:
             yield image
     except ImageError as error:
-        _refuse(source, error.code, f"the image {error.text}")
+        _refuse(source, error.code, f"the image {error.reason}")
 
 
 def _refuse(source: ImageSource, code: str, text: str) -> NoReturn:

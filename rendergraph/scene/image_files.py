@@ -38,11 +38,11 @@ _FORMATS = {".png": "png", ".jpg": "jpeg", ".exr": "openexr", ".hdr": "hdr", ".b
 
 
 class ImageError(Exception):
-    """A mistake in an image: the code, and a text that continues "the image …"."""
+    """A mistake in an image; the reason continues "the image …"."""
 
-    def __init__(self, code: str, text: str) -> None:
-        super().__init__(text)
-        self.code, self.text = code, text
+    def __init__(self, code: str, reason: str) -> None:
+        super().__init__(reason)
+        self.code, self.reason = code, reason
 
 
 class ImageFile(Struct):

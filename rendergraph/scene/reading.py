@@ -209,7 +209,7 @@ class Reading(Struct):
                 channels = len(image.color_channels())
                 return ImageSource(source.path, source.data, source.label, None, image.size, channels)
         except ImageError as error:
-            raise self.error(error.code, f"{what} {error.text}", line=line) from None
+            raise self.error(error.code, f"{what} {error.reason}", line=line) from None
 
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
