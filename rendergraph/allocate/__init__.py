@@ -1,9 +1,8 @@
 """Schedule to ResourcePlan: lifetimes, physical textures, aliases, bytes, lower bound.
 
-Textures are shared whole, in three tiers: `descriptor`, equal descriptions; `view`, equal texel classes looked at
-through texture views; and `heap`, blocks of memory for textures of any description. Within a class lifetimes are
-intervals, so that giving each the first free texture in order of time uses as few textures as are ever alive at once:
-no assignment uses fewer.
+Textures share memory as a whole, in three tiers: `descriptor`, equal descriptions; `view`, equal texel classes through
+texture views; and `heap`, blocks of memory for textures of any description. Within a class lifetimes are intervals, so
+giving each the first free texture in order of time uses as few textures as are ever alive at once, which is optimal.
 """
 
 from __future__ import annotations
@@ -40,15 +39,14 @@ class Lifetime(Struct, frozen=True, gc=False):
 
 
 class Physical(Struct, frozen=True, gc=False):
-    """One texture or buffer that is really allocated.
+    """One texture or buffer that is allocated.
 
     Attributes:
-        index: its number.
-        desc: what it is created from; members of another format of the same texel class look at it through a view. Of a
-            block the largest member's.
+        desc: what it is created from; members of another format of the same texel class use a view of it. Of a block
+            the largest member's.
         members: resources that live in it, in time order; a history resource has two physicals to itself.
-        bytes: by formula; none for what is the scene's.
-        block: whether it is memory alone, in which members of different texel classes are textures of their own.
+        bytes: by formula; 0 for the scene's.
+        block: whether it is plain memory, in which members of different texel classes are textures of their own.
     """
 
     index: int
@@ -62,14 +60,14 @@ class MemoryFigures(Struct, frozen=True):
     """The figures of `run --json` and `plan --json`.
 
     Attributes:
-        no_reuse_bytes: every resource its own texture.
+        no_reuse_bytes: with a texture of its own for every resource.
         allocated_bytes: what the plan allocates.
         lower_bound_bytes: no legal order has a lower peak of live bytes.
         peak_node: the node whose step is the peak of this order; None without steps.
         proven: an order was found whose peak is that bound.
-        least_peak_bytes: the least peak of live bytes of an order that was found.
-        tier: how textures are shared: `view` only where some share needs a view, `heap` where some lie in a block.
-        next_tier: the next way of sharing; None where everything shares all it can already.
+        least_peak_bytes: the least peak of live bytes of any order found.
+        tier: how textures share: `view` only if some share needs a view, `heap` if some lie in a block.
+        next_tier: the next way of sharing that saves bytes, if any.
         next_tier_bytes: what that would allocate, in this order.
     """
 
@@ -84,7 +82,6 @@ class MemoryFigures(Struct, frozen=True):
     next_tier_bytes: int | None = None
 
     def as_json(self) -> dict[str, object]:
-        """Plain JSON values."""
         return asdict(self)
 
 
@@ -92,13 +89,9 @@ class ResourcePlan(Struct, frozen=True, dict=True):
     """Where every resource lives.
 
     Attributes:
-        schedule: what it was made from.
-        lifetimes: resource id to lifetime.
-        physicals: what is allocated.
         placement: resource id to the indices of its physicals (two for history, else one).
         released: step position to the resources that are dead after it (for the poison mode).
-        memory: bytes.
-        alias, views, heap: as `allocate` was asked.
+        alias, views, heap: as requested of `allocate`.
     """
 
     schedule: Schedule
@@ -120,7 +113,6 @@ class ResourcePlan(Struct, frozen=True, dict=True):
 
     @property
     def resources(self) -> Mapping[str, Resource]:
-        """The schedule's resources."""
         return self.schedule.resources
 
     @cached_property
@@ -129,7 +121,7 @@ class ResourcePlan(Struct, frozen=True, dict=True):
         return _reasons(self)
 
     def bytes(self, id: str) -> int:
-        """Bytes of a resource by formula: of both textures where it has two; none of what is the scene's."""
+        """Return the bytes of a resource by formula: of both textures if it has two; 0 for the scene's."""
         resource = self.resources[id]
         return 0 if resource.role == "scene" else resource.desc.bytes * len(self.placement[id])
 
@@ -139,9 +131,9 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
 
     Args:
         schedule: steps in order.
-        alias: let resources that are never alive together share; without it each has its own.
+        alias: let resources that are never alive together share memory.
         views: let formats of one texel class share through texture views.
-        heap: let textures of any description share blocks of memory, where that takes fewer bytes.
+        heap: let textures of any description share blocks of memory, if that takes fewer bytes.
     """
     descs = {id: resource.desc for id, resource in schedule.resources.items()}
     classes = {id: storage_class(resource) for id, resource in schedule.resources.items()}
@@ -213,7 +205,7 @@ Kinds: TypeAlias = Mapping[str, object]
 
 
 def _colour(ids: Iterable[str], lifetimes: Mapping[str, Lifetime], descs: Kinds, kinds: Kinds) -> Groups:
-    """Interval colouring within each kind; of the free textures one of the same description, else the oldest."""
+    """Colour intervals within each kind, preferring a free texture of the same description, then the oldest."""
     groups: Groups = []
     free: dict[object, list[int]] = defaultdict(list)  # by kind: indices into groups, lowest first
     free_exact: dict[object, list[int]] = defaultdict(list)  # by description
@@ -249,7 +241,7 @@ def _take(free: list[int], taken: Sequence[bool], groups: Groups, descs: Kinds, 
 
 
 def _fewest_views(ids: Iterable[str], classes: Kinds, by_desc: Groups, by_class: Groups) -> Groups:
-    """The class's sharing where it saves bytes, the description's where it does not: a view for nothing is clutter."""
+    """Return the sharing by class if it saves bytes, else that by description: needless views are clutter."""
 
     def kinds(groups: Groups) -> dict[object, Groups]:
         table: dict[object, Groups] = defaultdict(list)
@@ -272,7 +264,7 @@ def _blocks(
     classes: Kinds,
     by_desc: Groups,
 ) -> Groups:
-    """Textures in blocks of memory, buffers as they are; no history and nothing kept is among them."""
+    """Return textures in blocks of memory, and buffers unchanged."""
     textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
     items = tuple([Item(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])
     buffers = [group for group in by_desc if isinstance(classes[group[0]], BufferDesc)]
@@ -282,7 +274,6 @@ def _blocks(
 
 
 def _bytes(groups: Groups, sizes: Mapping[str, int]) -> int:
-    """What groups take: each as much as its largest member."""
     return sum([max([sizes[id] for id in group]) for group in groups])
 
 
@@ -381,7 +372,7 @@ def _reasons(plan: ResourcePlan) -> dict[str, str]:
 
 
 def _alike(plan: ResourcePlan) -> tuple[Kinds, str]:
-    """What two textures that can share have in common, and how that is said."""
+    """Return what textures that can share have in common, and the words for it."""
     descs = {id: resource.desc for id, resource in plan.resources.items()}
     if plan.heap:
         return {id: isinstance(desc, TextureDesc) or desc for id, desc in descs.items()}, "is there"

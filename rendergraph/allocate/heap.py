@@ -1,6 +1,6 @@
-"""Blocks of memory in which textures of any description lie one after the other: who shares one.
+"""Assigns textures of any description to shared blocks of memory.
 
-A block is as large as its largest member, and all begin where it begins: drivers do not heed other offsets
+A block is as large as its largest member, and all members begin at its start: drivers ignore other offsets
 (docs/decisions/memory-objects.md). So this is interval colouring with weights, the sum over colours of the largest
 weight, which is NP-hard; largest first is within 1 % of the optimum on most small cases, and restarts do the rest.
 """
@@ -18,7 +18,7 @@ RESTARTS = 100
 
 
 class Item(Struct, frozen=True, gc=False):
-    """What lies in a block: bytes, first and last position in the schedule, and what it is alike with."""
+    """A texture to place: bytes, first and last position in the schedule, and its kind."""
 
     bytes: int
     first: int
@@ -28,14 +28,10 @@ class Item(Struct, frozen=True, gc=False):
 
 @lru_cache(64)  # most changes of a pipeline leave what is placed what it was
 def share_blocks(items: tuple[Item, ...], *, seed: int = 0) -> tuple[tuple[int, ...], ...]:
-    """Numbers of the items in each block, in time order, so that the blocks have few bytes.
+    """Return the numbers of the items in each block, in time order, so that the blocks have few bytes.
 
-    Largest first, each where the block grows least; of equal ones where its like is, then the tightest. Then seeded
-    restarts with sizes perturbed, until none can be better.
-
-    Args:
-        items: what is placed.
-        seed: of the restarts.
+    Largest first, each where the block grows least; of equal blocks one with its kind, then the tightest. Then seeded
+    restarts with perturbed sizes, until none can be better.
     """
     numbers = range(len(items))
     alive = [(1 << item.last + 1) - (1 << item.first) for item in items]  # a bit for each position
@@ -56,7 +52,7 @@ def share_blocks(items: tuple[Item, ...], *, seed: int = 0) -> tuple[tuple[int, 
 
 
 def least_bytes(items: Sequence[Item]) -> int:
-    """Bytes that no blocks are below: the n-th largest block holds the n-th largest item of every moment."""
+    """Return bytes that no blocks are below: the n-th largest block holds the n-th largest item of every moment."""
     most = [0] * len(items)
     ordered = sorted([(item.bytes, item.first, item.last) for item in items], reverse=True)
     for now in {item.first for item in items}:
@@ -66,7 +62,7 @@ def least_bytes(items: Sequence[Item]) -> int:
 
 
 def _placed(items: Sequence[Item], alive: Sequence[int], order: Sequence[int]) -> tuple[list[list[int]], int]:
-    """The blocks that items make when they are placed in that order, and their bytes."""
+    """Return the blocks of items placed in that order, and their bytes."""
     blocks: list[list[int]] = []
     sizes: list[int] = []
     taken: list[int] = []  # of each block the positions at which one of its items is alive

@@ -1,9 +1,9 @@
-"""How far a shader's macros may expand, bounded from above without expanding them, and refused beyond a limit.
+"""An upper bound on how far a shader's macros expand, found without expanding them.
 
-A few hundred bytes of macros that double each other fill the machine inside a driver's preprocessor. So the most words
-that one use of each macro can make are computed from the words of its body, those it refers to first; a call's
-arguments count as often as they come back in what the call makes. No condition is looked at: all that is written
-counts, and of several definitions of a name the worst. What people write stays far below the limit all the same.
+A few hundred bytes of macros that double each other exhaust the machine inside a driver's preprocessor. So the most
+words that one use of each macro can produce are computed from the words of its body, macros it refers to first; the
+arguments of a call count as often as the result repeats them. Conditions are ignored: all text counts, and of several
+definitions of a name the worst. Real shaders stay far below the limit.
 """
 
 from __future__ import annotations
@@ -18,10 +18,8 @@ from msgspec import Struct
 from rendergraph.errors import InputError, Problem
 from rendergraph.glsl.source import Origin, SourceText
 
-MOST_WORDS = 1_000_000
-"""Words and signs that macros may make of one stage."""
-MOST_NESTED = 256
-"""Macros inside each other, by their definitions and by calls in the arguments of calls."""
+MOST_WORDS = 1_000_000  # words and signs that the macros of one stage may produce
+MOST_NESTED = 256  # macros inside each other, by definitions and by calls in arguments
 
 _ENOUGH = MOST_WORDS + 1
 _ROUNDS = 16
@@ -31,14 +29,7 @@ _DEFINE = re.compile(r"([A-Za-z_]\w*)(\(([^()]*)\))?(.*)", re.DOTALL)
 
 
 def check_expansion(source: SourceText) -> None:
-    """Refuse a stage whose macros may expand too far.
-
-    Args:
-        source: the text of a stage.
-
-    Raises:
-        InputError: they may make more than `MOST_WORDS`, or stand more than `MOST_NESTED` deep (RG409).
-    """
+    """Refuse a stage whose macros may produce more than `MOST_WORDS` or nest deeper than `MOST_NESTED` (RG409)."""
     definitions, runs = _parts(source)
     macros = _Macros(definitions, [words for words, _ in runs])
     total = 0
@@ -48,9 +39,9 @@ def check_expansion(source: SourceText) -> None:
         for at, (growth, factor, around) in zip(lines, macros.walk(words), strict=True):
             total += growth.words * factor
             if total > MOST_WORDS:
-                raise _error(source, at, f"macros may make more than {MOST_WORDS:,} words of this line")
+                raise _error(source, at, f"macros may expand this line to more than {MOST_WORDS:,} words")
             if around + growth.depth > MOST_NESTED:
-                raise _error(source, at, f"more than {MOST_NESTED} macros stand inside each other in this line")
+                raise _error(source, at, f"more than {MOST_NESTED} macros are nested in this line")
 
 
 def _error(source: SourceText, at: int, text: str) -> InputError:
@@ -71,7 +62,7 @@ class _Definition(Struct, frozen=True):
 
 
 def _parts(source: SourceText) -> tuple[list[_Definition], list[tuple[list[str], list[int]]]]:
-    """Every definition; and the words that are expanded (text between directives, conditions) with their lines."""
+    """Return all definitions, and the words that are expanded (between directives, in conditions) with their lines."""
     definitions: list[_Definition] = []
     runs: list[tuple[list[str], list[int]]] = [([], [])]
     for text, at in _joined(source):
@@ -89,7 +80,7 @@ def _parts(source: SourceText) -> tuple[list[_Definition], list[tuple[list[str],
 
 
 def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
-    """Lines with those that end in a backslash joined to what follows; each with its position."""
+    """Yield lines with their continuations joined, each with its position."""
     text, start = "", 0
     for at, line in enumerate(source.lines):
         start = start if text else at
@@ -106,12 +97,12 @@ def _joined(source: SourceText) -> Iterator[tuple[str, int]]:
 
 
 class _Growth(Struct, frozen=True):
-    """What one use of a macro makes at most.
+    """The most that one use of a macro produces.
 
     Attributes:
-        words: words, those of its arguments aside.
-        times: how often a word of its arguments comes back.
-        depth: macros inside each other.
+        words: words, not counting its arguments.
+        times: how often a word of its arguments is repeated.
+        depth: macros nested inside each other.
     """
 
     words: int = 1
@@ -123,12 +114,11 @@ _PLAIN = _Growth()
 
 
 class _Macros:
-    """All macros of a stage, and what a use of each makes.
+    """All macros of a stage, and the growth of a use of each.
 
     Attributes:
-        names: of all.
-        loose: how often a word in brackets comes back where a macro that was handed on, as a name without arguments,
-            may be called with them; 1 where no macro is.
+        loose: how often a word in brackets is repeated if a macro passed on by name, without arguments, may be called
+            with them; 1 without such a macro.
     """
 
     def __init__(self, definitions: Sequence[_Definition], runs: Sequence[Sequence[str]]) -> None:
@@ -157,17 +147,12 @@ class _Macros:
                 self._growths[name] = self._growth(name)
             loose = max((self._growths[name].times for name in handed), default=1)
             if loose == self.loose or _ROUNDS - rounds_left > len(handed):
-                return  # on one way each is called once, so there are no more rounds than names
+                return  # each is called once on a path, so there are no more rounds than names
             self.loose = loose if rounds_left else _ENOUGH
 
     def walk(self, words: Sequence[str], inside: _Definition | None = None) -> Iterator[tuple[_Growth, int, int]]:
-        """For each word what it makes, how often it comes back, and how many calls stand around it.
-
-        Args:
-            words: words that are expanded together.
-            inside: the macro whose body they are.
-        """
-        own = inside.name if inside is not None else ""  # not expanded in itself again
+        """For each word yield its growth, how often it is repeated, and how many calls are around it."""
+        own = inside.name if inside is not None else ""  # it is not expanded inside itself
         brackets = [(1, 0)]
         for before, word in pairwise(("", *words)):
             factor, around = brackets[-1]
@@ -195,12 +180,12 @@ class _Macros:
             words += growth.words * factor
             depth = max(depth, around + growth.depth)
             left_open = max(0, left_open + (word == "(") - (word == ")"))
-        if left_open:  # what follows the macro would be among the arguments
+        if left_open:  # text after the macro would be among the arguments
             words = _ENOUGH
         return _Growth(min(_ENOUGH, 1 + words), min(_ENOUGH, max([1, *back.values()])), depth + 1)
 
     def _weigh_core(self, names: Sequence[str]) -> None:
-        """Macros that lead to each other: each is expanded once on any way, so that the references multiply at most."""
+        """Weigh macros that refer to each other: each expands once on any path, so references multiply at most."""
         self._growths |= dict.fromkeys(names, _PLAIN)
         own = [self._growth(name) for name in names]
         bodies = [one for name in names for one in self._definitions[name]]
@@ -215,7 +200,7 @@ class _Macros:
         return sum(factor for word, (_, factor, _) in walked if pastes or word in names)
 
     def _order(self) -> tuple[list[str], list[str], list[str]]:
-        """Names, each behind all that it refers to; those on circles and between them; those behind these."""
+        """Return names after all that they refer to; those on cycles and between; those that refer to these."""
         needs: dict[str, set[str]] = {}
         for name, alternatives in self._definitions.items():
             words = {word for one in alternatives for word in one.body}
@@ -231,13 +216,12 @@ class _Macros:
 
 
 def _worst(growths: Sequence[_Growth]) -> _Growth:
-    """What is true of any of them."""
     words, times, depth = (max(each) for each in zip(*((g.words, g.times, g.depth) for g in growths), strict=True))
     return _Growth(words, times, depth)
 
 
 def _sorted(needs: Mapping[str, Set[str]]) -> list[str]:
-    """Names, each behind all that it needs; those on circles, and those that need these, are left out."""
+    """Return names after all that they need; names on cycles, and those that need them, are left out."""
     needed_by: dict[str, list[str]] = {name: [] for name in needs}
     missing = {name: len(others) for name, others in needs.items()}
     for name, others in needs.items():
@@ -253,7 +237,7 @@ def _sorted(needs: Mapping[str, Set[str]]) -> list[str]:
 
 
 def _pastes(one: _Definition, name: str) -> bool:
-    """Whether a body may put a name together with `##`: then it holds what is no parameter there."""
+    """Whether a body may create a name with `##`, from its own words and parameters."""
     around = zip(one.body, one.body[1:], one.body[2:], strict=False)
     return any(
         sign == "##" and all(part in name or part in (one.parameters or ()) for part in (left, right))
@@ -262,7 +246,7 @@ def _pastes(one: _Definition, name: str) -> bool:
 
 
 def _joins(name: str, known: Collection[str]) -> bool:
-    """Whether a name is two or more of the known words, one behind the other."""
+    """Whether a name is a concatenation of two or more known words."""
     ends = {0}
     for end in range(1, len(name) + 1):
         if any(name[start:end] in known and (start, end) != (0, len(name)) for start in ends):

@@ -1,4 +1,4 @@
-"""Shader files: their text, their lines with what rendergraph looks at in them, and where links lead."""
+"""Shader files: their text, their lines with the directives that rendergraph handles, and resolved links."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _COMMENT = re.compile(r"//(?:\\\n|[^\n])*|/\*.*?(?:\*/|(?P<open>\Z))", re.DOTALL
 
 
 def strip_comments(text: str) -> str:
-    """The text with comments replaced by as many blanks: lines and columns stay where they are.
+    """Replace comments by as many blanks, so that lines and columns stay.
 
-    One that has no end is left as it is, for the driver to say so.
+    An unterminated comment stays, for the driver to report.
     """
 
     def blanks(match: re.Match[str]) -> str:
@@ -38,12 +38,12 @@ def strip_comments(text: str) -> str:
 
 
 class Directive(Struct, frozen=True, gc=False):
-    """A line that is more than text for the driver.
+    """A line that rendergraph handles itself.
 
     Attributes:
         number, text: the line.
-        word: `include`, `version`, `line`, or `needs` for a `#pragma needs`, which says nothing to the driver.
-        rest: what stands behind that.
+        word: `include`, `version`, `line`, or `needs` for a `#pragma needs`, which the driver ignores.
+        rest: the text after that.
     """
 
     number: int
@@ -58,7 +58,7 @@ class Directive(Struct, frozen=True, gc=False):
 
     @classmethod
     def of(cls, number: int, text: str, word: str, rest: str) -> Directive | None:
-        """What a line with a `#`, a word and more says, None where that is the driver's affair."""
+        """Return the directive of a line, None if it is left to the driver."""
         if word in ("include", "version", "line"):
             return cls(number, text, word, rest.strip())
         needs = _NEEDS.match(rest) if word == "pragma" else None
@@ -66,11 +66,11 @@ class Directive(Struct, frozen=True, gc=False):
 
 
 class Run(Struct, frozen=True, gc=False):
-    """Lines for the driver, and the one behind them that is not.
+    """Consecutive lines for the driver, and the directive after them.
 
     Attributes:
-        first: the number of the first.
-        lines: they, and how many `bytes` they are.
+        first: number of the first line.
+        bytes: size of the lines.
         nests: how many more `#if` they open than they close.
         end: None at the end of the file.
     """
@@ -83,7 +83,7 @@ class Run(Struct, frozen=True, gc=False):
 
 
 class Links:
-    """Paths with their links followed, each folder's once for as long as this is kept: asked for at every include."""
+    """Resolves symbolic links, each folder's once per instance, as every include asks."""
 
     def __init__(self) -> None:
         self._followed: dict[str, str] = {}
@@ -91,7 +91,7 @@ class Links:
         self._files: dict[tuple[Path, str, Path], Path | None] = {}
 
     def follow(self, path: str) -> str:
-        """As `os.path.realpath` says it."""
+        """Return `os.path.realpath`."""
         found = self._followed.get(path)
         if found is None:
             folder, name = os.path.split(path)
@@ -104,14 +104,14 @@ class Links:
         return found
 
     def of(self, path: Path) -> str:
-        """The same of a path that may begin in the current folder."""
+        """Return the same for a path that may be relative to the current folder."""
         found = self._led.get(path)
         if found is None:
             found = self._led[path] = self.follow(str(path if path.is_absolute() else Path.cwd() / path))
         return found
 
     def file(self, folder: Path, name: str, home: Path) -> Path | None:
-        """What a name in a folder stands for, whether it is there or not; None where that lies outside of `home`."""
+        """Return the path of a name in a folder, whether it exists or not; None if it lies outside of `home`."""
         key = folder, name, home
         if key not in self._files:
             target = folder / name
@@ -121,11 +121,7 @@ class Links:
 
 
 def read_text(file: Path) -> str:
-    """A shader's text, with `\n` at the end of lines.
-
-    Raises:
-        InputError: there is none, it is too large, or no UTF-8.
-    """
+    """Return a shader's text with `\n` as line ends."""
     record_read(file)
     if not file.is_file():
         beside = file.parent.glob("*") if file.parent.is_dir() else ()
@@ -141,21 +137,13 @@ def read_text(file: Path) -> str:
 
 
 def about(file: Path) -> str:
-    """A shader's opening comment as one line; empty where it has none.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """Return a shader's opening comment as one line; empty without one."""
     opening = itertools.takewhile(lambda line: line.startswith("//"), read_text(file).split("\n"))
     return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
 def runs(file: Path) -> tuple[str, tuple[Run, ...]]:
-    """A file's text, and its lines without comments and blanks at their ends.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """Return a file's text, and its lines without comments and trailing blanks."""
     record_read(file)
     return _runs(file, stamp(file))
 
@@ -179,5 +167,4 @@ def _runs(file: Path, stamp: Stamp) -> tuple[str, tuple[Run, ...]]:
 
 
 def _size(lines: Sequence[str]) -> int:
-    """How large lines are, their ends included."""
     return sum(map(len, lines)) + len(lines)

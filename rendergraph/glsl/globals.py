@@ -1,6 +1,6 @@
-"""The global `uniform`, `in`, `out` and `buffer` declarations of a text, with initialisers and places. No GL.
+"""The global `uniform`, `in`, `out` and `buffer` declarations of a text, with initialisers and positions. No GL.
 
-Like `names`, a scanner that also sees what stands inside `#if`: which branch is compiled depends on macros that only a
+Like `names`, a scanner that also sees declarations inside `#if`: which branch is compiled depends on macros that only a
 pipeline knows.
 """
 
@@ -17,12 +17,11 @@ _MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\d{1,9})[ \
 
 
 class Word(str):
-    """A token that knows where it stands."""
+    """A token with its position."""
 
     __slots__ = ("at",)
 
     at: int
-    """Its first character's number in the text."""
 
 
 class Global(Struct, frozen=True):
@@ -32,11 +31,10 @@ class Global(Struct, frozen=True):
         storage: `uniform`, `in`, `out`, or `buffer` for a storage block.
         type: the GLSL type, empty for a block.
         name: the variable's name, or the block's.
-        at: the name's first character's number in the text.
-        array: whether it is an array.
+        at: position of the name in the text.
         qualifiers: `readonly`, `flat`, …
-        layout: `location`, `binding`, … with the text behind `=`, empty for words alone (`rgba16f`).
-        initialiser: the text behind `=`, empty where there is none.
+        layout: `location`, `binding`, … with the text after `=`, empty for plain words (`rgba16f`).
+        initialiser: the text after `=`, empty without one.
     """
 
     storage: Storage
@@ -50,11 +48,11 @@ class Global(Struct, frozen=True):
 
 
 class Globals(Struct, frozen=True):
-    """What a text declares towards the outside.
+    """The interface that a text declares.
 
     Attributes:
-        declared: in the order of the text; a name that stands in several branches of an `#if` is there once.
-        numbers: macros that are a whole number.
+        declared: in the order of the text; a name in several branches of an `#if` occurs once.
+        numbers: macros that are an integer.
         input_layout: the words of `layout(…) in;`, such as `local_size_x`.
     """
 
@@ -63,7 +61,7 @@ class Globals(Struct, frozen=True):
     input_layout: Mapping[str, tuple[str, ...]]
 
     def number(self, words: Sequence[str]) -> int:
-        """The whole number behind a layout's `=`: written there, or `#define`d as one.
+        """Return the integer after a layout's `=`: a literal, or a macro.
 
         Raises:
             ValueError: it is neither.
@@ -72,12 +70,12 @@ class Globals(Struct, frozen=True):
         if re.fullmatch(r"\d{1,9}", text):
             return int(text)
         if text not in self.numbers:
-            raise ValueError(f"'{text}' is no number, nor a macro that is one; write a number")
+            raise ValueError(f"'{text}' is neither a number nor a macro that is one; write a number")
         return self.numbers[text]
 
 
 def globals_of(text: str) -> Globals:
-    """What a text without comments declares."""
+    """Return the declarations of a text without comments."""
     plain = without_directives(text)
     found: dict[str, Global] = {}
     input_layout: dict[str, tuple[str, ...]] = {}

@@ -1,4 +1,4 @@
-"""Literals of GLSL: a number, `true` or `false`, or a vector's constructor of numbers."""
+"""GLSL literals: a number, `true` or `false`, or a vector constructor of numbers."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _LONGEST = 100
 
 
 def literal(text: str) -> Literal:
-    """The value of a literal.
+    """Return the value of a literal.
 
     Raises:
-        ValueError: the text is none.
+        ValueError: the text is not a literal.
     """
     if vector := _VECTOR.match(text):
         convert = int if vector[1] else float
         count, parts = int(vector[2]), [_number(part.strip()) for part in vector[3].split(",")]
         if len(parts) not in (1, count):
-            raise ValueError(f"{vector[1]}vec{count} takes 1 or {count} numbers, not {len(parts)}")
+            raise ValueError(f"{vector[1]}vec{count} expected 1 or {count} numbers, got {len(parts)}")
         return tuple(convert(part) for part in (parts if len(parts) == count else parts * count))
     return _SWITCHES[text] if text in _SWITCHES else _number(text)
 
@@ -36,11 +36,11 @@ def literal(text: str) -> Literal:
 def _number(text: str) -> int | float:
     found = _NUMBER.match(text) if len(text) <= _LONGEST else None
     if found is None:
-        raise ValueError("it is no literal")
+        raise ValueError("it is not a literal")
     if found["real"]:
         value: int | float = float(found["real"])
     else:
         value = int(found["based"], 16) if found["based"] else int(found["whole"])
-    if value > _LARGEST:  # whole numbers would grow without end, and no parameter is infinite
+    if value > _LARGEST:  # integers have no limit in Python, and no parameter is infinite
         raise ValueError("it is too large")
     return -value if found[1] == "-" else value

@@ -1,4 +1,4 @@
-"""What a piece of GLSL declares, and giving its names a prefix. A scanner, not a parser: it looks at the top level."""
+"""A scanner, not a parser, for what GLSL declares at its top level; and renaming."""
 
 from __future__ import annotations
 
@@ -17,28 +17,11 @@ TOKEN = re.compile(r"[A-Za-z_]\w*|\.?\d[\w.]*|[^\s\w]")
 _WORD = re.compile(r"[A-Za-z_]\w*\Z")
 _STORAGE: dict[str, Storage] = {"uniform": "uniform", "in": "in", "out": "out", "buffer": "buffer"}
 _QUALIFIERS = frozenset(
-    [
-        "const",
-        "inout",
-        "shared",
-        "flat",
-        "smooth",
-        "noperspective",
-        "centroid",
-        "sample",
-        "patch",
-        "invariant",
-        "precise",
-        "coherent",
-        "volatile",
-        "restrict",
-        "readonly",
-        "writeonly",
-        "highp",
-        "mediump",
-        "lowp",
-        "subroutine",
-    ]
+    re.findall(
+        r"\w+",
+        """const inout shared flat smooth noperspective centroid sample patch invariant precise coherent volatile
+        restrict readonly writeonly highp mediump lowp subroutine""",
+    )
 )
 _DIRECTIVE = re.compile(r"^[ \t]*#(?:\\\n|[^\n])*", re.MULTILINE)
 _MEMBERS = re.compile(
@@ -50,12 +33,11 @@ _CLOSES = {"(": ")", "[": "]", "{": "}"}
 
 
 class Head(Struct, frozen=True):
-    """How a statement begins, and the tokens behind that.
+    """How a statement begins, and the remaining tokens.
 
     Attributes:
-        storage: the storage qualifier; None where there is none.
-        qualifiers: the others: `readonly`, `flat`, …
-        layout: `location`, `binding`, … with the tokens behind `=`, none for words alone (`rgba16f`).
+        qualifiers: all but the storage qualifier: `readonly`, `flat`, …
+        layout: `location`, `binding`, … with the tokens after `=`, none for plain words (`rgba16f`).
         rest: from the type on.
     """
 
@@ -66,22 +48,22 @@ class Head(Struct, frozen=True):
 
 
 def tokens(text: str) -> list[str]:
-    """Words, numbers and signs of a text without comments."""
+    """Return words, numbers and signs of a text without comments."""
     return TOKEN.findall(text)
 
 
 def without_directives(text: str) -> str:
-    """The text with preprocessor lines (and what continues them) blanked out, every character where it was."""
+    """Blank out preprocessor lines and their continuations; every other character keeps its position."""
     return _DIRECTIVE.sub(lambda match: blank(match.group()), text)
 
 
 def blank(text: str) -> str:
-    """As many blanks, in as many lines."""
+    """Return as many blanks, on as many lines."""
     return "\n".join(" " * len(line) for line in text.split("\n"))
 
 
 def declared(text: str) -> set[str]:
-    """All names a text declares at its top level, macros included, whatever `#if` they stand in."""
+    """Return all names that a text declares at its top level, macros included, in every branch of `#if`."""
     found = set(_DEFINE.findall(text))
     for statement, body in statements(tokens(without_directives(text))):
         found |= set(_declared_by(head(statement).rest, body))
@@ -90,7 +72,7 @@ def declared(text: str) -> set[str]:
 
 @lru_cache(maxsize=1024)
 def calls(text: str, function: str) -> bool:
-    """Whether a text without comments calls a function it does not declare itself."""
+    """Whether a text without comments calls a function that it does not declare itself."""
     places = [at for at in _places(text, function) if text[at - 1 : at] != "."]
     places = [at for at in places if _OPENS.match(text, at + len(function))]
     if not any(_may_be_type(_before(text, at)) for at in places):
@@ -99,12 +81,12 @@ def calls(text: str, function: str) -> bool:
 
 
 def mentions(text: str, name: str) -> bool:
-    """Whether a name stands in a text as a whole word."""
+    """Whether a text contains a name as a whole word."""
     return next(_places(text, name), None) is not None
 
 
 def _places(text: str, name: str) -> Iterator[int]:
-    """Where a name stands as a whole word. Names are many; to compile an expression takes a millisecond."""
+    """Yield where a name occurs as a whole word. Names are many, and compiling a pattern takes a millisecond."""
     at = text.find(name)
     while at >= 0:
         around = text[at - 1 : at] + text[at + len(name) : at + len(name) + 1]
@@ -114,7 +96,7 @@ def _places(text: str, name: str) -> Iterator[int]:
 
 
 def _before(text: str, at: int) -> str:
-    """The word or the sign before a place."""
+    """Return the word or sign before a position."""
     while at and text[at - 1].isspace():
         at -= 1
     begin = at
@@ -124,16 +106,16 @@ def _before(text: str, at: int) -> str:
 
 
 def _may_be_type(before: str) -> bool:
-    """Whether what stands before a function's name may be the type of its declaration, as in `float[2] f()`."""
+    """Whether the text before a function's name may be its return type, as in `float[2] f()`."""
     return before not in ("return", "else") and (before[-1:] in ("_", "]") or before[-1:].isalnum())
 
 
 def renamed(text: str, rename: Callable[[str], str]) -> str:
-    """A text without comments with its names replaced; members after a dot and members of structs stay."""
-    kept = _member_positions(text)
+    """Rename in a text without comments; members after a dot and members of structs keep their names."""
+    members = _member_positions(text)
 
     def replace(match: re.Match[str]) -> str:
-        return match.group() if match.start() in kept else rename(match.group())
+        return match.group() if match.start() in members else rename(match.group())
 
     return re.sub(r"(?<![\w.])[A-Za-z_]\w*", replace, text)
 
@@ -142,7 +124,7 @@ def renamed(text: str, rename: Callable[[str], str]) -> str:
 
 
 def statements(words: Sequence[str]) -> Iterator[tuple[list[str], Sequence[str] | None]]:
-    """Top-level statements, each with the tokens of its braces where it has any.
+    """Yield top-level statements, each with the tokens inside its braces, if any.
 
     The tokens after the braces of a block or struct (`} name;`) are appended to the statement after a `}`.
     """
@@ -172,7 +154,7 @@ def statements(words: Sequence[str]) -> Iterator[tuple[list[str], Sequence[str] 
 
 
 def head(statement: Sequence[str]) -> Head:
-    """The qualifiers and layouts that a statement begins with, and what follows."""
+    """Return the qualifiers and layouts at the beginning of a statement, and the rest."""
     storage: Storage | None = None
     qualifiers: set[str] = set()
     layout: dict[str, tuple[str, ...]] = {}
@@ -196,7 +178,7 @@ def head(statement: Sequence[str]) -> Head:
 
 
 def declarators(words: Sequence[str]) -> Iterator[tuple[str, bool, Sequence[str]]]:
-    """Name, whether it is an array, and initialiser of each of `a = 1, b[3], c`, the words behind a type."""
+    """Yield name, whether it is an array, and initialiser of each of `a = 1, b[3], c`: the tokens after a type."""
     array_type = words[:1] == ["["]
     if array_type:
         words = words[closing(words, 0) + 1 :]
@@ -214,7 +196,7 @@ def declarators(words: Sequence[str]) -> Iterator[tuple[str, bool, Sequence[str]
 
 
 def closing(words: Sequence[str], start: int) -> int:
-    """The position of the bracket that closes the one at `start`; brackets of other kinds may stand in branches."""
+    """Return where the bracket at `start` is closed; other kinds may not match, as of branches."""
     opens, closes = words[start], _CLOSES[words[start]]
     depth = 0
     for position in range(start, len(words)):
@@ -237,13 +219,12 @@ def _split_at_commas(words: Sequence[str]) -> list[list[str]]:
 
 
 def function_of(rest: Sequence[str]) -> str:
-    """The function that a statement declares or defines; empty where it is something else."""
+    """Return the function that a statement declares or defines; empty for anything else."""
     names = rest[closing(rest, 1) + 1 :] if rest[1:2] == ["["] else rest[1:]
     return names[0] if names[1:2] == ["("] and _WORD.match(names[0]) else ""
 
 
 def _declared_by(rest: Sequence[str], body: Sequence[str] | None) -> Iterator[str]:
-    """The names that a statement declares, from its type on."""
     if not rest or rest[0] == "precision":
         return
     if function := function_of(rest):
@@ -253,18 +234,18 @@ def _declared_by(rest: Sequence[str], body: Sequence[str] | None) -> Iterator[st
     else:
         is_struct = rest[0] == "struct"
         yield rest[1] if is_struct else rest[0]
-        own = [name for name, _, _ in declarators(rest[rest.index("}") + 1 :])]
-        yield from own
-        if not own and not is_struct:  # members of a block without a name of its own
+        instances = [name for name, _, _ in declarators(rest[rest.index("}") + 1 :])]
+        yield from instances
+        if not instances and not is_struct:  # members of a block without a name of its own
             for member, _ in statements(body):
                 yield from (name for name, _, _ in declarators(head(member).rest[1:]))
 
 
 def _member_positions(text: str) -> set[int]:
-    """Where the members of structs and of blocks with an instance name are declared."""
-    kept: set[int] = set()
+    """Return where the members of structs and of blocks with an instance name are declared."""
+    positions: set[int] = set()
     for match in _MEMBERS.finditer(without_directives(text)):
         group = 1 if match[1] is not None else 2
         for member in re.finditer(r"(?<!\[)\b([A-Za-z_]\w*)\s*(?=[,;\[])", match[group]):
-            kept.add(match.start(group) + member.start())
-    return kept
+            positions.add(match.start(group) + member.start())
+    return positions

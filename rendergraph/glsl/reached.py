@@ -1,4 +1,4 @@
-"""The names that a shader's `main` comes to, through the functions, macros and values it uses. No GL."""
+"""The names that a shader's `main` reaches through the functions, macros and values it uses. No GL."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ _DEFINED = re.compile(r"(!?)\s*defined\s*\(?\s*(\w+)\s*\)?\s*\Z")
 
 
 def reached(text: str) -> set[str]:
-    """The names that stand in `main` of a text without comments and in what it uses; members after a dot do not count.
+    """Return the names in `main` of a text without comments and in all that it uses; members after a dot do not count.
 
-    Branches of `#ifdef` are followed as the text's own macros say; of other conditions every branch counts.
+    Branches of `#ifdef` are followed according to the text's own macros; of other conditions every branch counts.
     """
     uses: dict[str, list[Sequence[str]]] = {}
     words = tokens("\n".join(_taken(text, uses)))
-    if "##" in text:  # names that are put together are not known
+    if "##" in text:  # pasted names are not known
         return _names(words).union(*(_names(part) for parts in uses.values() for part in parts))
     macros, waiting = set(uses), ["main"]
     for statement, body in statements(words):
-        waiting += macros.intersection(statement)  # one that stands between functions may make one
+        waiting += macros.intersection(statement)  # a macro between functions may expand to one
         begin = head(statement)
         if body is not None and statement[-1:] == [")"]:
             for name, after in pairwise(statement):
-                if after == "(":  # behind such a macro the function's own name is not the first
+                if after == "(":  # after such a macro the function's own name is not the first
                     uses.setdefault(name, []).extend([statement, body])
         elif body is None and begin.rest:
             for one, _, value in declarators(begin.rest[1:]):
@@ -44,9 +44,9 @@ def reached(text: str) -> set[str]:
 
 
 def _taken(text: str, uses: dict[str, list[Sequence[str]]]) -> Iterator[str]:
-    """The lines that are compiled, directives left out; what macros use goes to `uses`."""
+    """Yield the lines that are compiled, without directives; the words of macros go to `uses`."""
     macros: set[str] = set()
-    branches: list[tuple[bool, bool | None, bool]] = []  # around is taken; so is this one, None: perhaps; one was
+    branches: list[tuple[bool, bool | None, bool]] = []  # outside is taken; this one is, None: perhaps; one was
     for line in text.replace("\\\n", " ").split("\n"):
         directive = _DIRECTIVE.match(line)
         taken = not branches or (branches[-1][0] and branches[-1][1] is not False)

@@ -1,4 +1,4 @@
-"""Shader files to text with includes resolved, every line knowing where it came from."""
+"""Shader files as text with includes resolved, every line with its origin."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Origin(Struct, frozen=True):
         line: its line there, from 1.
         column: columns by which the line has moved to the right.
         shared: it comes from an include in angle brackets.
-        prefix: what stands before the names that the file declares.
+        prefix: the prefix of the names that the file declares.
         by: the line that includes the file, None for the file of a stage itself.
-        made: what a generated line is there for, as in "the views of 'depth'".
+        made: the purpose of a generated line, as in "the views of 'depth'".
     """
 
     file: Path | None = None
@@ -42,26 +42,20 @@ class Origin(Struct, frozen=True):
     made: str = ""
 
     def place(self, column: int = 1) -> Place | None:
-        """The place as messages print it, relative to the current folder where it lies inside."""
+        """Return the place for messages, relative to the current folder where possible."""
         if self.file is None:
             return None
         return Place(shown_file(self.file), self.line, max(1, column - self.column))
 
 
 class Block(Struct, frozen=True, gc=False):
-    """Lines that stand one after the other in a file, or in none.
-
-    Attributes:
-        lines: they, comments blanked out.
-        origin: of the first.
-    """
+    """Consecutive lines of a file, comments blanked out, or generated lines; `origin` is that of the first."""
 
     lines: tuple[str, ...]
     origin: Origin
 
     @property
     def origins(self) -> Iterator[Origin]:
-        """Of each line."""
         first = self.origin
         if first.file is None:
             return repeat(first, len(self.lines))
@@ -69,33 +63,28 @@ class Block(Struct, frozen=True, gc=False):
 
 
 class SourceText(Struct, frozen=True, dict=True):
-    """GLSL of which every line knows where it comes from; only what goes wrong asks."""
+    """GLSL in which every line has an origin, computed only when something is wrong."""
 
     blocks: tuple[Block, ...] = ()
 
     @classmethod
     def of(cls, rows: Iterable[tuple[str, Origin]]) -> SourceText:
-        """Lines with an origin each."""
         return cls(tuple(Block((line,), origin) for line, origin in rows))
 
     @cached_property
     def lines(self) -> tuple[str, ...]:
-        """All of them."""
         return tuple(chain.from_iterable(block.lines for block in self.blocks))
 
     @property
     def files(self) -> set[Path]:
-        """Where its lines come from."""
         return {block.origin.file for block in self.blocks if block.origin.file is not None}
 
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
-        """As many as there are lines."""
         return tuple(chain.from_iterable(block.origins for block in self.blocks))
 
     @cached_property
     def text(self) -> str:
-        """The lines as one string."""
         return "".join(["\n".join([*block.lines, ""]) for block in self.blocks])
 
     def __add__(self, other: SourceText) -> SourceText:
@@ -103,7 +92,7 @@ class SourceText(Struct, frozen=True, dict=True):
 
 
 def generated(lines: Iterable[str], made: str = "") -> SourceText:
-    """Lines that stand in no file; `made` is what they are there for."""
+    """Return lines of no file; `made` is their purpose."""
     return SourceText((Block(tuple(lines), Origin(made=made)),))
 
 
@@ -112,10 +101,10 @@ _INCLUDE_NAME = re.compile(r'"([^"<>]+)"\Z|<([^"<>]+)>\Z')
 
 
 class Includes:
-    """Resolves the includes of one stage; a file is compiled once a stage, wherever it is included first.
+    """Resolves the includes of one stage; each file is compiled once a stage, where it is first included.
 
-    An include inside `#if` may or may not be compiled, which only the driver's preprocessor knows: such text stands
-    between guards and is written again where it is included again.
+    Whether an include inside `#if` is compiled only the driver's preprocessor knows: such text stands between guards
+    and is repeated where it is included again.
     """
 
     def __init__(self, include_folder: Path, links: Links | None = None) -> None:
@@ -129,11 +118,11 @@ class Includes:
         self._inherited: tuple[Path, ...] = ()
 
     def fresh(self) -> Includes:
-        """Those of another stage, which follow the same links."""
+        """Return the includes of another stage, with the same resolved links."""
         return Includes(self.include_folder, self._links)
 
     def copy(self) -> Includes:
-        """Those of the same stage, for a text that may not be kept."""
+        """Return a copy for a text that may be discarded."""
         other = self.fresh()
         other.bytes, other._certain, other._guards = self.bytes, set(self._certain), dict(self._guards)
         return other
@@ -148,19 +137,16 @@ class Includes:
         versions: bool = False,
         inherited: tuple[Path, ...] = (),
     ) -> SourceText:
-        """The text of a file with all its includes.
+        """Return the text of a file with all its includes.
 
         Args:
             source: the file.
             root: the folder that includes in quotes must stay in; the file's own by default.
             prefix: noted in the origins of every line that is not shared.
             plugged: parameters in capitals with the file of their choice: `#include <SHADING>` is the file given here,
-                and nothing where none is.
-            versions: take a `#version` of 330 to 460 in the file itself, and leave its line empty.
-            inherited: folders in which an include in quotes is looked for that is not beside the file, each a root.
-
-        Raises:
-            InputError: a file is missing, unreadable, outside the root, includes itself, or a limit is passed.
+                and nothing without one.
+            versions: accept a `#version` of 330 to 460 in the file itself, and leave its line empty.
+            inherited: more folders for includes in quotes that are not beside the file, each a root.
         """
         root = Path(self._links.of(root or source.parent))
         blocks: list[Block] = []
@@ -206,7 +192,6 @@ class Includes:
             self._include(target, home, inner, stack, blocks, depth)
 
     def _take(self, run: Run, first: Origin, raw: str, blocks: list[Block]) -> None:
-        """Lines of a file as they stand there."""
         if self.bytes + run.bytes > MAX_BYTES:
             sizes = accumulate(len(line) + 1 for line in run.lines)
             beyond = sum(self.bytes + size <= MAX_BYTES for size in sizes)
@@ -246,7 +231,7 @@ class Includes:
     def _find(
         self, written: str, file: Path, root: Path, origin: Origin, raw: str, in_shared: bool
     ) -> tuple[Path, bool, Path]:
-        """The file an include names, whether it is a shared one, and the folder that its own includes must stay in."""
+        """Return the file that an include names, whether it is shared, and the root of its own includes."""
         match = _INCLUDE_NAME.match(written)
         if match is None:
             text = f"'#include {written[:60]}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
@@ -285,16 +270,11 @@ def expand(
     versions: bool = False,
     inherited: tuple[Path, ...] = (),
 ) -> SourceText:
-    """One file with its includes resolved, as `Includes.expand`."""
     return Includes(include_folder).expand(source, root=root, versions=versions, inherited=inherited)
 
 
 def needs(file: Path) -> tuple[str, ...]:
-    """What the include of a choice says that it needs: the words of its `#pragma needs(…)`.
-
-    Raises:
-        InputError: the file cannot be read, or the line is written in another way (RG405).
-    """
+    """Return the words of an include's `#pragma needs(…)`: what a choice needs."""
     raw, found = runs(file)
     words: list[str] = []
     for line in (run.end for run in found):
@@ -308,7 +288,7 @@ def needs(file: Path) -> tuple[str, ...]:
 
 
 def needs_place(file: Path) -> tuple[Place, str]:
-    """Where an include says what it needs, and that line."""
+    """Return the place and text of an include's `#pragma needs`."""
     raw, found = runs(file)
     number = next((run.end.number for run in found if run.end is not None and run.end.word == "needs"), 1)
     return Place(shown_file(file), number, 1), raw.split("\n")[number - 1]

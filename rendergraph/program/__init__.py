@@ -1,22 +1,15 @@
-"""One step's program as text, and what a driver says of it. No GL.
+"""One step's program as text, and a driver's messages about it. No GL.
 
-`compile` calls
-
-    stage_texts(step, types, resources, views, defines=..., include_folder=None) -> {stage: StageText}
-
-with a `steps.Step`, node id to `catalog.NodeType`, and `Expansion.resources` and `Expansion.views`; `defines` are
-the macros of the scene and the batch (`LIGHT_COUNT`, `MATERIAL_COUNT`, `HAS_UV0`, `PASS_VIEW_COUNT`, ...).
-`StageText.text` goes to the driver; what it answers goes through `messages.compile_problems` and
+`stage_texts` makes the text of each stage; the driver's answers go through `messages.compile_problems` and
 `messages.link_problems`.
 
-Names of a function's text are `prefix(node id) + name`: its textures (`shadows_shadow_map`), uniforms
-(`shadows_bias`), view blocks (`shadows_shadow_map_view_block`). The consumer's own texture reads keep their names, with
-`<name>_view_block` for the views; a block or table that the text does not look at is not declared.
-
 A stage's text is, in this order: version, `#extension` lines, macros, `<view.glsl>`, views and light tables of the
-textures read, then for each function the stage calls its providers' texts and the function that joins them, then the
-author's file. A shader that mentions `SHADOW_LIGHT_COUNT` is given that and, where it is not 0, the table
-`shadow_lights` of the scene's lights that some provider of `shadow` knows; the same for other functions, by their name.
+textures read; for each function that the stage calls, its providers' texts and the function that joins them; the
+author's file. Names of a provider's text are `prefix(node id) + name`: its textures (`shadows_shadow_map`), uniforms
+(`shadows_bias`), view blocks (`shadows_shadow_map_view_block`). The step's own texture reads keep their names, with
+`<name>_view_block` for the views. A block or table that the text does not use is not declared. A shader that mentions
+`SHADOW_LIGHT_COUNT` gets it and, if it is not 0, the table `shadow_lights` of the lights that some provider of `shadow`
+knows; the same for other functions, by their name.
 """
 
 from __future__ import annotations

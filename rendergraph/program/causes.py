@@ -1,4 +1,4 @@
-"""Of what a driver says of one stage, the causes: one misspelt name is one mistake, whatever follows from it."""
+"""The causes among a driver's messages about one stage: a misspelt name is one mistake, whatever follows from it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ gl_SampleID gl_VertexID gl_WorkGroupID EmitVertex EndPrimitive
 
 
 class Said(Struct, frozen=True):
-    """One message of a driver: where in the stage's text, a column of 0 where it names none, and what."""
+    """One message of a driver, with its line in the stage's text and its column, 0 if it names none."""
 
     text: str
     line: int
@@ -56,10 +56,10 @@ class Said(Struct, frozen=True):
 
 
 def causes(rows: Sequence[str], source: SourceText) -> list[Said]:
-    """The messages that name a line, without those that follow from others; warnings only where there is no error.
+    """Return the messages that name a line, without consequences of others; warnings only if there is no error.
 
-    Of a statement all that counts is what is wrong first, and names that nobody knows. Such a name is told once, with a
-    near one; of the candidates for a call only the nearest are listed.
+    Of a statement only the first error counts, and unknown names. Such a name is reported once, with a near one; of the
+    candidates for a call only the nearest are listed.
     """
     found = list(_with_candidates([said for row in rows if (said := _read(row)) is not None]))
     errors = [said for said in found if not said.is_warning]
@@ -92,7 +92,7 @@ def _read(row: str) -> Said | None:
 
 
 def _with_candidates(found: Sequence[Said]) -> Iterator[Said]:
-    """The messages; the overloads that Mesa lists beneath a call, a message each, become part of that one."""
+    """Join the overloads that Mesa lists beneath a call, one message each, to the message about the call."""
     at = 0
     while at < len(found):
         said = found[at]
@@ -112,7 +112,7 @@ def _with_candidates(found: Sequence[Said]) -> Iterator[Said]:
 
 
 def _distance(types: str, candidate: str) -> tuple[int, int, list[bool]]:
-    """How far a candidate is from what was called: by its number of arguments, then by those that differ."""
+    """Return how far a candidate is from the call: by the number of arguments, then by those that differ."""
     match = _CANDIDATE.match(f"   {candidate}")
     assert match  # it was listed for that
     given, taken = types.split(", "), match["types"].split(", ")
@@ -121,7 +121,7 @@ def _distance(types: str, candidate: str) -> tuple[int, int, list[bool]]:
 
 
 def _statement(source: SourceText, line: int) -> int:
-    """The line that the statement of a line begins in."""
+    """Return the line in which the statement of a line begins."""
     line = min(line, len(source.lines))
     while line > 1 and source.lines[line - 2].strip() and not _ENDS.search(source.lines[line - 2]):
         line -= 1

@@ -1,4 +1,4 @@
-"""A step's program text held against what the step gives it, as far as that shows without GL."""
+"""A step's program text compared with what the step provides, as far as possible without GL."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def check_texts(
     resources: Mapping[str, Resource],
     views: Mapping[str, ViewTable],
 ) -> None:
-    """Put the program texts of steps together and look at them.
+    """Build the program texts of steps and check them.
 
     Raises:
-        InputError: files are missing or cannot be put together (RG400 to RG408), a sampler does not fit what is bound
-            to it (RG447), an `out` goes nowhere (RG448), or a kept value comes from what moves (RG439).
+        InputError: files are missing or cannot be combined (RG400 to RG408), a sampler does not fit its texture (RG447),
+            an `out` has no target (RG448), or a persistent value depends on what changes (RG439).
     """
     problems: list[Problem] = []
     seen: set[object] = set()
@@ -56,7 +56,7 @@ def check_texts(
         kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
         key = step.type, step.shaders, step.defines, step.functions, kinds, _kept(step, resources)
         if not step.shaders or key in seen:
-            continue  # its text is that of another step
+            continue  # same text as another step
         seen.add(key)
         try:
             whole = text_key(step, types, resources, views), _kept(step, resources)
@@ -83,7 +83,7 @@ def _check_step(
 
 
 def sampler_of(read: Read, resource: Resource) -> str:
-    """The GLSL type that a sampler of what is read has: `usampler2D`, `sampler2DArrayShadow`, `sampler2DMS`."""
+    """Return the GLSL sampler type of a read: `usampler2D`, `sampler2DArrayShadow`, `sampler2DMS`."""
     assert isinstance(resource.desc, TextureDesc)
     whole = {"uint": "u", "int": "i"}.get(FORMATS[resource.desc.format].family, "")
     name = _SAMPLERS[read.kind]
@@ -93,21 +93,20 @@ def sampler_of(read: Read, resource: Resource) -> str:
 
 
 def named_reads(step: Step) -> Iterator[tuple[str, Read]]:
-    """What a step and the functions it calls read, by the names in its program."""
+    """Yield the reads of a step and of the functions it calls, by their names in the program."""
     yield from ((read.name, read) for read in step.reads)
     for function in step.functions:
         yield from ((prefix(function.node) + read.name, read) for read in function.reads)
 
 
 def _sampled(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str, Read]]:
-    """The named reads that are sampled."""
     for name, read in named_reads(step):
         if read.use == "sample" and isinstance(resources[read.resource].desc, TextureDesc):
             yield name, read
 
 
 def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str, Resource]) -> Problem | None:
-    """What is wrong with a sampler of this type for what is read; None where it fits."""
+    """Return the problem of a sampler type for a read; None if it fits."""
     right = sampler_of(read, resources[read.resource])
     if declared == right:
         return None
@@ -131,16 +130,16 @@ def _check_samplers(step: Step, texts: Mapping[str, StageText], resources: Mappi
     for text in texts.values():
         for name, kinds in _samplers(text.text).items():
             found = [unfit_sampler(step, kind, reads[name], resources) for kind in kinds] if name in reads else [None]
-            if found[0] is not None and None not in found:  # a branch of an `#if` may declare the right one
+            if found[0] is not None and None not in found:  # a branch of an `#if` may declare the right type
                 problems.append(_placed(found[0], text, [name]))
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
 
 
 def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> None:
-    """Each `out` is a target of the step or a port of the node; a single one may have any name.
+    """Check that each `out` is a target of the step or a port of the node; a single one may have any name.
 
-    What stands inside `#if` is another step's or another variant's.
+    An `out` inside `#if` belongs to another step or variant.
     """
     text = texts.get("fragment")
     if text is None:
@@ -155,7 +154,7 @@ def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> 
 
 
 def _always(text: str) -> str:
-    """A text without what stands inside `#if`."""
+    """Return a text without what is inside `#if`."""
     depth, kept = 0, []
     for line in text.split("\n"):
         directive = re.match(r"\s*#\s*(ifdef|ifndef|if|endif)\b", line)
@@ -165,7 +164,7 @@ def _always(text: str) -> str:
 
 
 def _samplers(text: str) -> dict[str, list[str]]:
-    """The types that a text declares each of its samplers with."""
+    """Return the types that a text declares for each of its samplers."""
     found: dict[str, list[str]] = {}
     for kind, names in re.findall(_SAMPLER, text):
         for name in re.findall(_NAME, names):
@@ -173,21 +172,11 @@ def _samplers(text: str) -> dict[str, list[str]]:
     return found
 
 
-# --- what is kept ----------------------------------------------------------------------------------------------------
+# --- persistent values ------------------------------------------------------------------------------------------------
 
 
 def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mapping[str, Resource]) -> None:
-    """Refuse a step that makes a kept value from the camera, time, lights, views or an input that is not kept.
-
-    Args:
-        step: any step.
-        texts: its texts.
-        cls: its node's class.
-        resources: what it touches.
-
-    Raises:
-        InputError: it does (RG439).
-    """
+    """Refuse a step that makes a persistent value from the camera, time, lights, views or a transient input (RG439)."""
     kept = _kept(step, resources)
     if kept is None:
         return
@@ -210,17 +199,15 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
 
 @lru_cache(maxsize=256)
 def _reached(text: str) -> tuple[set[str], set[str], list[tuple[str, set[str]]]]:
-    """The names that a text comes to, its samplers, and its blocks: of many kept steps the text is one."""
     return reached(text), set(_samplers(text)), list(_blocks(text))
 
 
 def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
-    """The kept resource that a step makes."""
     return next((write.resource for write in step.writes if resources[write.resource].role == "kept"), None)
 
 
 def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
-    """Each uniform or storage block with the names a text uses it by: its members', or its own (`block {…} own`)."""
+    """Yield each uniform or storage block with the names of its members, or its instance (`block {…} instance`)."""
     for before, body, own in re.findall(_BRACES, without_directives(text)):
         words = tokens(before)
         storage = next((at for at, word in enumerate(words) if word in ("uniform", "buffer")), None)
@@ -231,14 +218,14 @@ def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
 
 @lru_cache(maxsize=256)
 def looked_at(text: str) -> frozenset[str]:
-    """The blocks of which `main` of a program text, or what it calls, uses a member."""
+    """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
     names = reached(text)
     return frozenset(block for block, members in _blocks(text) if not names.isdisjoint(members))
 
 
 def _placed(problem: Problem, text: StageText, names: Sequence[str]) -> Problem:
-    """The problem at the author's line that has one of the names, if there is one."""
-    from rendergraph.program.messages import declared_at, mentioned_at  # where something is wrong alone
+    """Return the problem at the author's line that contains one of the names, if there is one."""
+    from rendergraph.program.messages import declared_at, mentioned_at  # needed only if something is wrong
 
     found = declared_at(text.source, names) or mentioned_at(text.source, names)
     return problem.relocate(*found) if found is not None else problem

@@ -1,6 +1,6 @@
-"""Images of compute shaders: their format stands in the declaration of the port, and in the shader if its author likes.
+"""Images of compute shaders: their format comes from the port, and may be repeated in the shader.
 
-`uniform writeonly image2D board;` gets the `layout(rgba16f)` of its port; a layout that is written is held against it.
+`uniform writeonly image2D board;` gets the `layout(rgba16f)` of its port; a written layout must agree with it.
 """
 
 from __future__ import annotations
@@ -20,34 +20,13 @@ _IMAGE = re.compile(
     rf"(?P<layout>layout\s*\((?P<inside>[^)]*)\)\s*)?(?P<rest>{_MEMORY}uniform\s+{_MEMORY}"
     rf"(?P<type>[iu]?image\w+)\s+(?P<name>[A-Za-z_]\w*))"
 )
-_LAYOUT_FORMATS = frozenset(FORMATS) | {
-    "rg16_snorm",
-    "r16_snorm",
-    "rgba8_snorm",
-    "rg8_snorm",
-    "r8_snorm",
-    "rgba32i",
-    "rgba16i",
-    "rgba8i",
-    "rg32i",
-    "rg16i",
-    "rg8i",
-    "r16i",
-    "r8i",
-    "rgba16ui",
-    "rgb10_a2ui",
-    "rgba8ui",
-    "rg16ui",
-    "rg8ui",
-}
+_OTHER_FORMATS = """rg16_snorm r16_snorm rgba8_snorm rg8_snorm r8_snorm rgba32i rgba16i rgba8i rg32i rg16i rg8i r16i
+r8i rgba16ui rgb10_a2ui rgba8ui rg16ui rg8ui"""
+_LAYOUT_FORMATS = {*FORMATS, *_OTHER_FORMATS.split()}
 
 
 def with_formats(source: SourceText, step: Step, resources: Mapping[str, Resource]) -> SourceText:
-    """A compute shader's text with the format of every image that states none.
-
-    Raises:
-        InputError: an image's format or type is not its port's (RG427).
-    """
+    """Add the port's format to every image of a compute shader that states none (RG427 if they disagree)."""
     images = dict(_images(step, resources))
     if not images:
         return source
@@ -81,13 +60,11 @@ def _images(step: Step, resources: Mapping[str, Resource]) -> Iterator[tuple[str
 
 
 def _stated(match: re.Match[str]) -> str | None:
-    """The format that a declaration states."""
     words = [word.strip() for word in (match["inside"] or "").split(",")]
     return next((word for word in words if word in _LAYOUT_FORMATS), None)
 
 
 def _mismatch(match: re.Match[str], use: Read | Write, desc: TextureDesc) -> str | None:
-    """What an image's declaration and its port disagree about."""
     letter = {"uint": "u", "int": "i"}.get(FORMATS[desc.format].family, "")
     shape = {"texture2d_array": "2DArray", "texture_cube": "Cube"}.get(desc.kind, "2D")
     wanted = f"{letter}image{'2D' if use.layer is not None else shape}"

@@ -1,4 +1,4 @@
-"""Macros of a program's text: what a step reads tells some of them, and those that nobody looks at are left out."""
+"""Macros of a program's text: those that follow from a step's reads; unused ones are left out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rendergraph.textures import TextureDesc
 def read_defines(
     reads: Iterable[Read], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
 ) -> dict[str, str]:
-    """`<X>_LAYERS`, `<X>_SAMPLES` and `<X>_VIEW_COUNT` of every texture read, `<X>_COUNT` of every list of inputs."""
+    """Return `<X>_LAYERS`, `<X>_SAMPLES`, `<X>_VIEW_COUNT` of textures read, `<X>_COUNT` of lists of inputs."""
     macros: dict[str, str] = {}
     counts: dict[str, int] = {}
     for read in reads:
@@ -32,21 +32,21 @@ def read_defines(
 
 
 def sample_macros(name: str, samples: int) -> Iterator[tuple[str, str]]:
-    """`<X>_SAMPLES`, and where there are several their places in the texel."""
+    """Yield `<X>_SAMPLES`, and for several samples their positions in the texel."""
     yield f"{name}_SAMPLES", str(samples)
     if samples > 1:
         yield f"{name}_SAMPLE_POSITIONS", positions_macro(samples)
 
 
 def positions_macro(samples: int) -> str:
-    """The macro that holds where a device has so many samples; with GL it is known what it stands for."""
+    """Return the macro of the device's sample positions; its value is known only with GL."""
     return f"SAMPLE_POSITIONS_{samples}"
 
 
 def looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
-    """The macros whose names occur in a text or in what such a macro stands for.
+    """Return the macros whose names occur in a text or in the value of such a macro.
 
-    The others would only make different programs of equal ones: a blur is the same however many lights there are.
+    The others would only make different programs of equal ones: a blur is the same for any number of lights.
     """
     found: dict[str, str] = {}
     texts = [text]
@@ -58,7 +58,6 @@ def looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
 
 
 def written(macros: Mapping[str, str]) -> SourceText:
-    """Macros as program text."""
     return SourceText.of(
         (f"#define {key} {value}".rstrip(), Origin(made=f"the macro {key}")) for key, value in macros.items()
     )

@@ -22,10 +22,10 @@ _DECLARES = re.compile(r"\b(?:in|out|inout|uniform|buffer|flat|centroid|const|la
 
 
 def compile_problems(message: str, text: StageText) -> list[Problem]:
-    """What a driver says of one stage, at the places the author knows.
+    """Return a driver's messages about one stage, at places that the author knows.
 
     Understands the forms of Mesa (`0:12(5): error: …`), NVIDIA (`0(12) : error C1008: …`) and of AMD, Intel and glslang
-    (`ERROR: 0:12: …`). Warnings are left out where there are errors. A message that names no line becomes one problem.
+    (`ERROR: 0:12: …`). Warnings are dropped if there are errors. A message that names no line becomes one problem.
     """
     found = _located(message.splitlines(), text, "RG410")
     if found:
@@ -36,10 +36,10 @@ def compile_problems(message: str, text: StageText) -> list[Problem]:
 
 
 def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]:
-    """What a driver says when stages do not fit together.
+    """Return a driver's messages about stages that do not fit together.
 
-    NVIDIA names lines under the heading of a stage. Other drivers name a variable: the line that declares it stands for
-    the place, in the later stage where both do; without one it is the last stage's file.
+    NVIDIA names lines under the heading of a stage. Other drivers name a variable: the place is the line that declares
+    it, in the later stage if both do; else it is the last stage's file.
     """
     rows = [row for row in message.splitlines() if row.strip()]
     heads = [number for number, row in enumerate(rows) if _SECTION.match(row)]
@@ -67,12 +67,9 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
 
 
 def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = True) -> tuple[Place, str] | None:
-    """Where an author's file declares one of some names, and that line.
+    """Return where an author's file declares one of some names, and that line.
 
-    Args:
-        source: a stage's text.
-        names: what to look for.
-        mentions: take a line of the author's that declares something else with the name too, such as a parameter.
+    With `mentions` a line that declares something else with the name counts too, such as a parameter.
     """
     declared = {one.name: one.at for one in globals_of(source.text).declared} if names else {}
     for name in names:
@@ -89,7 +86,7 @@ def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = Tr
 
 
 def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] | None:
-    """The first line of an author's file that has one of some names in it, and where."""
+    """Return the first place in an author's file that contains one of some names, and its line."""
     pattern = re.compile(rf"\b(?:{'|'.join(map(re.escape, names))})\b")
     for line, origin in zip(source.lines, source.origins, strict=True):
         match = None if origin.shared else pattern.search(line)
@@ -99,7 +96,6 @@ def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] 
 
 
 def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
-    """The messages that name a line; warnings only where there is no error."""
     return list(dict.fromkeys(_problem(code, said, text) for said in causes(rows, text.source)))
 
 
@@ -133,7 +129,7 @@ def _problem(code: str, message: Said, stage: StageText) -> Problem:
 
 
 def _unsqueezed(line: str, column: int) -> int:
-    """The column in a line of one that Mesa gives, whose preprocessor makes one blank of many; of the text without one.
+    """Return the column in a line for one reported by Mesa, whose preprocessor collapses blanks; of the text for none.
 
     Measured with Mesa 22.3: indents, tabs and blanks inside a line alike, and comments, which are blanks already.
     """
@@ -144,7 +140,7 @@ def _unsqueezed(line: str, column: int) -> int:
 
 
 def _of_name(line: str, said: str, column: int) -> int:
-    """Where a name that the driver quotes stands, next to the column it gives: macros of the line move that one."""
+    """Return where a quoted name is, next to the reported column: macros of the line shift that one."""
     for name in _QUOTED.findall(said):
         starts = [match.start() + 1 for match in _WORD.finditer(line) if match.group() == name]
         if starts:
@@ -153,7 +149,7 @@ def _of_name(line: str, said: str, column: int) -> int:
 
 
 def _macro(source: SourceText, line: str, said: str) -> tuple[int, str] | None:
-    """The macro of a line that a driver's name comes from: drivers give the line that uses it, and odd columns."""
+    """Return the macro that contains a quoted name: drivers report the line that uses it, and odd columns."""
     words = [(match.group(), match.start()) for match in _WORD.finditer(line)]
     for name in _QUOTED.findall(said):
         if name in (word for word, _ in words):
@@ -168,7 +164,7 @@ def _macro(source: SourceText, line: str, said: str) -> tuple[int, str] | None:
 
 
 def _included(origin: Origin) -> str:
-    """Where the author includes a file; of shared files that include each other, the author's own line."""
+    """Return where the author includes a file; for nested shared files, the author's own line."""
     by = origin.by
     while by is not None and by.shared and by.by is not None:
         by = by.by
@@ -177,13 +173,13 @@ def _included(origin: Origin) -> str:
 
 
 def _first_place(source: SourceText) -> Origin | None:
-    """The first line of the author's own file, which stands last in the text."""
+    """Return the first line of the author's own file, which is last in the text."""
     last = next((origin for origin in reversed(source.origins) if origin.file is not None and origin.by is None), None)
     return Origin(last.file, 1) if last else None
 
 
 def _nearest_author(source: SourceText, line: str, said: str) -> Origin | None:
-    """The first line of an author's file that has to do with a generated line: it names what is generated there."""
+    """Return the first line of an author's file that names what a generated line is about."""
     own = [
         (text, origin)
         for text, origin in zip(source.lines, source.origins, strict=True)
@@ -198,7 +194,7 @@ def _nearest_author(source: SourceText, line: str, said: str) -> Origin | None:
 
 
 def _names(line: str, said: str) -> Iterator[str]:
-    """Names to look for: those the driver quotes, then the longest of the line."""
+    """Yield the names that the driver quotes, then the longest of the line."""
     yield from _QUOTED.findall(said)
     yield from sorted(set(_WORD.findall(line)) - {"define", "uniform", "layout", "const", "float", "int"}, key=len)[
         ::-1

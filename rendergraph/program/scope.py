@@ -1,4 +1,4 @@
-"""Everything that the text of a step may use, and where each thing comes from; and the text with its files noted."""
+"""Everything that the text of a step may use, with its origin; and the text annotated with its files."""
 
 from __future__ import annotations
 
@@ -24,28 +24,18 @@ _BLOCK = re.compile(r"\b(?:uniform|buffer)\s+(\w+)\s*\{([^{}]*)\}")
 _KINDS = {"texture2d": "2D", "texture2d_array": "2DArray", "texture_cube": "Cube"}
 
 
-SECTIONS = (
-    "textures",
-    "uniforms",
-    "blocks",
-    "macros",
-    "functions",
-    "includes",
-    "attributes",
-    "varyings",
-    "outputs",
-)
-"""In the order in which they are shown."""
+SECTIONS = ("textures", "uniforms", "blocks", "macros", "functions", "includes", "attributes", "varyings", "outputs")
+"""In the order of printing."""
 
 
 @dataclass(frozen=True)
 class InScope:
-    """One thing that a step's text may use.
+    """One name that a step's text may use.
 
     Attributes:
         section: one of `SECTIONS`.
-        name: what stands in the text, such as `uniform sampler2D depth`; of an include its file.
-        source: where it comes from, such as `input 'depth': gbuffer.depth`; of an include the names it declares.
+        name: as in the text, such as `uniform sampler2D depth`; of an include its file.
+        source: its origin, such as `input 'depth': gbuffer.depth`; of an include the names it declares.
     """
 
     section: str
@@ -61,12 +51,7 @@ def in_scope(
     defines: Mapping[str, str],
     texts: Mapping[str, StageText],
 ) -> list[InScope]:
-    """Everything that is in scope in a step, section by section.
-
-    Args:
-        step, types, resources, views, defines: as `stage_texts` takes them.
-        texts: what it made of them.
-    """
+    """Return everything in scope in a step by section; `texts` is the result of `stage_texts`."""
     found = _Scope(step, types, resources)
     rows = [
         *found.textures(),
@@ -180,7 +165,7 @@ class _Scope:
             yield InScope("functions", signature.declaration, given)
 
     def includes(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
-        """The names of every file but the stages' own, whatever condition they stand in."""
+        """Yield the names of every file except the stages' own, under any condition."""
         lines: dict[tuple[Path, str], list[str]] = {}
         for text in texts.values():
             for line, origin in zip(text.source.lines, text.source.origins, strict=True):
@@ -195,7 +180,7 @@ class _Scope:
                 yield InScope("includes", _file(file), ", ".join([*called, *others]))
 
     def between(self, texts: Mapping[str, StageText]) -> Iterator[InScope]:
-        """What goes into the vertex shader, and from one stage to the next."""
+        """Yield the inputs of the vertex shader, and the values between stages."""
         for stage, storage, section in (
             ("vertex", "in", "attributes"),
             ("vertex", "out", "varyings"),
@@ -213,7 +198,7 @@ class _Scope:
             yield InScope("outputs", f"{word[write.use]}{write.name}", f"{write.resource}, {what}")
 
     def _reads(self) -> Iterator[tuple[str, Read]]:
-        """Every read of the step and its functions, with what stands before its name."""
+        """Yield every read of the step and its functions, with the prefix of its name."""
         yield from (("", read) for read in self.step.reads)
         yield from ((prefix(one.node), read) for one in self.step.functions for read in one.reads)
 
@@ -248,7 +233,7 @@ def _value(value: object) -> str:
 
 
 def _file(file: Path | None) -> str:
-    """A file as an author names it: `<view.glsl>` of the shared includes, else its path."""
+    """Return a file as an author names it: `<view.glsl>` for shared includes, else its path."""
     if file is None:
         return "rendergraph"
     shared = folder("rendergraph.shaders")
@@ -259,7 +244,7 @@ def _file(file: Path | None) -> str:
 
 
 def annotated(text: StageText) -> str:
-    """A stage's text with a comment above each run of lines that says where they stand; it compiles as it did."""
+    """Return a stage's text with a comment before each run of lines that names its file; it compiles as before."""
     found: list[str] = []
     last = Origin()
     gap = True

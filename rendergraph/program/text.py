@@ -1,4 +1,4 @@
-"""One step's program text: version, macros, declarations, the functions it is given, then the author's file."""
+"""One step's program text: version, macros, declarations, the functions provided to it, then the author's file."""
 
 from __future__ import annotations
 
@@ -32,13 +32,7 @@ _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of on
 
 
 class StageText(Struct, frozen=True):
-    """The final text of one stage.
-
-    Attributes:
-        stage: `vertex`, `geometry`, `fragment` or `compute`.
-        source: lines and where they come from.
-        node: id of the node whose step it belongs to.
-    """
+    """The final text of one stage, with the id of the step's node."""
 
     stage: str
     source: SourceText
@@ -46,24 +40,22 @@ class StageText(Struct, frozen=True):
 
     @property
     def of_node(self) -> str:
-        """How messages begin: `node 'blur': `."""
+        """The beginning of messages: `node 'blur': `."""
         return f"node '{self.node}': " if self.node else ""
 
     @property
     def who(self) -> str:
-        """How messages about the stage begin."""
         return f"{self.of_node}{self.stage} shader"
 
     @property
     def text(self) -> str:
-        """What the driver compiles."""
         return self.source.text
 
 
 def prefix(node: str) -> str:
-    """What stands before every name of a function's text: the providing node's id and an underscore.
+    """Return the prefix of every name in a function's text: the providing node's id and an underscore.
 
-    Two ids never give the same prefix, nor can a prefixed name be read in two ways: signs that are no letters or
+    Two ids never give the same prefix, nor can a prefixed name be read in two ways: characters that are not letters or
     digits are escaped with `Z`.
     """
     escapes = {"Z": "ZZ", "_": "Zu", "-": "Zd", "/": "Zs"}
@@ -81,24 +73,20 @@ def stage_texts(
     include_folder: Path | None = None,
     links: Links | None = None,
 ) -> dict[str, StageText]:
-    """The text of every stage of a step.
+    """Return the text of every stage of a step, in the pipeline's order.
 
     Args:
-        step: its `defines` already hold `HAS_*`, the node's define parameters and its own (`expand` puts them there);
-            likewise those of its functions.
-        types: node id to type, at least for the step's node and the providers of its functions: their folders of
-            shaders and their declarations.
+        step: its `defines` already hold `HAS_*`, the node's define parameters and its own (from `expand`); likewise
+            those of its functions.
+        types: node id to type, at least for the step's node and the providers of its functions.
         resources: everything the step and its functions read, for layers, views and light tables.
         views: view tables by id, for their length.
         defines: macros the framework adds: lights, materials, batch, `PASS_VIEW_COUNT`.
         include_folder: where `#include <…>` looks; the shipped one by default.
-        links: what links have been followed so far, for whoever asks for many steps at once.
-
-    Returns:
-        Stage to text, in the pipeline's order.
+        links: links resolved so far, for callers with many steps.
 
     Raises:
-        InputError: a file is missing or cannot be put together (RG400 to RG409).
+        InputError: a file is missing or cannot be combined (RG400 to RG409).
     """
     includes = Includes(include_folder or folder("rendergraph.shaders") / "include", links)
     shaders = dict(step.shaders)
@@ -114,18 +102,15 @@ def stage_texts(
             args = (step, types, resources, views, macros, wanted, includes.fresh())
             try:
                 texts[stage] = _stage(stage, shaders[stage], *args)
-            except InputError as error:  # a file that is not there stands nowhere but in the call that names it
+            except InputError as error:  # the place of a missing file is the call that names it
                 raise InputError([p if p.place else step.relocate(p) for p in error.problems]) from error
     return texts
 
 
 class StepTexts(Struct, eq=False):
-    """Program texts of many steps; those of steps that differ in nothing a text depends on are put together once.
+    """Program texts of many steps; steps that differ in nothing a text depends on share one.
 
-    They are kept from one pipeline to the next, as long as the files stay that they were made from.
-
-    Attributes:
-        types, resources, views: as `stage_texts` takes them.
+    They are cached from one pipeline to the next, as long as their files do not change.
     """
 
     types: Mapping[str, NodeType]
@@ -134,11 +119,6 @@ class StepTexts(Struct, eq=False):
     _links: Links = field(default_factory=Links)
 
     def of(self, step: Step, defines: Mapping[str, str]) -> dict[str, StageText]:
-        """The text of every stage of a step with these macros.
-
-        Raises:
-            InputError: a file is missing or cannot be put together (RG400 to RG409).
-        """
         key = text_key(step, self.types, self.resources, self.views), tuple(defines.items())
         args = step, self.types, self.resources, self.views
         texts = _TEXTS.get(key, lambda: stage_texts(*args, defines=defines, links=self._links))
@@ -194,7 +174,7 @@ def _stage(
 
 
 def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
-    """`#extension` lines, which must come before everything else, and the text without them."""
+    """Separate `#extension` lines, which must come before everything else, from the text."""
     is_extension = ["#" in line and _EXTENSION.match(line) is not None for line in source.lines]
     found = [line.strip() for line, yes in zip(source.lines, is_extension, strict=True) if yes]
     if not found:
@@ -204,7 +184,7 @@ def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
 
 
 def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource], before: str, body: str) -> SourceText:
-    """Views and light tables of the textures read, where the text looks at them."""
+    """Return views and light tables of the textures read, as far as the text uses them."""
     text = SourceText()
     for read in reads:
         resource = resources.get(read.resource)
@@ -231,7 +211,7 @@ def _read_declarations(reads: Iterable[Read], resources: Mapping[str, Resource],
 
 
 def signatures_of(step: Step, types: Mapping[str, NodeType]) -> dict[str, Signature]:
-    """Every function the step's shader may call: with providers, or declared as an input and so neutral."""
+    """Return every function that the step's shader may call: provided, or declared as an input and so neutral."""
     found = {signature.name: signature for signature in SIGNATURES}
     for binding in step.functions:
         found |= _declared_signatures(types[binding.node])
@@ -254,7 +234,7 @@ def _functions(
     views: Mapping[str, ViewTable],
     includes: Includes,
 ) -> SourceText:
-    """The providers' texts with prefixed names, and the one function that joins them."""
+    """Return the providers' texts with prefixed names, and the function that joins them."""
     text = SourceText()
     factors: list[str] = []
     arguments = ", ".join(signature.arguments)
@@ -275,7 +255,7 @@ def _functions(
 
 
 def _light_table(signature: Signature, step: Step, node: NodeType, resources: Mapping[str, Resource]) -> Iterator[str]:
-    """The lights that some provider or texture of the function knows, for shaders that treat those apart."""
+    """Yield the lights that some provider or texture of the function knows, for shaders that need them."""
     reads = [read for binding in step.functions if binding.signature == signature.name for read in binding.reads]
     reads += screen_reads(signature, step, node)
     known = list(dict.fromkeys(light for read in reads for light in _lights(read, resources)))
@@ -289,7 +269,7 @@ def _lights(read: Read, resources: Mapping[str, Resource]) -> tuple[int, ...]:
 
 
 def screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read]:
-    """The step's textures that hold the function's values in screen space."""
+    """Return the step's textures that hold the function's values in screen space."""
     names = [
         name
         for name, port in node.cls.inputs().items()
@@ -324,11 +304,7 @@ def provider_text(
     views: Mapping[str, ViewTable],
     includes: Includes,
 ) -> SourceText:
-    """One provider's text with every name it declares, its inputs and its parameters prefixed.
-
-    Raises:
-        InputError: a file is missing, or does not define the function (RG408).
-    """
+    """Return one provider's text with every name it declares, its inputs and its parameters prefixed."""
     before = prefix(binding.node)
     file, root = node.shader_file(binding.shader)
     plugged = dict(binding.includes)

@@ -1,4 +1,4 @@
-"""The macros that the scene, its lights and its batches add to a step's program: one variant for each kind of batch."""
+"""The macros that scene, lights and batches add to a step's program: one variant for each kind of batch."""
 
 from __future__ import annotations
 
@@ -21,17 +21,10 @@ LARGEST_BLOCK = 65536
 def variants(
     step: Step, scene: Scene, packed: PackedScene, views: Mapping[str, ViewTable], largest_block: int = LARGEST_BLOCK
 ) -> list[dict[str, str]]:
-    """What `stage_texts` takes as `defines`, for every program that a step is compiled to.
+    """Return the `defines` of `stage_texts` for every program that a step is compiled to.
 
-    Args:
-        step: one that draws or computes.
-        scene: what geometry steps draw.
-        packed: the same.
-        views: view tables by id.
-        largest_block: bytes of a uniform block; tables that are larger are storage blocks.
-
-    Returns:
-        Macros, in the order in which the scene's objects first need them; none for a geometry step that draws nothing.
+    In the order in which the scene's objects first need them; none for a geometry step that draws nothing. Tables of
+    more than `largest_block` bytes are storage blocks.
     """
     stored = storage_blocks(packed, largest_block)
     macros = light_macros(scene, stored)
@@ -49,17 +42,15 @@ def variants(
 
 
 def view_count(step: Step, views: Mapping[str, ViewTable]) -> str:
-    """`PASS_VIEW_COUNT` of a step."""
     return str(max(1, views[step.view or CAMERA].count))
 
 
 def storage_blocks(packed: PackedScene, largest_block: int) -> frozenset[str]:
-    """The scene's blocks that are too large for a uniform block."""
+    """Return the scene's blocks that are too large for a uniform block."""
     return frozenset(name for name, records in pack.blocks(packed).items() if records.nbytes > largest_block)
 
 
 def light_macros(scene: Scene, stored: Collection[str]) -> dict[str, str]:
-    """Macros about the lights, for every shader."""
     kinds = [light.type for light in scene.lights]
     macros = {
         "LIGHT_COUNT": str(len(kinds)),
@@ -73,7 +64,7 @@ def light_macros(scene: Scene, stored: Collection[str]) -> dict[str, str]:
 
 
 def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> dict[str, str]:
-    """Macros about objects and materials, for geometry steps: what none of them needs is not compiled."""
+    """Return macros about objects and materials, for geometry steps; unused features are not compiled."""
     macros = {"MATERIAL_COUNT": str(max(1, len(scene.materials)))}
     moving = {path.partition(".")[0] for path in scene.keyframes}
     if "objects" not in moving and _evenly_scaled(packed.instances["rows"]):
@@ -94,7 +85,7 @@ def scene_macros(scene: Scene, packed: PackedScene, stored: Collection[str]) -> 
 
 
 def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
-    """Whether every object, given by the rows of its matrix (n, 3, 4), is only turned, moved and scaled evenly."""
+    """Whether the matrix of every object, (n, 3, 4), only rotates, translates and scales uniformly."""
     linear = rows[:, :, :3].astype(np.float64)
     products = np.einsum("nij,nkj->nik", linear, linear)
     size = np.trace(products, axis1=1, axis2=2)[:, None, None] / 3
@@ -102,7 +93,7 @@ def _evenly_scaled(rows: npt.NDArray[np.float32]) -> bool:
 
 
 def select(scene: Scene, step: Step) -> list[int]:
-    """The objects a step draws: in the scene's order, or in that of their names, which `expand` has found there."""
+    """Return the objects that a step draws, in the scene's order or that of their names."""
     if isinstance(step.objects, str):
         return selected(scene, step.objects)
     names = {placed.name: number for number, placed in enumerate(scene.objects)}
@@ -110,9 +101,9 @@ def select(scene: Scene, step: Step) -> list[int]:
 
 
 def features(scene: Scene, index: int, level: str) -> tuple[dict[str, str], dict[str, Texture]]:
-    """Macros and textures an object's material needs of a shader that looks at `level` of it, whatever moves.
+    """Return macros and textures of an object's material for a shader with this `level`, whether animated or not.
 
-    Only what makes a difference is named, so that objects which differ in nothing else share a batch.
+    Only differences are named, so that otherwise equal objects share a batch.
     """
     placed = scene.objects[index]
     material, mesh = scene.materials[placed.material], scene.meshes[placed.mesh]

@@ -2,7 +2,7 @@
 
 The order minimises what is allocated: the bytes of a pool of textures shared within a texel class, then the peak of
 live bytes. The least peak over all orders is searched for separately and reported beside it (`lower_bound_bytes`,
-`proven`), as what a heap of bytes could reach. So an order above that peak is taken only where it allocates less.
+`proven`), as what a heap of bytes could reach. So an order above that peak is taken only if it allocates less.
 """
 
 from __future__ import annotations
@@ -41,20 +41,18 @@ class Schedule(Struct, frozen=True, dict=True):
     """Steps culled and ordered.
 
     Attributes:
-        steps: the steps that run, in order.
-        resources: the resources they touch, by id.
         wanted: as in `Expansion`: output name to resource id.
         culled: node id to the reason why none of its steps runs.
         peak_bytes: the most bytes of live resources at any step, in this order.
-        peak_node: the node whose step is the peak.
-        least_peak_bytes: the least peak of an order that was found; this one may have a higher, as it allocates less.
-        lower_bound_bytes: no legal order has a lower peak than this.
+        peak_node: the node of that step.
+        least_peak_bytes: the least peak of any order found; this order's may be higher, as it allocates less.
+        lower_bound_bytes: no legal order has a lower peak.
         whole_frame: ids of the resources that keep their memory for the whole frame: history, kept values, and buffers
             that the CPU fills before the first step.
         waits: step key to the steps it waits for, with the resource that is the reason and `reads`, `continues` or
-            `overwrites`; empty where the schedule was made by hand.
-        model: the same in numbers; None where the schedule was made by hand.
-        chosen: what picked the order where it was not memory: `in the program's order`.
+            `overwrites`; empty for a schedule made by hand.
+        model: the same in numbers; None for a schedule made by hand.
+        chosen: what picked the order if not memory: `in the program's order`.
     """
 
     steps: tuple[Step, ...]
@@ -72,7 +70,7 @@ class Schedule(Struct, frozen=True, dict=True):
 
     @property
     def proven(self) -> bool:
-        """Whether the least peak that was found is the least of all legal orders."""
+        """Whether the least peak found is the least of all legal orders."""
         return self.least_peak_bytes == self.lower_bound_bytes
 
     @cached_property
@@ -82,7 +80,7 @@ class Schedule(Struct, frozen=True, dict=True):
 
     @cached_property
     def reasons(self) -> Mapping[StepKey, str]:
-        """Step key to why it stands where it stands."""
+        """Step key to the reason for its position."""
         if self.model is None:
             return {}
         number_of = {step.key: number for number, step in enumerate(self.model.steps)}
@@ -90,14 +88,14 @@ class Schedule(Struct, frozen=True, dict=True):
 
     @cached_property
     def history_copies(self) -> Mapping[str, int]:
-        """How many textures each history takes: one where it is read for the last time before it is written."""
+        """Number of textures of each history: one if it is read for the last time before it is written."""
         return history_copies(self.steps, self.resources)
 
 
 def schedule(
     expansion: Expansion, *, budget_s: float = 0.5, shuffle: int | None = None, keep_order: bool = False
 ) -> Schedule:
-    """Cull the steps nothing wanted needs and put the rest in the order that allocates least.
+    """Cull the steps that no output needs and put the rest in the order that allocates least.
 
     The result depends on links, ports and sizes alone: not on the order of nodes or keys in a file, nor on the machine.
 
@@ -106,10 +104,10 @@ def schedule(
         budget_s: how long to search at most, in seconds of an ordinary machine; counted in resources looked at, not by
             a clock.
         shuffle: seed of a random legal order instead, for tests.
-        keep_order: the program's order instead, for debugging; where both are given this one counts.
+        keep_order: use the program's order instead, for debugging; takes precedence over `shuffle`.
 
     Raises:
-        InputError: the steps have no legal order, or read what nothing has written (RG601 to RG606).
+        InputError: the steps have no legal order, or read what no step has written (RG601 to RG607).
     """
     if len(expansion.steps) > MOST_STEPS:
         text = f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; use fewer nodes or lower counts"
@@ -124,7 +122,7 @@ def schedule(
     waits = dependencies(kept, kept_versions)
     sinks = _sinks(expansion, kept, versions)
     whole_frame = frozenset(alive_all_frame(resources, kept_versions))
-    problem = _Problem(kept, waits, resources, shown, whole_frame, sinks)
+    problem = _SchedulingProblem(kept, waits, resources, shown, whole_frame, sinks)
     found = _least(problem, read_first_choices(waits, kept, kept_versions, resources), budget_s)
     model, order, chosen = found.model, found.order, None
     if keep_order or shuffle is not None:
@@ -154,15 +152,15 @@ def schedule(
 
 
 def _sinks(expansion: Expansion, kept: Sequence[Step], versions: Versions) -> list[Step]:
-    """The last writers of what is shown, by output name, then of what the next frame reads."""
+    """Return the last writers of the outputs, by output name, then of what the next frame reads."""
     ids = [expansion.wanted[name] for name in sorted(expansion.wanted)]
     ids += sorted({read.resource for step in kept for read in step.all_reads if read.previous})
     finals = [versions.final(id) for id in ids]
     return [step for step in finals if step is not None]
 
 
-class _Problem(Struct, frozen=True):
-    """What is scheduled, whatever the order: the steps, what they must wait for, and what they touch."""
+class _SchedulingProblem(Struct, frozen=True):
+    """What is scheduled: steps, dependencies and resources."""
 
     kept: Sequence[Step]
     waits: Waits
@@ -172,18 +170,17 @@ class _Problem(Struct, frozen=True):
     sinks: Sequence[Step]
 
     def model(self, waits: Waits) -> Model:
-        """Return the steps as numbers, where they wait for what `waits` says."""
         return Model.of(waits, self.kept, self.resources, self.whole_frame, self.shown, self.sinks)
 
     def with_copies(self, model: Model, copies: Mapping[str, int]) -> Model:
-        """Return a model in which each history takes so many textures."""
+        """Return a model with this number of textures for each history."""
         whole = [self.resources[id] for id in self.whole_frame]
         sizes = [one.desc.bytes * copies[one.id] if one.role == "history" else one.bytes for one in whole]
         return replace(model, constant=sum(sizes))
 
 
-class _Found(Struct, frozen=True):
-    """An order that allocates little, what it costs, the least peak found, and one that no order is below."""
+class _Ordering(Struct, frozen=True):
+    """An order that allocates little, its cost, the least peak found, and a peak that no order is below."""
 
     model: Model
     order: Sequence[int]
@@ -192,17 +189,17 @@ class _Found(Struct, frozen=True):
     bound: int
 
 
-def _least(problem: _Problem, first: ReadFirst, budget_s: float) -> _Found:
+def _least(problem: _SchedulingProblem, first: ReadFirst, budget_s: float) -> _Ordering:
     """Return the best order over all choices of histories that are read before they are written.
 
-    The other histories take a second texture. A choice is skipped where not even the least that its textures need
-    could be better than what was found.
+    The other histories take a second texture. A choice is skipped if even the least memory for its textures could
+    not be better than what was found.
     """
     base = problem.model(problem.waits)
     single = history_copies(base.steps, problem.resources) | dict.fromkeys(first.turns, 1)
     sizes = {id: problem.resources[id].desc.bytes for id in first.turns}
     pool_floor, peak_floor = problem.with_copies(base, single).bounds() if len(first.choices) > 1 else (0, 0)
-    found: list[_Found] = []
+    found: list[_Ordering] = []
     for early in first.choices:
         late = [id for id in first.turns if id not in early]
         extra = sum(sizes[id] for id in late)
@@ -222,20 +219,20 @@ def _least(problem: _Problem, first: ReadFirst, budget_s: float) -> _Found:
 
 _MOST_ORDERS = 256
 _orders: dict[Hashable, tuple[Sequence[int], Cost, int, int]] = {}
-"""What was found for a model before: most changes of a pipeline leave the order what it was."""
+"""Results by model: most changes of a pipeline keep the order."""
 
 
-def _optimise(model: Model, budget_s: float) -> _Found:
+def _optimise(model: Model, budget_s: float) -> _Ordering:
     key = model.content, budget_s
     if key not in _orders:
         if len(_orders) >= _MOST_ORDERS:
             _orders.clear()
         _orders[key] = _ordered(model, int(budget_s * LOOKS_PER_SECOND))
-    return _Found(model, *_orders[key])
+    return _Ordering(model, *_orders[key])
 
 
 def _ordered(model: Model, budget: int) -> tuple[Sequence[int], Cost, int, int]:
-    """Numbers of the steps, cost, the least peak found, the bound."""
+    """Return the numbers of the steps, the cost, the least peak found and the bound."""
     if not len(model):
         return (), Cost(model.constant, model.constant, 0), model.constant, model.constant
     pool_bound, bound = model.bounds()

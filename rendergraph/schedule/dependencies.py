@@ -29,17 +29,17 @@ Turns: TypeAlias = Mapping[str, tuple[StepKey, Sequence[StepKey]]]
 
 
 def touched_ids(step: Step) -> dict[str, None]:
-    """Ids of the resources a step reads or writes, each once, in its own order."""
+    """Return the ids of the resources that a step reads or writes, each once, in its own order."""
     touched: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
     return dict.fromkeys([one.resource for one in touched])
 
 
 class Versions(Struct, frozen=True):
-    """Who writes and who reads each version of each resource.
+    """Writers and readers of each version of each resource.
 
     Attributes:
-        writers: resource id to version to the step that makes it, in rising order of versions.
-        readers: resource id to (version, step) pairs; last frame's values are no part of it.
+        writers: resource id to version to the step that writes it, in rising order of versions.
+        readers: resource id to (version, step) pairs, without reads of the last frame.
     """
 
     writers: Mapping[str, dict[int, Step]]
@@ -47,11 +47,7 @@ class Versions(Struct, frozen=True):
 
     @classmethod
     def of(cls, steps: Iterable[Step]) -> Versions:
-        """Collect what the steps touch.
-
-        Raises:
-            InputError: two steps make the same version of one resource (RG605).
-        """
+        """Collect the versions of steps; two steps that write the same version of a resource are an error (RG605)."""
         writers: dict[str, dict[int, Step]] = defaultdict(dict)
         readers: dict[str, list[tuple[int, Step]]] = defaultdict(list)
         problems: list[Problem] = []
@@ -68,13 +64,13 @@ class Versions(Struct, frozen=True):
         return cls({id: dict(sorted(found.items())) for id, found in writers.items()}, dict(readers))
 
     def final(self, resource: str) -> Step | None:
-        """The step that makes the last version, None where nothing writes it."""
+        """Return the step that writes the last version, None if no step does."""
         found = self.writers.get(resource)
         return found[next(reversed(found))] if found else None
 
 
 def continues(step: Step, write: Write, resource: Resource) -> bool:
-    """Whether something of the version before shows in what the step leaves behind.
+    """Whether some of the previous version remains after a step.
 
     True for everything but a clear or discard of the whole texture: a part, a level of a mip chain, an image store and
     a buffer leave the rest as it was.
@@ -84,7 +80,7 @@ def continues(step: Step, write: Write, resource: Resource) -> bool:
 
 
 def is_filled_by_update(id: str, resource: Resource, versions: Versions) -> bool:
-    """Whether a buffer holds what the CPU wrote before the frame's first step: it is read before any step writes it."""
+    """Whether a buffer is filled by the CPU before the first step: a step reads it before any step writes it."""
     return not isinstance(resource.desc, TextureDesc) and (
         id not in versions.writers or any(version == 0 for version, _ in versions.readers.get(id, ()))
     )
@@ -97,19 +93,12 @@ def contributing(
     versions: Versions,
     idle: Mapping[str, str],
 ) -> list[Step]:
-    """The steps that something wanted depends on, in the order given.
+    """Return the steps that some output depends on, in the order given.
 
-    History that a kept step reads from the last frame is wanted as well: its writers are kept.
-
-    Args:
-        steps: everything that was recorded.
-        resources: what the steps touch.
-        wanted: output name to the resource it shows.
-        versions: who writes and reads what.
-        idle: nodes that recorded nothing, with the reason.
+    History that such a step reads from the last frame is needed as well: its writers stay.
 
     Raises:
-        InputError: a kept step reads, or continues, a texture that nothing has written (RG601, RG603), an output is
+        InputError: a needed step reads, or continues, a texture that no step has written (RG601, RG603), an output is
             never written (RG604), or the node that would write it is idle (RG607).
     """
     kept: set[StepKey] = set()
@@ -155,18 +144,11 @@ def contributing(
 
 
 def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
-    """The order among kept steps: what each waits for.
+    """Return the steps that each needed step waits for.
 
-    A reader follows the writer of its version; a writer follows the writer before it and everybody who reads what it
-    is about to overwrite. What a step waits for is in the order of its reads, then its writes, so that nothing depends
-    on the order of nodes.
-
-    Args:
-        kept: the steps.
-        versions: what they read and write, and nobody else.
-
-    Raises:
-        InputError: steps wait for each other (RG602); the message names both nodes.
+    A reader follows the writer of its version; a writer follows the writer before it and all readers of what it
+    overwrites. A step's dependencies are in the order of its reads, then its writes, not in that of nodes.
+    `versions` are those of the needed steps alone. Steps that wait for each other are an error (RG602).
     """
     # Readers by the kept version they see: the writers between may have been culled.
     readers: dict[tuple[str, int], list[StepKey]] = defaultdict(list)
@@ -200,9 +182,9 @@ def dependencies(kept: Sequence[Step], versions: Versions) -> Waits:
 
 
 def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> dict[str, int]:
-    """How many textures the history among the resources takes in an order of steps, by id.
+    """Return how many textures each history takes in an order of steps, by id.
 
-    Two take turns; one does where last frame's value is read for the last time before this frame's is written.
+    Two take turns; one does if last frame's value is read for the last time before this frame's is written.
     """
     copies = {id: 1 for id, resource in resources.items() if resource.role == "history"}
     written: set[str] = set()
@@ -213,10 +195,9 @@ def history_copies(steps: Iterable[Step], resources: Mapping[str, Resource]) -> 
 
 
 class ReadFirst(Struct, frozen=True):
-    """Histories whose last value can be read before the next is written, where not every order does so by itself.
+    """Histories whose last value can be read before the next is written, if not every order does so by itself.
 
     Attributes:
-        turns: the histories.
         choices: sets of them that can be read first together; the largest first, the empty one last.
         exhaustive: whether these are all such sets.
     """
@@ -229,7 +210,7 @@ class ReadFirst(Struct, frozen=True):
 def read_first_choices(
     waits: Waits, kept: Sequence[Step], versions: Versions, resources: Mapping[str, Resource]
 ) -> ReadFirst:
-    """Return which histories can be read before they are written; of many, one large set that can be so together."""
+    """Return which histories can be read before they are written; of many only one large set."""
     readers: dict[str, set[StepKey]] = defaultdict(set)
     for step in kept:
         for read in step.all_reads:
@@ -260,7 +241,7 @@ def read_first_choices(
 
 
 def read_first(waits: Waits, turns: Turns) -> Waits:
-    """Return the same with the readers of some histories ahead of the steps that write them."""
+    """Return the same dependencies with the readers of some histories before the steps that write them."""
     more = dict(waits)
     for id, (writer, readers) in turns.items():
         more[writer] = {**more[writer], **dict.fromkeys(readers, (id, "overwrites"))}
@@ -268,7 +249,7 @@ def read_first(waits: Waits, turns: Turns) -> Waits:
 
 
 def _reachable(waits: Waits, step: StepKey) -> set[StepKey]:
-    """The step and all that it waits for."""
+    """Return a step and all that it waits for."""
     seen, stack = {step}, [step]
     while stack:
         fresh = [earlier for earlier in waits[stack.pop()] if earlier not in seen]
@@ -286,7 +267,7 @@ def _two_writers(resource: str, one: Step, other: Step) -> Problem:
 
 
 def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str, str]) -> Problem:
-    """Why nothing has been written: the maker has nothing to do, forgot it, or the step comes too early."""
+    """Explain why a resource is not written: its node is idle or forgot it, or the step comes too early."""
     maker = resource.rpartition(".")[0]
     if maker in idle:
         text = f"node '{step.node}' reads '{resource}', but '{maker}' does nothing: {idle[maker]}"

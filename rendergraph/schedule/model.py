@@ -1,4 +1,4 @@
-"""The steps as small integers: what a search needs to know of them, and what an order costs."""
+"""The steps as small integers for the search, and the cost of an order."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from rendergraph.schedule.dependencies import StepKey, Versions, Waits, is_fille
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
 
-# Counting where a texture must live costs a visit a step and texture; long graphs count only where it is touched.
+# Counting where a texture must live costs a visit per step and texture; long graphs count only where it is touched.
 MUST_LIVE_VISITS = 20_000
 
 
 class Cost(Struct, frozen=True):
-    """What an order costs, compared from the first field to the last.
+    """The cost of an order.
 
     Attributes:
         pool: bytes of a pool of textures that are shared within a texel class.
@@ -29,7 +29,6 @@ class Cost(Struct, frozen=True):
 
     @property
     def key(self) -> tuple[int, int, int]:
-        """What is compared."""
         return self.pool, self.peak, self.area
 
 
@@ -41,13 +40,13 @@ class Model(Struct, frozen=True):
 
     Attributes:
         steps: by number.
-        before, after: numbers a step waits for, and that wait for it.
-        touched: resources a step touches, as numbers; only those that are not alive during the whole frame.
-        born: bytes that come alive with a step.
+        before, after: numbers of the steps that a step waits for, and that wait for it.
+        touched: resources that a step touches, as numbers; only those that are not alive during the whole frame.
+        born: bytes that become alive with a step.
         sizes: bytes of each resource.
         classes: number of the storage class of each resource; equal ones can share a texture.
-        toucher_count: how many touch each resource: steps, and the frame's end what is shown.
-        shown: numbers of the resources that the frame's end touches.
+        toucher_count: number of steps that touch each resource, plus one for the frame's end if it is shown.
+        shown: numbers of the resources that are alive at the frame's end.
         names: id of each resource.
         constant: bytes alive during the whole frame: history, kept values, buffers that `update` fills.
     """
@@ -66,7 +65,7 @@ class Model(Struct, frozen=True):
 
     @property
     def content(self) -> Hashable:
-        """All that decides what an order costs; which steps the numbers stand for does not."""
+        """All that decides the cost of an order; which steps the numbers stand for does not."""
         kept = self.before, self.touched, self.born, self.sizes, self.classes, self.toucher_count
         return *kept, self.shown, self.constant
 
@@ -80,13 +79,13 @@ class Model(Struct, frozen=True):
         shown: Collection[str],
         sinks: Sequence[Step],
     ) -> Model:
-        """Number the steps of a dependency graph.
+        """Number the steps of a dependency graph; bytes of the whole frame are not counted yet.
 
         Args:
             waits: step to the steps it waits for.
             kept: the steps.
             resources: what the steps touch.
-            whole_frame: ids of the resources that are alive during the whole frame; their bytes are not counted yet.
+            whole_frame: ids of the resources that are alive during the whole frame.
             shown: ids of the resources that are alive at its end.
             sinks: the steps the frame is rendered for, in a fixed order.
         """
@@ -140,7 +139,7 @@ class Model(Struct, frozen=True):
         return len(self.steps)
 
     def cost(self, order: Sequence[int]) -> Cost:
-        """What an order costs; linear in what the steps touch."""
+        """Return the cost of an order, in time linear in the resources that the steps touch."""
         sizes, classes, touched = self.sizes, self.classes, self.touched
         count = len(sizes)
         left = list(self.toucher_count)
@@ -171,7 +170,7 @@ class Model(Struct, frozen=True):
         return Cost(self.constant + sum(size_of[kind] * number for kind, number in most.items()), peak, area)
 
     def peak(self, order: Sequence[int]) -> tuple[int, int | None]:
-        """The most live bytes of an order, and the first step with that many; None where there is no step."""
+        """Return the most live bytes of an order and the first step with that many, None without steps."""
         left = list(self.toucher_count)
         live = peak = self.constant
         at = order[0] if order else None
@@ -186,10 +185,10 @@ class Model(Struct, frozen=True):
         return peak, at
 
     def bounds(self) -> tuple[int, int]:
-        """Bytes that no order's pool and no order's peak can go below.
+        """Return bytes that no order's pool and no order's peak can go below.
 
         A resource is alive at a step that touches it, and at every step that must lie between its first writer and
-        another step that touches it; what is shown at every step that must follow its first writer.
+        another step that touches it; an output at every step that must follow its first writer.
         """
         count = len(self)
         ancestors = [0] * count
@@ -223,7 +222,7 @@ class Model(Struct, frozen=True):
         size_of = dict(zip(self.classes, self.sizes, strict=True))
         at_end = [self.classes[resource] for resource in self.shown]
         pool = sum(size_of[kind] * max(*numbers, at_end.count(kind)) for kind, numbers in alive.items())
-        # Some step that nothing waits for runs last, beside all that is shown.
+        # A step that no other waits for runs last, while all outputs are alive.
         least = sum(self.sizes[resource] for resource in self.shown) + min(
             sum(self.sizes[resource] for resource in self.touched[step] if resource not in self.shown)
             for step in range(count)
@@ -240,12 +239,12 @@ class Model(Struct, frozen=True):
 
 
 def storage_class(resource: Resource) -> object:
-    """Resources of an equal storage class can share one texture or buffer, through a view where formats differ."""
+    """Return a key that is equal for resources that can share a texture or buffer, perhaps through a view."""
     return resource.desc.storage_class if isinstance(resource.desc, TextureDesc) else resource.desc
 
 
 def alive_all_frame(resources: Mapping[str, Resource], versions: Versions) -> set[str]:
-    """Ids of what is there for the whole frame: history, kept values, the scene's, what `update` fills."""
+    """Return the ids of what exists for the whole frame: history, kept values, scene data, what `update` fills."""
     return {
         id
         for id, resource in resources.items()
@@ -254,7 +253,7 @@ def alive_all_frame(resources: Mapping[str, Resource], versions: Versions) -> se
 
 
 def _reading_order(waits: Waits, sinks: Sequence[StepKey]) -> list[StepKey]:
-    """Depth-first post-order from the sinks along what each step waits for, in the order of its ports."""
+    """Return a depth-first post-order from the sinks along what each step waits for, in the order of its ports."""
     order: list[StepKey] = []
     seen: set[StepKey] = set()
     for sink in sinks:

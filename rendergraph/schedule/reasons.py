@@ -1,4 +1,4 @@
-"""Why a step stands where it stands, and why a node does not run: one sentence each."""
+"""Why a step runs when it does, and why a node does not run: one sentence each."""
 
 from __future__ import annotations
 
@@ -12,10 +12,7 @@ from rendergraph.steps import Step
 
 
 def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
-    """Step key to what it is called: the node's id, with number and label where the node has several steps.
-
-    A copy is the framework's own and has a name that says what for.
-    """
+    """Return step key to name: the node's id, with number and label if it has several steps; of a copy its label."""
     several = {step.node for step in steps if step.index > 0 and step.kind != "copy"}
     names = {
         step.key: f"{step.node}[{f'{step.index} {step.label}'.rstrip()}]" if step.node in several else step.node
@@ -25,13 +22,7 @@ def step_names(steps: Sequence[Step]) -> dict[tuple[str, int], str]:
 
 
 def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dict[tuple[str, int], str]:
-    """Step key to why it runs when it does.
-
-    Args:
-        model: the steps.
-        order: their order.
-        chosen: what picked the order where it was not memory: `program order`.
-    """
+    """Return step key to why it runs when it does; `chosen` is what picked the order if not memory."""
     names = step_names(model.steps)
     place = {step: number for number, step in enumerate(order)}
     left = list(model.toucher_count)
@@ -71,7 +62,7 @@ def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dic
 
 
 def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versions) -> Mapping[str, str]:
-    """Node id to why none of its steps runs."""
+    """Return node id to why none of its steps runs."""
     running = {step.node for step in kept}
     culled: dict[str, str] = {}
     for node in dict.fromkeys(step.node for step in steps):

@@ -53,11 +53,7 @@ Path = tuple["Path | None", int]
 
 
 class _Beams:
-    """Beams over one model.
-
-    Attributes:
-        budget: resources that may still be looked at.
-    """
+    """Beams over one model; `budget` is the number of resources that may still be looked at."""
 
     def __init__(self, model: Model, budget: int) -> None:
         self.budget = budget
@@ -77,7 +73,7 @@ class _Beams:
         self._ends = [[(masks[r], model.sizes[r]) for r in resources] for resources in model.touched]
 
     def run(self, width: int, below: int, bound: int) -> tuple[tuple[list[int], int] | None, int]:
-        """Return an order below `below` with its peak, if there is one, and the least peak of what was passed over."""
+        """Return an order below `below` with its peak, if there is one, and the least peak of the states dropped."""
         first = tuple(step for step, needs in enumerate(self._needs) if not needs)
         level: list[tuple[int, int, int, tuple[int, ...], Path | None]] = [(bound, self._constant, 0, first, None)]
         passed_over = below
@@ -107,7 +103,7 @@ class _Beams:
         return (order[::-1], peak), passed_over
 
     def _moves(self, peak: int, live: int, done: int, ready: Sequence[int], below: int) -> list[tuple[int, int, int]]:
-        """Peak and live bytes after each step that can run, and the step."""
+        """Return peak and live bytes after each step that can run, and the step."""
         moves = []
         for step in ready:
             self.budget -= 1 + len(self._ends[step])
@@ -130,13 +126,9 @@ class _Beams:
 
 
 def improve(model: Model, order: Sequence[int], *, pool_bound: int, budget: int) -> tuple[list[int], Cost]:
-    """Move single steps to other legal places while that makes the order cheaper.
+    """Move single steps to other legal positions while that makes the order cheaper.
 
-    Args:
-        model: the steps.
-        order: where to start.
-        pool_bound: stop where the pool is that small; no order is better.
-        budget: touches to count before giving up, so that the result does not depend on the machine.
+    Stops at `pool_bound`, as no order has a smaller pool, or when the budget of touched resources is spent.
     """
     best, cost = list(order), model.cost(order)
     price = max(1, sum(model.toucher_count))
@@ -163,7 +155,7 @@ def improve(model: Model, order: Sequence[int], *, pool_bound: int, budget: int)
 
 
 def _window(model: Model, order: Sequence[int], place: int) -> tuple[int, int]:
-    """First and last place a step may move to while the others keep their order."""
+    """Return the first and last position that a step may move to while the others keep their order."""
     step = order[place]
     early = place
     waits = set(model.before[step])

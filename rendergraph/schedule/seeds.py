@@ -9,7 +9,7 @@ from rendergraph.schedule.model import Model
 
 
 def seeds(model: Model) -> Iterator[list[int]]:
-    """Legal orders to start from: the reading order, both post-orders, both list schedules."""
+    """Yield legal orders to start from: the reading order, the post-order, both list schedules."""
     yield list(range(len(model)))
     yield post_order(model)
     yield list_schedule(model)
@@ -24,7 +24,7 @@ def post_order(model: Model) -> list[int]:
     """
     count = len(model)
     left = model.toucher_count
-    # What a step leaves behind: what is born there and somebody else touches.
+    # What a step leaves behind: resources born there that another step touches.
     leaves = [0] * count
     seen = bytearray(len(model.sizes))
     for step in range(count):
@@ -66,7 +66,7 @@ def post_order(model: Model) -> list[int]:
 
 
 def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
-    """Of the ready steps always the one after which least is alive; backwards, of those that may come last.
+    """Always run the ready step after which least is alive; backwards, choose among the steps that may come last.
 
     A step's gain changes while it waits, whenever it becomes the last to touch a resource; it is then queued again.
     """
@@ -123,8 +123,8 @@ def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
 
 
 def random_order(model: Model, seed: int) -> list[int]:
-    """A legal order drawn by the seed: of the ready steps any with equal chance."""
-    import random  # few orders are drawn by lot
+    """Return a legal order drawn by the seed: any ready step with equal chance."""
+    import random  # rarely needed
 
     chooser = random.Random(seed)
     missing = [len(steps) for steps in model.before]
@@ -143,12 +143,7 @@ def random_order(model: Model, seed: int) -> list[int]:
 
 
 def program_order(model: Model, rank: Sequence[int]) -> list[int]:
-    """The order of nodes in the file and of recording, as far as it is legal.
-
-    Args:
-        model: the steps.
-        rank: place of each step in the program.
-    """
+    """Return the order of `rank`, the position of each step in the program, as far as it is legal."""
     missing = [len(steps) for steps in model.before]
     ready = [(rank[step], step) for step, number in enumerate(missing) if not number]
     heapify(ready)

@@ -274,7 +274,7 @@ SHADERS = {
     ),
     "macros that double": (
         BOMB + SHADER.replace("gain *", "(B30) * gain *"),
-        r"glow.(py|frag).* RG409 macros may make more than",
+        r"glow.(py|frag).* RG409 macros may expand this line",
     ),
 }
 

@@ -326,7 +326,7 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
         ("layout(r32f) uniform image2D a;", "1:1: RG443 a compute shader says how many threads a group has"),
         (
             "layout(local_size_x = N) in;\nlayout(r32f) uniform image2D a;",
-            "1:1: RG443 local_size_x: 'N' is no number, nor a macro that is one; write a number",
+            "1:1: RG443 local_size_x: 'N' is neither a number nor a macro that is one; write a number",
         ),
         (
             "layout(local_size_x = 0) in;\nlayout(r32f) uniform image2D a;",

@@ -288,17 +288,17 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
         ("out ivec2 c;", "1:11: RG441 no format holds the ivec2 of output 'c'; use uvec4 or int"),
         (
             "out vec4 c;\nuniform float a = other;",
-            "2:15: RG442 the initialiser of 'a': it is no literal; write a number, or say its default in the header",
+            "2:15: RG442 the initialiser of 'a': it is not a literal; write a number, or say its default in the header",
         ),
         (
             "out vec4 c;\nuniform vec3 a = vec3(1, 2);",
-            "2:14: RG442 the initialiser of 'a': vec3 takes 1 or 3 numbers, not 2; write a number, or say its default "
+            "2:14: RG442 the initialiser of 'a': vec3 expected 1 or 3 numbers, got 2; write a number, or say its default "
             "in the header",
         ),
         ("out vec4 c;\nuniform int a = 1.5;", "2:13: RG442 the default of 'a' (int) is a whole number, not 1.5"),
         (
             "layout(location = 1 + 0) out vec4 c;",
-            "1:35: RG441 the location of 'c': '1+0' is no number, nor a macro that is one; write a number, or leave the "
+            "1:35: RG441 the location of 'c': '1+0' is neither a number nor a macro that is one; write a number, or leave the "
             "layout out",
         ),
         (
