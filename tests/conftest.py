@@ -41,11 +41,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests marked `nightly` run with `--nightly`, all others without."""
-    nightly = bool(config.getoption("--nightly"))
-    chosen = [item for item in items if ("nightly" in item.keywords) == nightly]
-    config.hook.pytest_deselected(items=[item for item in items if ("nightly" in item.keywords) != nightly])
-    items[:] = chosen
+    """Run tests marked `nightly` with `--nightly`, all others without.
+
+    `nightly(keep=2)` on a parametrised test leaves two of its cases in `make check`, spread over all of them.
+    """
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    nightly: set[pytest.Item] = set()
+    for family in cases.values():
+        mark = family[0].get_closest_marker("nightly")
+        keep = mark.kwargs.get("keep", 0) if mark else 0
+        stride = len(family) // keep + 1 if keep else 0  # on a grid of two parameters this walks along the diagonal
+        kept = {family[number * stride % len(family)] for number in range(keep)}
+        nightly.update(item for item in family if item.get_closest_marker("nightly") and item not in kept)
+    wanted = bool(config.getoption("--nightly"))
+    config.hook.pytest_deselected(items=[item for item in items if (item in nightly) != wanted])
+    items[:] = [item for item in items if (item in nightly) == wanted]
 
 
 @pytest.fixture(scope="session")

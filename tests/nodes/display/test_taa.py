@@ -36,6 +36,7 @@ def test_one_frame_is_the_picture_as_it_is(session: rg.Session) -> None:
     np.testing.assert_array_equal(smooth, plain)
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["cornell_box", "stairs", "shadow_study", "spheres"])
 def test_sixteen_still_frames_are_a_supersampled_picture(session: rg.Session, scene: str) -> None:

@@ -70,6 +70,7 @@ def srgb(c: Floats) -> Floats:
     return np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
 
 
+@pytest.mark.nightly(keep=8)
 @pytest.mark.parametrize("curve", CURVES)
 @pytest.mark.parametrize("exposure", [0.0, *(pytest.param(stops, marks=pytest.mark.slow) for stops in (-2.0, 3.0))])
 def test_curve(session: rg.Session, curve: str, exposure: float) -> None:

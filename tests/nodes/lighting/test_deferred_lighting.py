@@ -59,6 +59,7 @@ cameras: {main: {eye: [0.5, 2, 4.2], target: [0, 0.4, 0.2], fov_y_degrees: 42, n
 # --- full precision: the same picture --------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_full_precision_draws_the_forward_picture(radiance: Any, steps_off: Any, scene: str) -> None:
@@ -89,6 +90,7 @@ def test_a_near_plane_of_a_twentieth_of_a_millimetre(session: rg.Session, tmp_pa
         assert (np.abs(other.astype(int) - forward).max(-1) > 1).mean() <= 1e-3
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ASSETS)
 def test_full_precision_draws_the_forward_picture_of_assets(
@@ -99,6 +101,7 @@ def test_full_precision_draws_the_forward_picture_of_assets(
     same(steps_off(radiance("deferred", file, FULL), radiance("forward-prepass", file)), most=24.0)
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", MODELS)
 def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shading: str) -> None:
@@ -115,6 +118,7 @@ def test_the_fast_visibility(radiance: Any, steps_off: Any) -> None:
     same(steps_off(*pictures))
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", ["phong", "pbr"])
 def test_an_obj_with_its_own_coefficients(radiance: Any, steps_off: Any, shared: Path, shading: str) -> None:
@@ -123,6 +127,7 @@ def test_an_obj_with_its_own_coefficients(radiance: Any, steps_off: Any, shared:
     same(steps_off(radiance("deferred", file, FULL, model), radiance("forward-prepass", file, model)))
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("term", ["ambient", "diffuse", "specular", "emissive"])
 def test_each_term_alone(radiance: Any, steps_off: Any, tmp_path: Path, term: str) -> None:

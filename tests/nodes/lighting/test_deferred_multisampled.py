@@ -27,6 +27,7 @@ def steps_apart(a: rg.Frame, b: rg.Frame) -> npt.NDArray[np.int64]:
     return np.asarray(np.abs(a["image"].astype(np.int64) - b["image"].astype(np.int64)).max(axis=-1))
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study", "many_lights", "glass"])
 def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str) -> None:
     pipeline = rg.load("deferred-msaa", scene=scene, size=(144, 81), patches=[UNSHADOWED])
@@ -41,6 +42,7 @@ def test_the_picture_is_that_of_every_sample_lit(session: rg.Session, scene: str
     np.testing.assert_allclose(marked["edge_share"], edges.mean(), rtol=1e-6)
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("scene", "taps", "size"),
     [

@@ -51,6 +51,7 @@ LIGHTS = {
 }
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("name", LIGHTS)
 def test_it_draws_the_deferred_picture(radiance: Any, steps_off: Any, tmp_path: Path, name: str) -> None:
     scene = room(tmp_path, LIGHTS[name])
@@ -72,12 +73,14 @@ def test_cameras_of_every_kind(radiance: Any, steps_off: Any, tmp_path: Path, ca
     assert off.max() <= 1.001
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("scene", ["cornell_box", "many_lights", "spheres"])
 def test_shipped_scenes(radiance: Any, steps_off: Any, scene: str) -> None:
     off = steps_off(radiance("deferred-stencil-lights", scene), radiance("deferred", scene))
     assert off.max() <= 1.001
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("shading", ["phong", "anisotropic", "unlit"])
 def test_every_shading_model(radiance: Any, steps_off: Any, tmp_path: Path, shading: str) -> None:
     scene, model = room(tmp_path, LIGHTS["several and the sun"]), f"light.shading={shading}"

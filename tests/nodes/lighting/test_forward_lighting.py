@@ -87,6 +87,7 @@ def test_empirical_models_draw_the_analytic_sphere(
 # --- terms and variants ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", ["unlit", "phong", "blinn_phong", "anisotropic", "pbr"])
 def test_the_terms_sum_to_the_whole(session: rg.Session, shading: str) -> None:

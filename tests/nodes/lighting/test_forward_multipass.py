@@ -24,6 +24,7 @@ def test_blended_surfaces_come_last(radiance: Any, steps_off: Any) -> None:
     assert off.max() <= 6
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["gltf/DamagedHelmet.glb", "gltf/UnlitTest.glb", "gltf/AlphaBlendModeTest.glb"])
 def test_it_draws_the_forward_picture_of_assets(radiance: Any, steps_off: Any, shared: Path, scene: str) -> None:

@@ -16,6 +16,7 @@ Floats = npt.NDArray[np.float64]
 SOME = "[inner_1, inner_4, outer_1, outer_2, outer_3]"
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("scene", "lights"), [("shadow_study", "sun"), ("many_lights", SOME)])
 def test_it_is_the_picture_of_visibility(radiance: Any, steps_off: Any, scene: str, lights: str) -> None:
     """Several lights, each with a stencil of its own that is wiped for the next."""
