@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct, field
 
-from rendergraph.annotations import Range
 from rendergraph.compile import Executable
 from rendergraph.compile.executable import source_of_buffer, source_of_region, source_of_view
 from rendergraph.declare import Node, Port, Views
@@ -33,6 +32,7 @@ from rendergraph.steps.checks import argument, own_port
 from rendergraph.steps.checks import buffer as buffer_of
 from rendergraph.steps.state import DepthBounds
 from rendergraph.textures import BufferDesc
+from rendergraph.typecheck import Range
 
 _Scissor: TypeAlias = Annotated[tuple[int, int, Count, Count], "x, y, width and height in texels"]
 _Part: TypeAlias = Annotated[float, Range(-1, 1)]

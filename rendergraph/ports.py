@@ -13,9 +13,9 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from rendergraph.annotations import Known, Length, Range, right
 from rendergraph.facts import Facts
 from rendergraph.textures import FORMATS, EnvironmentMap, Filter, Kind, Sampler, Semantic, Signature, Wrap
+from rendergraph.typecheck import Known, Length, Range, validated
 
 T = TypeVar("T")
 Rule: TypeAlias = Annotated[Callable[[Any, Facts], T], "a function of node and facts"]
@@ -89,7 +89,7 @@ class Part(Struct, frozen=True):
     link: Count | None = None
 
     def __post_init__(self) -> None:
-        right(self, f"a part of '{getattr(self.port, 'name', '')}'")
+        validated(self, f"a part of '{getattr(self.port, 'name', '')}'")
 
     def at_mip(self, level: int) -> Part:
         """The same layer's level."""
@@ -101,7 +101,7 @@ class Part(Struct, frozen=True):
 
     def sampled(self, filter: Filter = "nearest", wrap: Wrap = "clamp", compare: bool = False) -> Part:
         """The same part, read with this sampler."""
-        return replace(self, sampler=right(Sampler(filter, wrap, compare), "sampled"))
+        return replace(self, sampler=validated(Sampler(filter, wrap, compare), "sampled"))
 
 
 class Input(Port, frozen=True, eq=False):

@@ -9,27 +9,29 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated, Any
 
 from msgspec.structs import replace
 
 from rendergraph.document import Document, Value, YamlLimits, parse, read_text
 from rendergraph.errors import InputError
-from rendergraph.keys import Codes, Key, Later, Names, Naming, Table, Walk
-from rendergraph.keys.forms import ANYTHING, FLAG, NUMBER, TEXT, either, listed, row, shipped, version, whole
+from rendergraph.keys import Codes, Key, MapOf, Naming, Recursive, Table, Validator
+from rendergraph.keys.values import NUMBER, TEXT, listed, row, shipped, version, whole
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 from rendergraph.textures import MOST_SIDE
+from rendergraph.typecheck import Brief
 
 CODES = Codes(unknown="RG105", wrong="RG106", name="RG107", file="RG013")
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}\Z")
 """Node ids, output names, parameter names; long ones make messages and the search for the nearest name long."""
 
-_NAMING = Naming(NAME, "letters, digits, '_' and '-' make one, no digit first")
-_LINK = either(TEXT, listed(TEXT, "links"), wanted="a link as in 'node.port', a list of links, or null")
-_SIDES = row(whole(1, MOST_SIDE), whole(1, MOST_SIDE))
+_NAMING = Naming(NAME, "letters, digits, '_' and '-', no digit first")
+_LINK: Any = Annotated[TEXT | listed(TEXT, "links"), "a link as in 'node.port', a list of links, or null"]
+_SIDE = whole(1, MOST_SIDE)
 SIZE = Key(
     "size",
-    replace(_SIDES, shown="[2 numbers]", wanted=f"width and height in pixels, 1 to {MOST_SIDE}"),
+    Annotated[row(_SIDE, _SIDE), f"width and height in pixels, 1 to {MOST_SIDE}", Brief("[2 numbers]")],
     "Width and height in pixels.",
     example="size: [1280, 720]",
     code="RG207",
@@ -38,7 +40,7 @@ SIZE = Key(
 PARAMETER = Table(
     "'{}'",
     (
-        Key("default", ANYTHING, "Its value where nothing sets it."),
+        Key("default", Any, "Its value where nothing sets it."),
         Key("min", NUMBER, "Least legal value."),
         Key("max", NUMBER, "Greatest legal value."),
         Key("doc", TEXT, "What it does, in a line."),
@@ -48,7 +50,7 @@ INPUT = Table(
     "'{}'",
     (
         Key("semantic", TEXT, "What its texels mean, such as `radiance`."),
-        Key("optional", FLAG, "Whether it may stay unconnected."),
+        Key("optional", bool, "Whether it may stay unconnected."),
         Key("doc", TEXT, "What it is for, in a line."),
     ),
 )
@@ -56,10 +58,10 @@ NODE = Table(
     "'{}'",
     (
         # A resolved file carries its sub-pipelines where it would name their files.
-        Key("type", Later(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
-        Key("inputs", Names(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
-        Key("params", Names(ANYTHING, _NAMING), "Parameter to value; null is its default."),
-        Key("enabled", FLAG, "`false` takes the node out: its readers read what went into it.", default=True),
+        Key("type", Recursive(TEXT, lambda: PIPELINE), "A node type, or a pipeline file."),
+        Key("inputs", MapOf(_LINK, _NAMING), "Input to `node.port`, to a node's id, or to null for nothing."),
+        Key("params", MapOf(Any, _NAMING), "Parameter to value; null is its default."),
+        Key("enabled", bool, "`false` takes the node out: its readers read what went into it.", default=True),
     ),
 )
 _NOT_A_NODE = {"inputs": "a node cannot be called 'inputs'; rename it"}
@@ -82,10 +84,10 @@ PIPELINE: Table = Table(
             whole(1, 10_000),
             "How many frames decide the next, where it depends on those before; drawn in parts, each begins so early.",
         ),
-        Key("parameters", Names(PARAMETER, _NAMING), "Knobs of the whole pipeline, used as $name."),
-        Key("inputs", Names(INPUT, _NAMING), "What the file takes as the type of a node."),
-        Key("nodes", Names(NODE, _NAMING, "node id", _NOT_A_NODE), "Nodes by id."),
-        Key("outputs", Names(TEXT, _NAMING, "output name"), "Output name to `node.port`."),
+        Key("parameters", MapOf(PARAMETER, _NAMING), "Knobs of the whole pipeline, used as $name."),
+        Key("inputs", MapOf(INPUT, _NAMING), "What the file takes as the type of a node."),
+        Key("nodes", MapOf(NODE, _NAMING, "node id", _NOT_A_NODE), "Nodes by id."),
+        Key("outputs", MapOf(TEXT, _NAMING, "output name"), "Output name to `node.port`."),
     ),
     code="RG101",
 )
@@ -142,23 +144,23 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
     Raises:
         InputError: something was left out and `keep_going` is off, or the whole is not a mapping.
     """
-    walk, value = Walk(CODES, document.problems), document.root
+    validator, value = Validator(CODES, document.problems), document.root
     if value.data is None and not patch:
-        walk.say(value, CODES.file, f"the file is empty; a pipeline has at least {_HOLDS}")
-        raise InputError(walk.problems)
+        validator.report(value, CODES.file, f"the file is empty; a pipeline has at least {_HOLDS}")
+        raise InputError(validator.problems)
     if (sweep := value.get("sweep")) is not None:
         text = "this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
-        walk.say(sweep, "RG101", text, key=True)
-        raise InputError(walk.problems)
+        validator.report(sweep, "RG101", text, key=True)
+        raise InputError(validator.problems)
     scene = value.get("scene")
     if scene is not None and type(scene.data) is int and value.get("nodes") is value.get("extends") is None:
         text = "this is no pipeline but a scene; draw it with: rendergraph run forward --scene FILE"
-        walk.say(scene, "RG013", text, key=True)
-        raise InputError(walk.problems)
-    root = walk.root(value, _PATCH if patch else PIPELINE, _HOLDS)
-    if root is None or (walk.problems and not keep_going):
-        raise InputError(walk.problems)
-    return Document(root, document.source, tuple(walk.problems), document.dropped | walk.dropped)
+        validator.report(scene, "RG013", text, key=True)
+        raise InputError(validator.problems)
+    root = validator.file(value, _PATCH if patch else PIPELINE, _HOLDS)
+    if root is None or (validator.problems and not keep_going):
+        raise InputError(validator.problems)
+    return Document(root, document.source, tuple(validator.problems), document.dropped | validator.dropped)
 
 
 def entries(value: Value | None, *path: str) -> dict[str, Value]:

@@ -9,21 +9,21 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any
 
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Extensions, Function, InOut, Input, Node, Parameter, Port, Views
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.glsl import about
-from rendergraph.keys import Schema, as_markdown, file_schema
+from rendergraph.keys import as_markdown, file_schema
 from rendergraph.keys import schema as schema_of
 from rendergraph.read import NODE, PIPELINE, entries, read, word
 from rendergraph.resolve import PipelineSpec, resolve
 from rendergraph.resources import shipped_pipelines
 from rendergraph.settings import Roots
 from rendergraph.textures import Signature
+from rendergraph.typecheck import Schema, json_schema
 
 _LINK: Schema = {"type": ["string", "null"], "description": "`node.port`, a node's id, or null for nothing."}
 _ROLES = {
@@ -32,13 +32,6 @@ _ROLES = {
     "structural": "Changing it changes the plan.",
 }
 _REFERENCE: Schema = {"type": "string", "pattern": "^\\$", "description": "A parameter of the pipeline."}
-_PLAIN: dict[type, Schema] = {
-    bool: {"type": "boolean"},
-    int: {"type": "integer"},
-    float: {"type": "number"},
-    str: {"type": "string"},
-    NoneType: {"type": "null"},
-}
 _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "array": "a list"}
 
 
@@ -182,19 +175,14 @@ def _param(parameter: Parameter, extensions: Extensions) -> Schema:
         parameter: the parameter.
         extensions: where the choices come from that plugins add.
     """
-    own = _type(parameter.type)
-    doc = parameter.doc
-    if parameter.open_name:  # any word in its type, its own and the plugins' in the schema
-        added = extensions.choices(parameter.open_name)
-        doc = " ".join([doc, *(f"`{one.name}` ({one.plugin}): {about(one.value)}" for one in added)])
-        words = [*parameter.words, *(one.name for one in added)]
-        own = {"type": "string", "enum": list(dict.fromkeys(words))}
-    limits = {"minimum": parameter.limits.low, "maximum": parameter.limits.high}
-    limits = {key: limit for key, limit in limits.items() if limit is not None}
+    added = extensions.choices(parameter.open_name) if parameter.open_name else []
+    doc = " ".join([parameter.doc, *(f"`{one.name}` ({one.plugin}): {about(one.value)}" for one in added)])
+    own = json_schema(parameter.closed(tuple(one.name for one in added)))
+    limits = parameter.limits.schema("number")
     common = {"description": _about_param(parameter, doc), "default": json.loads(json.dumps(parameter.default))}
     kind = own.get("type")
-    if kind in _WORDS:  # said without alternatives: editors then name the limit that is broken
-        message = f"This is {_WORDS[kind]}, or $name for a parameter of the pipeline."
+    if kind in _WORDS:  # without alternatives, so that editors name the limit that is violated
+        message = f"expected {_WORDS[kind]}, or $name for a parameter of the pipeline"
         return {
             **common,
             **own,
@@ -211,31 +199,9 @@ def _param(parameter: Parameter, extensions: Extensions) -> Schema:
 def _about_param(parameter: Parameter, doc: str) -> str:
     """Its line of documentation, its default, its range and what a change of it costs."""
     unit = f" {parameter.unit}" if parameter.unit else ""
-    low, high = parameter.limits.low, parameter.limits.high
-    limits = {
-        (True, True): f", {low} to {high}",
-        (True, False): f", at least {low}",
-        (False, True): f", at most {high}",
-        (False, False): "",
-    }[low is not None, high is not None]
+    limits = f",{parameter.limits}" if str(parameter.limits) else ""
     default = json.dumps(parameter.default, ensure_ascii=False)
     return f"{doc}\n\nDefault {default}{unit}{limits}. {_ROLES[parameter.role]}"
-
-
-def _type(annotation: Any) -> Schema:
-    """A type as a schema; of what is not listed here, any value."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin in (Union, UnionType):
-        return {"anyOf": [_type(part) for part in arguments]}
-    if origin is Literal:
-        kinds = {type(choice) for choice in arguments}
-        return {"enum": list(arguments), **(_PLAIN.get(kinds.pop(), {}) if len(kinds) == 1 else {})}
-    if origin in (tuple, list):
-        several = origin is list or Ellipsis in arguments
-        entries = _type(arguments[0]) if several else [_type(part) for part in arguments]
-        count = {} if several else {"minItems": len(arguments), "maxItems": len(arguments)}
-        return {"type": "array", "items": entries, **count}
-    return dict(_PLAIN.get(annotation, {}))
 
 
 # --- is a file on disk still right? ----------------------------------------------------------------------------------

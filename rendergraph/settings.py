@@ -11,23 +11,19 @@ import os
 from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
+from typing import Annotated
 
 from msgspec import Struct
 
 from rendergraph.document import Source, from_plain, read_bytes, shown
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.keys import Codes, Form, Key, Table, Walk, plain
-from rendergraph.keys.forms import TEXT, listed
+from rendergraph.keys import Codes, Key, Table, Validator, plain
+from rendergraph.keys.values import listed
 from rendergraph.stamps import record_read
+from rendergraph.typecheck import Brief, Matching
 
 FILE_NAME = "rendergraph.toml"
-_PATH = Form(
-    "path",
-    "a path",
-    lambda value: TEXT.fits(value) and "\0" not in str(value.data),
-    TEXT.schema,
-)
-_PATHS = listed(_PATH, "paths")
+_PATHS = listed(Annotated[str, Matching(r"\s*[^\s\0][^\0]*\Z"), Brief("path")], "paths")
 SETTINGS = Table(
     "a settings file",
     (
@@ -88,10 +84,10 @@ def load(file: Path) -> Settings:
         table = tomllib.loads(read_bytes(file, _MOST_BYTES).decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise InputError(source.problem("RG017", f"not a valid settings file: {shown(error, 120)}")) from None
-    walk = Walk(_CODES)
-    root = walk.root(from_plain(table, source), SETTINGS, "lists of paths")
-    if walk.problems or root is None:
-        raise InputError(walk.problems)
+    validator = Validator(_CODES)
+    root = validator.file(from_plain(table, source), SETTINGS, "lists of paths")
+    if validator.problems or root is None:
+        raise InputError(validator.problems)
     paths = {key: tuple(file.parent / at_home(path) for path in found) for key, found in plain(root, SETTINGS).items()}
     return Settings(file, **paths)
 

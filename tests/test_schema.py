@@ -70,7 +70,7 @@ def test_ranges_and_units_are_there(made: dict[str, Any]) -> None:
     exposure = rules_of(made, "tonemap")["params"]["properties"]["exposure"]
     assert (exposure["minimum"], exposure["maximum"]) == (-16, 16)
     assert exposure["type"] == ["number", "string", "null"]  # a string is a pipeline's parameter
-    assert exposure["description"] == "Stops.\n\nDefault 0.0 EV, -16 to 16. Changing it rebuilds nothing."
+    assert exposure["description"] == "Stops.\n\nDefault 0.0 EV, from -16 to 16. Changing it rebuilds nothing."
 
 
 def test_an_independent_validator_agrees(made: dict[str, Any]) -> None:

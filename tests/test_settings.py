@@ -33,10 +33,10 @@ def test_the_nearest_above(tmp_path: Path) -> None:
         ("asset_root = []", r"RG017 a settings file has no key 'asset_root'; did you mean 'asset_roots'\?"),
         (
             'plugins = "nodes"',
-            r"RG017 'plugins' takes a list of paths, as in plugins = \[\"my_effects\"\], this is 'nodes'",
+            r"RG017 'plugins': expected a list of paths, as in plugins = \[\"my_effects\"\], got 'nodes'",
         ),
-        ("plugins = [1]", "RG017 'plugins' takes a list of paths"),
-        ('plugins = ["a\\u0000b"]', "RG017 'plugins' takes a list of paths"),
+        ("plugins = [1]", "RG017 'plugins': expected a list of paths"),
+        ('plugins = ["a\\u0000b"]', "RG017 'plugins': expected a list of paths"),
     ],
 )
 def test_wrong_settings(tmp_path: Path, text: str, message: str) -> None:

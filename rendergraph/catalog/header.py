@@ -5,16 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import get_args
+from typing import Annotated, Any, get_args
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
 from rendergraph.document import Document, Value, parse
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.keys import Codes, Form, Key, Names, Naming, Table, Walk
-from rendergraph.keys.forms import FLAG, NUMBER, TEXT, choice, either, listed, number, row, whole, word
+from rendergraph.keys import Codes, Key, MapOf, Naming, Table, Validator
+from rendergraph.keys.values import NUMBER, TEXT, choice, listed, number, row, vector, whole, word
 from rendergraph.textures import FORMATS, MOST_SIDE, Filter, Wrap
+from rendergraph.typecheck import Brief
 
 BEGIN, END = "/*---", "---*/"
 """The lines between which a header stands."""
@@ -94,37 +95,29 @@ def _problem(name: str, lines: list[str], number: int, text: str) -> Problem:
 
 _INPUT = word(_NAME, "the name of an input")
 _REFERENCE = word(re.compile(r"\$[A-Za-z]\w*\Z", re.ASCII), "$ and a parameter's name", "$name")
-_FACTOR = either(number(0, 64, above=True), _REFERENCE)
-_NAMES = Naming(_NAME, "letters, digits and '_' make one, a letter first")
+_FACTOR: Any = number(0, 64, above=True) | _REFERENCE
+_NAMES = Naming(_NAME, "letters, digits and '_', a letter first")
 
 
-def _count(most: int) -> Form:
-    return either(whole(1, most), _REFERENCE)
+def _count(most: int) -> Any:
+    return whole(1, most) | _REFERENCE
 
 
-_SIZE = either(
-    _FACTOR,
-    _INPUT,
-    row(_INPUT, _FACTOR),
-    row(whole(1, MOST_SIDE), whole(1, MOST_SIDE)),
-    wanted="a factor of the picture's size, an input's name, [input, factor], or [width, height] in texels",
-    shown="number | $name | input | [input, number] | [2 whole numbers]",
-)
-_THREADS = either(
-    _INPUT,
-    _count(1 << 30),
-    listed(_count(1 << 30), "whole numbers", 1, 3),
-    wanted="a port whose texels they are, or 1 to 3 whole numbers",
-    shown="name | [whole number, …]",
-)
-_DEFAULT = either(
-    FLAG,
-    NUMBER,
-    TEXT,
-    listed(NUMBER, "numbers", 2, 4),
-    wanted="a number, a switch, a word or a list of 2 to 4 numbers",
-)
-_FORMAT = either(choice(*FORMATS), _REFERENCE, shown="format | $name")
+_SIZE: Any = Annotated[
+    _FACTOR | _INPUT | row(_INPUT, _FACTOR) | row(*[whole(1, MOST_SIDE)] * 2),
+    "a factor of the picture's size, an input's name, [input, factor], or [width, height] in texels",
+    Brief("number | $name | input | [input, number] | [2 whole numbers]"),
+]
+_THREADS: Any = Annotated[
+    _INPUT | _count(1 << 30) | listed(_count(1 << 30), "whole numbers", 1, 3),
+    "a port whose texels are the threads, or 1 to 3 whole numbers",
+    Brief("name | [whole number, …]"),
+]
+_DEFAULT: Any = Annotated[
+    bool | NUMBER | TEXT | listed(NUMBER, "numbers", 2, 4),
+    "a number, true or false, a word or a list of 2 to 4 numbers",
+]
+_FORMAT: Any = Annotated[choice(*FORMATS) | _REFERENCE, Brief("format | $name")]
 
 _DOC = Key("doc", TEXT, "What it is, in a line.")
 INPUT = Table(
@@ -133,8 +126,8 @@ INPUT = Table(
         _DOC,
         Key("semantic", word(_NAME, "a word"), "What it must mean; of a function its name.", "any"),
         Key("kind", choice("function", "view"), "For what is no texture; the sampler's by default."),
-        Key("optional", FLAG, "It may stay unconnected, and the text goes without `HAS_<NAME>`.", False),
-        Key("many", FLAG, "It takes a list, as `name_0`, `name_1`, ….", False),
+        Key("optional", bool, "It may stay unconnected, and the text goes without `HAS_<NAME>`.", False),
+        Key("many", bool, "It takes a list, as `name_0`, `name_1`, ….", False),
         Key("size", choice("same", "any"), "Whether it is as large as the target.", "same"),
         Key("filter", choice(*get_args(Filter)), "How it is read between texels.", "nearest"),
         Key("wrap", choice(*get_args(Wrap)), "How it is read beyond its edges.", "clamp"),
@@ -150,16 +143,16 @@ OUTPUT = Table(
         Key("like", _INPUT, "An input whose format, size, semantic and view it takes over where nothing else is said."),
         Key("format", _FORMAT, "Format of a texel, such as `r32f`.", "rgba16f"),
         Key("size", _SIZE, "A factor of the picture's size, an input, or texels.", 1),
-        Key("mips", either(choice("all"), _count(15)), "Levels of detail.", 1),
+        Key("mips", choice("all") | _count(15), "Levels of detail.", 1),
         Key("layers", _count(2048), "Layers of an array.", 1),
         Key("samples", _count(16), "Samples of a texel.", 1),
         Key(
             "clear",
-            either(NUMBER, listed(NUMBER, "4 numbers", 4, 4), shown="number | [4 numbers]"),
+            NUMBER | vector(4),
             "What it holds where nothing is written.",
         ),
         Key("first", NUMBER, "What `@previous` reads in the first frame.", 0),
-        Key("kept", FLAG, "It outlives the frame, and is made again only when what it is made of has changed.", False),
+        Key("kept", bool, "It outlives the frame, and is made again only when what it is made of has changed.", False),
         Key("bytes", _count(1 << 30), "Size of a buffer."),
     ),
 )
@@ -179,9 +172,9 @@ HEADER = Table(
     "a header",
     (
         Key("doc", TEXT, "What the node does: a line, and behind an empty line as much as you like."),
-        Key("inputs", Names(INPUT, _NAMES, "name of an input"), "What it reads.", example="inputs: {color: {doc: …}}"),
-        Key("outputs", Names(OUTPUT, _NAMES, "name of an output"), "What it makes."),
-        Key("params", Names(PARAM, _NAMES, "name of a parameter"), "What a pipeline can set."),
+        Key("inputs", MapOf(INPUT, _NAMES, "name of an input"), "What it reads.", example="inputs: {color: {doc: …}}"),
+        Key("outputs", MapOf(OUTPUT, _NAMES, "name of an output"), "What it makes."),
+        Key("params", MapOf(PARAM, _NAMES, "name of a parameter"), "What a pipeline can set."),
         Key("threads", _THREADS, "Of a `.comp`: a texture that has a texel for each thread, or 1 to 3 numbers."),
     ),
 )
@@ -191,10 +184,10 @@ _CODES = Codes(unknown="RG440", wrong="RG440", name="RG440", file="RG440")
 
 def _checked(document: Document) -> Header:
     """A header without what is wrong in it."""
-    walk = Walk(_CODES, document.problems)
+    validator = Validator(_CODES, document.problems)
     root = document.root
     if root.data is not None:
-        root = walk.root(root, HEADER, "doc, inputs, outputs, params") or root.with_data(None)
+        root = validator.file(root, HEADER, "doc, inputs, outputs, params") or root.with_data(None)
     names: dict[str, Value] = {}
     parts: dict[str, dict[str, dict[str, Value]]] = {"inputs": {}, "outputs": {}, "params": {}}
     for section, found in parts.items():
@@ -202,10 +195,10 @@ def _checked(document: Document) -> Header:
             if name in names:
                 line = names[name].key_line
                 text = f"'{name}' stands in line {line} too; no port or parameter has the name of another"
-                walk.say(entry, _CODES.name, text, key=True)
+                validator.report(entry, _CODES.name, text, key=True)
                 continue
             names[name] = entry
             found[name] = {key: value for key, value in entry.items() if value.data is not None}
     given = {key: value for key, value in root.items() if value.data is not None}
     doc = str(given["doc"].data).strip() if "doc" in given else None
-    return Header(doc, **parts, names=names, threads=given.get("threads"), problems=tuple(walk.problems))
+    return Header(doc, **parts, names=names, threads=given.get("threads"), problems=tuple(validator.problems))

@@ -6,12 +6,12 @@ import re
 from collections.abc import Mapping, Sequence, Set
 from typing import Any, Literal
 
-from rendergraph.annotations import Range, fits
 from rendergraph.declare import Parameter
 from rendergraph.document import Value
 from rendergraph.errors import Problem, suggestion
 from rendergraph.glsl.globals import Global
 from rendergraph.glsl.literals import literal
+from rendergraph.typecheck import Range, fits
 
 _SCALAR: dict[str, type] = {"float": float, "int": int, "uint": int, "bool": bool}
 _VECTOR = re.compile(r"([iu]?)vec([234])\Z")
@@ -132,7 +132,7 @@ class HeaderParameter:
                 text = f"the initialiser of '{self.name}': {error}; write a number, or say its default in the header"
                 self.said.append(("RG442", text))
         parts = list(value) if isinstance(value, list | tuple) else [value] * count
-        if len(parts) != count or not all(fits(number, part) and Range().holds(number) for number in parts):
+        if len(parts) != count or not all(fits(number, part) and Range().accepts(number) for number in parts):
             words = f"{count} numbers" if vector else _WORDS[part]
             text = f"the default of '{self.name}' ({found.type}) is {words}, not {_text(value)}"
             self._wrong("RG442", "default", text)
@@ -164,7 +164,7 @@ class HeaderParameter:
             self._wrong("RG442", "min", f"'{self.name}' has a min of {limits.low:g} above its max of {limits.high:g}")
             return
         for number in default if isinstance(default, tuple) else (default,):
-            if fits(number, float) and not limits.holds(number):
+            if fits(number, float) and not limits.accepts(number):
                 key = next((key for key in ("default", "min", "max") if key in self.entry), "")
                 self._wrong("RG442", key, f"the default of '{self.name}' is {number:g}, outside of its own range")
                 return

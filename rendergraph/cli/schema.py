@@ -13,7 +13,7 @@ from rendergraph.cli.output import warn
 from rendergraph.errors import InputError, Problem, suggestion
 
 if TYPE_CHECKING:
-    from rendergraph.keys import Schema
+    from rendergraph.typecheck import Schema
 
 
 _KINDS = ("pipeline", "scene", "sweep", "results", "results-csv")

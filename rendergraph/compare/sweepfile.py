@@ -7,15 +7,15 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from rendergraph.compare.axes import MOST_RUNS, Axis, Space, axis_of, repeated
 from rendergraph.compare.ranges import RANGE
 from rendergraph.compare.sampling import Sampling
 from rendergraph.document import Value, load
 from rendergraph.errors import InputError, Problem
-from rendergraph.keys import Codes, Key, Names, Table, Walk, plain
-from rendergraph.keys.forms import ANYTHING, TEXT, choice, either, listed, shipped, version, whole, word
+from rendergraph.keys import Codes, Key, MapOf, Table, Validator, plain
+from rendergraph.keys.values import TEXT, choice, listed, shipped, version, whole, word
 from rendergraph.read import SIZE, entries
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 
@@ -23,11 +23,10 @@ MOST_MEASURED = 10_000
 """Frames of a run."""
 MOST_REPEATS = 1000
 _CODES = Codes(unknown="RG030", wrong="RG030", name="RG030", file="RG030")
-_VALUES = either(
-    listed(ANYTHING, "values", least=1),
-    word(RANGE, "a range such as 8:64:8 or log:0.1:10:5", "FIRST:LAST:STEP"),
-    wanted="a list of values, or a range such as 8:64:8 or log:0.1:10:5",
-)
+_VALUES: Any = Annotated[
+    listed(Any, "values", least=1) | word(RANGE, "a range", "FIRST:LAST:STEP"),
+    "a list of values, or a range such as 8:64:8 or log:0.1:10:5",
+]
 SWEEP = Table(
     "a sweep",
     (
@@ -41,7 +40,7 @@ SWEEP = Table(
         ),
         Key(
             "axes",
-            Names(_VALUES, what="path", null=False, least=1),
+            MapOf(_VALUES, what="path", null=False, least=1),
             "Paths, as `-s` takes them, each with a list of values or a range, both ends included.",
             required=True,
             example="axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}",
@@ -59,7 +58,7 @@ SWEEP = Table(
         Key("seed", whole(0), "Of the samples: the same one gives the same.", default=0),
         Key(
             "minimise",
-            either(TEXT, listed(TEXT, "names", least=1), wanted="a name such as flip or ms, or a list of them"),
+            Annotated[TEXT | listed(TEXT, "names", least=1), "a name such as flip or ms, or a list of names"],
             "Look for what makes this least, or these, in place of all combinations.",
             example="minimise: [flip, ms]",
         ),
@@ -68,7 +67,7 @@ SWEEP = Table(
         Key("metric", TEXT, "A port, `NODE.PORT`, whose texture is measured in place of the picture."),
         Key("scene", shipped(shipped_scenes), "What is drawn, in place of the pipeline's own."),
         SIZE,
-        Key("set", Names(ANYTHING, what="path"), "Paths to values that hold for all runs."),
+        Key("set", MapOf(Any, what="path"), "Paths to values that hold for all runs."),
         Key("frames", whole(1, MOST_MEASURED), "How many frames are measured."),
         Key("repeats", whole(1, MOST_REPEATS), "How often they are measured, each time anew."),
         Key("keep", choice("all", "best"), "Which pictures stay; `best` are those of the Pareto front."),
@@ -135,11 +134,11 @@ def read_sweep(path: Path) -> SweepFile:
     Raises:
         InputError: it is missing, no YAML, or says something a sweep cannot have; with all mistakes.
     """
-    walk = Walk(_CODES)
-    root = walk.root(load(path).root, SWEEP, "`sweep: 1`, `pipeline` and `axes`")
-    axes = [_axis(str(name), listed, walk) for name, listed in entries(root, "axes").items()] if root else []
-    if walk.problems or root is None:
-        raise InputError(walk.problems)
+    validator = Validator(_CODES)
+    root = validator.file(load(path).root, SWEEP, "`sweep: 1`, `pipeline` and `axes`")
+    axes = [_axis(str(name), listed, validator) for name, listed in entries(root, "axes").items()] if root else []
+    if validator.problems or root is None:
+        raise InputError(validator.problems)
     said = plain(root, SWEEP)
     groups = {",".join(group.plain()): group for group in _parts(root.get("zip"))}
     said |= {key: _beside(path, said[key]) for key in ("pipeline", "reference", "scene") if key in said}
@@ -173,15 +172,15 @@ def value_text(value: Value) -> str:
     return plain if isinstance(plain, str) else json.dumps(plain)
 
 
-def _axis(path: str, given: Value, walk: Walk) -> Axis:
+def _axis(path: str, given: Value, validator: Validator) -> Axis:
     if isinstance(given.data, str):
         try:
             return axis_of(path, given.data)
         except ValueError as error:
-            walk.say(given, _CODES.wrong, str(error))
+            validator.report(given, _CODES.wrong, str(error))
     values = [value_text(value) for value in _parts(given)]
     for value in repeated(values):
-        walk.say(given, _CODES.wrong, f"axis '{path}' has the value {value} twice")
+        validator.report(given, _CODES.wrong, f"axis '{path}' has the value {value} twice")
     return Axis(path, tuple(values))
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from msgspec import Struct
 
-from rendergraph.annotations import Matching, mistakes_of
 from rendergraph.errors import Problem
 from rendergraph.textures import Semantic
+from rendergraph.typecheck import Matching, mistakes_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -24,11 +24,11 @@ else:
 
 Include: TypeAlias = Annotated[str | Path, "the name of an include"]
 Word: TypeAlias = Annotated[
-    str, Matching(r"[a-z][a-z0-9]*(_[a-z0-9]+)*"), "a word of small letters, digits and single '_'"
+    str, Matching(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z"), "a word of small letters, digits and single '_'"
 ]
 """What becomes part of a macro."""
 Ending: TypeAlias = Annotated[
-    str, Matching(r"\.[a-z0-9][a-z0-9_-]*"), "a file's ending, a dot and small letters as in '.stl'"
+    str, Matching(r"\.[a-z0-9][a-z0-9_-]*\Z"), "a file's ending, a dot and small letters as in '.stl'"
 ]
 
 

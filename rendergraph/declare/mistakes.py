@@ -9,13 +9,13 @@ from inspect import get_annotations
 from typing import Literal, get_args, get_origin
 from weakref import WeakSet
 
-from rendergraph.annotations import may_be, mistakes_in, parts_of, quoted
 from rendergraph.declare.blame import told
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
 from rendergraph.declare.port_mistakes import port_mistakes
 from rendergraph.errors import Problem, is_interruption, suggestion
 from rendergraph.ports import History, Internal
+from rendergraph.typecheck import accepts, mistakes_in, parts_of, quoted
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
@@ -198,7 +198,7 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
             try:
                 parameter.convert(json.loads(written))
             except (TypeError, ValueError) as error:
-                wrong = f"wrong: it {error}"
+                wrong = f"wrong: {error}"
         if wrong and parameter.role != "plain":
             yield _problem(name, f"the default of '{name}', {quoted(parameter.default)}, is {wrong}")
         sound = sound and not wrong
@@ -218,7 +218,7 @@ def _not_for_a_shader(parameter: Parameter) -> str | None:
         odd = [word for word in parameter.words if not re.fullmatch(r"[A-Za-z0-9_-]+", word)]
         if odd:
             return f"a define with the choice '{odd[0]}', which cannot stand in a macro's name"
-        if list in kinds or may_be(parameter.type, tuple):
+        if list in kinds or accepts(parameter.type, tuple):
             return "a define of several numbers; macros hold one, make it a param"
         if str in kinds and not parameter.open_name:
             return "a define of free text; list its choices as Literal[…]"

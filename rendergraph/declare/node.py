@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform, get_origin
 
 from msgspec.structs import replace
 
-from rendergraph.annotations import hints_of, quoted
 from rendergraph.declare.parameters import Parameter, define, param, structural
 from rendergraph.errors import Misuse, suggestion
 from rendergraph.ports import Function, InOut, Input, Output, Port, Views
 from rendergraph.steps import Frame, Steps
+from rendergraph.typecheck import hints_of, quoted
 
 DROPPED: Any = None
 """What a subclass sets a port of its base to that it does without: `depth = DROPPED`."""
@@ -41,7 +41,7 @@ class Node:
             except KeyError:
                 wrong.append(f"it has no parameter '{name}'{suggestion(name, parameters)}")
             except (TypeError, ValueError) as error:
-                wrong.append(f"'{name}' {error}, this is {quoted(values[name])}")
+                wrong.append(f"'{name}': {error}, got {quoted(values[name])}")
         if wrong:
             raise Misuse(f"{type(self).__name__}: {'; '.join(wrong)}")
         vars(self).update({name: parameter.default for name, parameter in parameters.items()} | values)

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeAlias, get_args, get_origin
 
 from msgspec import Struct
 
-from rendergraph.annotations import Range, conversion_to, test_of, words_for
+from rendergraph.typecheck import Range, conversion_to, test_of, words_for
 
 Role: TypeAlias = Literal["param", "define", "structural", "plain"]
 _is_number = test_of(float)
@@ -70,22 +70,22 @@ class Parameter(Struct, frozen=True, dict=True):
         """A value as its type has it: a list of a file as a tuple, a whole number as a float.
 
         Raises:
-            TypeError: it is not what the type says: `takes a whole number`.
+            TypeError: it is not what the type says: `expected a whole number`.
             ValueError: a number in it is not finite or outside the limits: `must be at least 1`.
         """
         convert, fits = self._taken
         found = convert(value)
         if not fits(found):
-            raise TypeError(f"takes {self.takes()}")
-        if wrong := self.beyond(found):
+            raise TypeError(f"expected {self.takes()}")
+        if wrong := self.violation(found):
             raise ValueError(wrong)
         return found
 
-    def beyond(self, value: object) -> str | None:
+    def violation(self, value: object) -> str | None:
         """What a value that is not finite or outside the limits must be; None where it is fine."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
         for number in parts:
-            if _is_number(number) and (wrong := self.limits.beyond(number)):
+            if _is_number(number) and (wrong := self.limits.violation(number)):
                 return wrong
         return None
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rendergraph.annotations import mistakes_of, quoted
 from rendergraph.declare.node import Node
 from rendergraph.errors import Problem, suggestion
 from rendergraph.ports import Function, History, InOut, Input, Internal, Output, Port, Views, WrittenPort
 from rendergraph.textures import Semantic, Signature
+from rendergraph.typecheck import mistakes_of, quoted
 
 
 def port_mistakes(cls: type[Node]) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""The grammar of the files we read: tables of keys with what each takes, and one walk that holds a file against them.
+"""The grammar of the files we read: tables of keys with their types, and one validator that checks a file against them.
 
 Pipelines, scenes, sweeps, project settings and the headers of shader files have one table each. From it come the check
 of a file, `rendergraph explain`, the pages of the reference and the JSON Schemas for editors.
@@ -6,37 +6,36 @@ of a file, `rendergraph explain`, the pages of the reference and the JSON Schema
 
 from __future__ import annotations
 
-from rendergraph.keys.forms import Form, Schema
 from rendergraph.keys.tables import (
     Key,
-    Later,
-    Names,
+    MapOf,
     Naming,
+    Recursive,
     Table,
-    Takes,
+    Type,
     as_markdown,
-    briefly,
+    brief,
     file_schema,
+    nullable,
     plain,
     schema,
 )
-from rendergraph.keys.walk import MOST_PROBLEMS, Codes, Walk
+from rendergraph.keys.validator import MOST_PROBLEMS, Codes, Validator
 
 __all__ = [
     "MOST_PROBLEMS",
     "Codes",
-    "Form",
     "Key",
-    "Later",
-    "Names",
+    "MapOf",
     "Naming",
-    "Schema",
+    "Recursive",
     "Table",
-    "Takes",
-    "Walk",
+    "Type",
+    "Validator",
     "as_markdown",
-    "briefly",
+    "brief",
     "file_schema",
+    "nullable",
     "plain",
     "schema",
 ]

@@ -1,4 +1,4 @@
-"""Tables: what the mappings of a file hold, as keys that are known or as names that are free."""
+"""Tables: the keys of the mappings in a file, known ones or names that authors choose."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any, TypeAlias
 
 from msgspec import Struct, field
 
+from rendergraph import typecheck
 from rendergraph.document import Value
-from rendergraph.keys.forms import Form, Schema, regular
+from rendergraph.typecheck import Schema, conversion_to, json_schema
 
 
 class Key(Struct, frozen=True):
@@ -19,17 +20,17 @@ class Key(Struct, frozen=True):
 
     Attributes:
         name: as written in the file.
-        takes: what its values are.
+        type: the type of its values: an annotation, see `keys.values`, or a mapping.
         doc: one line.
         default: the value where the file has none; None where that means absent.
         unit: the unit's symbol, empty for a pure number.
-        required: it must be there.
+        required: the file must have it.
         example: how it is written, for messages.
-        code: of the mistake that a value does not fit; empty where it is the file's usual one.
+        code: of the mistake that a value does not fit; empty for the file's usual one.
     """
 
     name: str
-    takes: Takes
+    type: Type
     doc: str
     default: Any = None
     unit: str = ""
@@ -38,89 +39,77 @@ class Key(Struct, frozen=True):
     code: str = ""
 
 
-Variant: TypeAlias = "tuple[Key, ...] | Mapping[str, tuple[Key, ...]]"
-"""The keys that a key brings with it, whatever its value, or by its value."""
-
-
 class Table(Struct, frozen=True, dict=True):
-    """A mapping of known keys.
+    """A mapping with known keys.
 
     Attributes:
         what: how messages name it, `light '{}'`, with its own name put in.
-        keys: what it may hold.
-        variants: keys of which exactly one is there, and the keys that each brings with it: always the same, or by the
-            word that is its value.
-        refused: keys that one might look for, and what is said of them.
-        code: of an unknown key; empty where it is the file's usual one.
+        keys: its keys.
+        alternatives: keys of which exactly one is required, and the further keys that each allows: always the same, or
+            by the word that is its value.
+        refused: keys that one might look for, with the message for each.
+        code: of an unknown key; empty for the file's usual one.
     """
 
     what: str
     keys: tuple[Key, ...]
-    variants: Mapping[str, Variant] = field(default_factory=dict)
+    alternatives: Mapping[str, tuple[Key, ...] | Mapping[str, tuple[Key, ...]]] = field(default_factory=dict)
     refused: Mapping[str, str] = field(default_factory=dict)
     code: str = ""
 
     @cached_property
-    def _own(self) -> dict[str, Key]:
+    def _common(self) -> dict[str, Key]:
         return {key.name: key for key in self.keys}
 
     def keys_of(self, value: Value) -> dict[str, Key]:
-        """The keys that a mapping may hold; where its variant is not known, those of all."""
-        found = self._own
-        for name, brings in self.variants.items():
+        """The keys that a mapping may hold: of an alternative whose word is unknown those of all words."""
+        found = self._common
+        for name, allowed in self.alternatives.items():
             given = value.get(name)
             if given is None or given.data is None:
                 continue
-            if isinstance(brings, tuple):
-                known = [brings]
-            else:
-                own = brings.get(str(given.data))
-                known = list(brings.values()) if own is None else [own]
-            found = found | {key.name: key for keys in known for key in keys}
+            if not isinstance(allowed, tuple):
+                allowed = allowed.get(str(given.data)) or tuple(key for keys in allowed.values() for key in keys)
+            found = found | {key.name: key for key in allowed}
         return found
 
     def sections(self, name: str = "") -> Iterator[tuple[str, tuple[Key, ...]]]:
-        """All keys of it and of what is in it, section by section, each with its name."""
-        always = [key for brings in self.variants.values() if isinstance(brings, tuple) for key in brings]
+        """All keys of the table and of the tables in it, section by section, each with its name."""
+        always = [key for allowed in self.alternatives.values() if isinstance(allowed, tuple) for key in allowed]
         keys = (*self.keys, *always)
         yield name, keys
-        for key, brings in self.variants.items():
-            if not isinstance(brings, tuple):
-                yield from ((f"{name} ({key}: {word})", own) for word, own in brings.items())
+        for key, allowed in self.alternatives.items():
+            if not isinstance(allowed, tuple):
+                yield from ((f"{name} ({key}: {word})", more) for word, more in allowed.items())
         for one in keys:
-            inner = one.takes.of if isinstance(one.takes, Names) else one.takes
+            inner = one.type.of if isinstance(one.type, MapOf) else one.type
             if isinstance(inner, Table):
                 yield from inner.sections(f"{name} ({one.name})" if name else one.name)
 
 
 class Naming(Struct, frozen=True):
-    """Which names are good.
-
-    Attributes:
-        pattern: of all of a name.
-        words: what makes one.
-    """
+    """Legal names: the pattern of a whole name, and the same in words, to follow `use`."""
 
     pattern: re.Pattern[str]
     words: str
 
 
-FREE = Naming(re.compile(r"[^\x00-\x1f\x7f-\x9f]+\Z"), "names are text")
+FREE = Naming(re.compile(r"[^\x00-\x1f\x7f-\x9f]+\Z"), "text without control characters")
 
 
-class Names(Struct, frozen=True):
-    """A mapping of free names.
+class MapOf(Struct, frozen=True):
+    """A mapping with names that authors choose.
 
     Attributes:
-        of: what each name has.
-        naming: which names there may be.
+        of: the type of each value.
+        naming: which names are legal.
         what: a name, in words.
-        refused: names that have another meaning, and what is said of them.
-        null: a name may have null; a table of no required key always may.
-        least: how many there are at least.
+        refused: names that have another meaning, with the message for each.
+        null: values may be null; a table without required keys always may.
+        least: minimum count.
     """
 
-    of: Takes
+    of: Type
     naming: Naming = FREE
     what: str = "name"
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -128,70 +117,65 @@ class Names(Struct, frozen=True):
     least: int = 0
 
 
-class Later(Struct, frozen=True):
-    """A table that holds itself, or a value in its place.
+class Recursive(Struct, frozen=True):
+    """A table that holds itself, which `table` gives, or a value of a type in its place."""
 
-    Attributes:
-        form: of the value.
-        table: what gives the table.
-    """
-
-    form: Form
+    type: Any
     table: Callable[[], Table]
 
 
-Takes: TypeAlias = "Form | Table | Names | Later"
-"""What a key takes: a value, or a mapping."""
+Type: TypeAlias = "Table | MapOf | Recursive | Any"
+"""What a key takes: a mapping, or a value of an annotation."""
 
 
-def briefly(takes: Takes) -> str:
-    """What a key takes, in a word or two for a table."""
-    if isinstance(takes, Later):
-        return takes.form.shown
-    return takes.shown if isinstance(takes, Form) else "mapping"
+def brief(type: Type) -> str:
+    """Return a type in a word or two for a table."""
+    if isinstance(type, Table | MapOf):
+        return "mapping"
+    return typecheck.brief(type.type if isinstance(type, Recursive) else type)
 
 
-def plain(value: Value, takes: Takes) -> Any:
-    """What a value that fits means, as plain Python; what is null is left out of mappings."""
-    if isinstance(takes, Form):
-        return takes.plain(value)
-    if isinstance(takes, Later):
+def plain(value: Value, type: Type) -> Any:
+    """Return a validated value as plain Python, as its type converts it; null is left out of mappings."""
+    if isinstance(type, Recursive):
         return value.plain()
+    if not isinstance(type, Table | MapOf):
+        return conversion_to(type)(value.plain())
     given = {name: child for name, child in value.items() if child.data is not None}
-    if isinstance(takes, Names):
-        return {name: plain(child, takes.of) for name, child in given.items()}
-    keys = takes.keys_of(value)
-    return {name: plain(child, keys[name].takes) for name, child in given.items() if name in keys}
+    if isinstance(type, MapOf):
+        return {name: plain(child, type.of) for name, child in given.items()}
+    keys = type.keys_of(value)
+    return {name: plain(child, keys[name].type) for name, child in given.items() if name in keys}
 
 
 # --- JSON Schema (draft 07, which is what editors read) --------------------------------------------------------------
 
 
-def schema(takes: Takes) -> Schema:
-    """The JSON Schema of what a key takes."""
-    if isinstance(takes, Form):
-        return takes.schema()
-    if isinstance(takes, Later):
-        return {"anyOf": [takes.form.schema(), {"$ref": "#"}]}
-    if isinstance(takes, Table):
-        return _table(takes)
-    values = schema(takes.of)
-    refused = {"not": {"enum": list(takes.refused)}} if takes.refused else {}
+def schema(type: Type) -> Schema:
+    """Return the JSON Schema of a type."""
+    if isinstance(type, Recursive):
+        return {"anyOf": [json_schema(type.type), {"$ref": "#"}]}
+    if isinstance(type, Table):
+        return _table(type)
+    if not isinstance(type, MapOf):
+        return json_schema(type)
+    values = schema(type.of)
+    refused = {"not": {"enum": list(type.refused)}} if type.refused else {}
     return {
         "type": "object",
-        "propertyNames": {"pattern": regular(takes.naming.pattern), **refused},
-        "additionalProperties": nullable(values) if takes.null and isinstance(takes.of, Form) else values,
-        **({"minProperties": takes.least} if takes.least else {}),
+        "propertyNames": {**typecheck.Matching(type.naming.pattern).schema("string"), **refused},
+        "additionalProperties": values if isinstance(type.of, Table) or not type.null else nullable(values),
+        **({"minProperties": type.least} if type.least else {}),
     }
 
 
 def file_schema(table: Table) -> Schema:
-    """The JSON Schema of a file."""
+    """Return the JSON Schema of a file."""
     return {"$schema": "http://json-schema.org/draft-07/schema#", **_table(table)}
 
 
 def as_markdown(value: Any) -> Any:
-    """A schema, where editors that show Markdown are told what is written in it; the others take it as it stands."""
+    """Return a schema that also tells editors which show Markdown to do so, where a description uses it."""
     if isinstance(value, list):
         return [as_markdown(part) for part in value]
     if not isinstance(value, dict):
@@ -205,52 +189,47 @@ def as_markdown(value: Any) -> Any:
 def _table(table: Table) -> Schema:
     required = [key.name for key in table.keys if key.required]
     found = {
-        "type": "object" if required or table.variants else ["object", "null"],
-        "properties": {key.name: key_schema(key) for key in table.keys},
+        "type": "object" if required or table.alternatives else ["object", "null"],
+        "properties": _properties(table.keys),
         **({"required": required} if required else {}),
     }
-    if not table.variants:
+    if not table.alternatives:
         return {**found, "additionalProperties": False}
-    known: dict[str, Any] = {key.name: True for key in table.keys}
+    common: dict[str, Any] = {key.name: True for key in table.keys}
     rules = []
-    for name, brings in table.variants.items():
-        for word, own in [(None, brings)] if isinstance(brings, tuple) else brings.items():
+    for name, allowed in table.alternatives.items():
+        for word, keys in [(None, allowed)] if isinstance(allowed, tuple) else allowed.items():
             condition = {"type": "string"} if word is None else {"const": word}
             rules.append(
                 {
                     "if": {"properties": {name: condition}, "required": [name]},
-                    "then": {
-                        "properties": known | {key.name: key_schema(key) for key in own},
-                        "additionalProperties": False,
-                    },
+                    "then": {"properties": common | _properties(keys), "additionalProperties": False},
                 }
             )
-    one = [{"properties": {name: {"type": "string"}}, "required": [name]} for name in table.variants]
+    one = [{"properties": {name: {"type": "string"}}, "required": [name]} for name in table.alternatives]
     return {**found, "oneOf": one, "allOf": rules}
 
 
-def key_schema(key: Key) -> Schema:
-    """The JSON Schema of a key, with its docs."""
-    values = schema(key.takes)
+def _properties(keys: tuple[Key, ...]) -> Schema:
+    return {key.name: _key_schema(key) for key in keys}
+
+
+def _key_schema(key: Key) -> Schema:
+    values = schema(key.type)
     default = list(key.default) if isinstance(key.default, tuple) else key.default
-    about = f"{key.doc}\n\n{default_words(default, key.unit)}".rstrip() if default is not None or key.unit else key.doc
+    about = key.doc
+    if default is not None:
+        about += f"\n\nDefault {json.dumps(default, ensure_ascii=False)}{' ' if key.unit else ''}{key.unit}."
+    elif key.unit:
+        about += f"\n\nin {key.unit}."
     found = {**(values if key.required else nullable(values)), "description": about}
     return found if default is None else {**found, "default": default}
 
 
-def default_words(default: Any, unit: str) -> str:
-    """`Default 45 °.`, or the unit alone."""
-    value = "" if default is None else f"Default {json.dumps(default, ensure_ascii=False)}"
-    return " ".join(part for part in (value, f"in {unit}" if unit and not value else unit) if part) + "."
-
-
 def nullable(values: Schema) -> Schema:
-    """The same or null, which stands for what is not there."""
-    if isinstance(values.get("type"), str):
-        found = {**values, "type": [values["type"], "null"]}
-        return found | ({"enum": [*values["enum"], None]} if "enum" in values else {})
-    if "enum" in values:
-        return {**values, "enum": [*values["enum"], None]}
+    """Return a schema that also accepts null, which means absent."""
     if "anyOf" in values:
         return {**values, "anyOf": [*values["anyOf"], {"type": "null"}]}
-    return values
+    enum = {"enum": [*values["enum"], None]} if "enum" in values else {}
+    kind = {"type": [values["type"], "null"]} if isinstance(values.get("type"), str) else {}
+    return {**values, **enum, **kind}

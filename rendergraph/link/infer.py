@@ -13,7 +13,6 @@ from typing import Annotated, Any, NoReturn, Optional, overload
 import msgspec
 
 from rendergraph import textures
-from rendergraph.annotations import fits, quoted, words_for
 from rendergraph.declare import (
     Facts,
     Function,
@@ -49,6 +48,7 @@ from rendergraph.textures import (
     View,
     full_mip_count,
 )
+from rendergraph.typecheck import fits, quoted, words_for
 
 CAMERA = "camera"
 _DRAWN = {s.name for s in (Albedo, Depth, Emissive, LinearDepth, Material, Normal, Radiance, ShadowMap)}

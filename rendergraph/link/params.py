@@ -46,7 +46,7 @@ def _unfit(
             parameters[name].convert(plain)
         except TypeError as error:
             hint = suggestion(value.data, parameters[name].words, most=0) if isinstance(value.data, str) else ""
-            yield name, value.problem("RG104", f"'{spec.id}.{name}' {error}, this is {said(value)}{hint}")
+            yield name, value.problem("RG104", f"'{spec.id}.{name}': {error}, got {said(value)}{hint}")
         except ValueError as error:
             yield name, value.problem("RG104", f"'{spec.id}.{name}' is {said(value)}, it {error}")
 
@@ -91,7 +91,7 @@ def choice_files(
                 file = added.value if added is not None else None
             if file is None:
                 known = tuple(added.name for added in extensions.choices(open_name))
-                text = f"'{spec.id}.{name}' takes {parameter.takes(known)}, this is '{shown(chosen, 40)}'"
+                text = f"'{spec.id}.{name}': expected {parameter.takes(known)}, got '{shown(chosen, 40)}'"
                 hint = suggestion(chosen, (*parameter.words, *known), most=0)
                 problems += [(value or spec.value).problem("RG104", text + hint), *extensions.problems]
             else:

@@ -13,7 +13,7 @@ from rendergraph.lazy import lazy_exports
 if TYPE_CHECKING:
     from rendergraph.reference.assets import describe_pipeline, describe_scene, kind_of
     from rendergraph.reference.examples import example_file, example_text
-    from rendergraph.reference.node_types import describe_node, input_facts, meaning, output_facts, summary, type_words
+    from rendergraph.reference.node_types import describe_node, input_facts, meaning, output_facts, summary
     from rendergraph.reference.programs import describe_program, find_node_of_type
     from rendergraph.reference.topics import FILE_KINDS, error_codes, error_page, file_keys, table_of
 
@@ -35,7 +35,6 @@ __all__ = [
     "output_facts",
     "summary",
     "table_of",
-    "type_words",
 ]
 
 __getattr__ = lazy_exports(
@@ -43,7 +42,7 @@ __getattr__ = lazy_exports(
     {
         "assets": ("describe_pipeline", "describe_scene", "kind_of"),
         "examples": ("example_file", "example_text"),
-        "node_types": ("describe_node", "input_facts", "meaning", "output_facts", "summary", "type_words"),
+        "node_types": ("describe_node", "input_facts", "meaning", "output_facts", "summary"),
         "programs": ("describe_program", "find_node_of_type"),
         "topics": ("FILE_KINDS", "error_codes", "error_page", "file_keys", "table_of"),
     },

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from types import UnionType
-from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from rendergraph.formatting import format_value
 
@@ -122,13 +121,14 @@ def _size(rule: Any) -> str:
 def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
     from rendergraph.glsl import about  # only needed for choices of plugins
     from rendergraph.glsl.source import needs  # likewise
+    from rendergraph.typecheck import brief  # `nodes` is loaded for `--help`, too
 
     open_name, default = parameter.open_name, parameter.default
     added = extensions.choices(open_name) if open_name else []
     annotation = parameter.closed(tuple(one.name for one in added))
     found: dict[str, Any] = {
         "name": parameter.name,
-        "type": type_words(annotation) + (" | …" if open_name else ""),  # plugins may add to it
+        "type": brief(annotation) + (" | …" if open_name else ""),  # plugins may add to it
         "default": list(default) if isinstance(default, tuple) else default,
         "role": parameter.role,
         "unit": parameter.unit,
@@ -144,21 +144,6 @@ def _parameter(parameter: Parameter, extensions: Extensions) -> dict[str, Any]:
         ]
     limits = {"min": parameter.limits.low, "max": parameter.limits.high}
     return found | {name: limit for name, limit in limits.items() if limit is not None}
-
-
-def type_words(annotation: Any) -> str:
-    """Return a type as the YAML file shows it: `number`, `[number, number]`, `neutral | aces`."""
-    origin, args = get_origin(annotation), get_args(annotation)
-    if origin is Literal:
-        return " | ".join(str(arg) for arg in args)
-    if origin in (Union, UnionType):
-        return " | ".join(dict.fromkeys(type_words(arg) for arg in args))
-    if origin in (tuple, list):
-        if origin is list or (len(args) == 2 and args[1] is Ellipsis):
-            return f"[{type_words(args[0])}, …]"
-        return "[" + ", ".join(type_words(arg) for arg in args) + "]"
-    names = {float: "number", int: "whole number", bool: "true | false", str: "text", type(None): "null"}
-    return names.get(annotation, getattr(annotation, "__name__", str(annotation)))
 
 
 # --- facts of a port in words ----------------------------------------------------------------------------------------

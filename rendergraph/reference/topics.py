@@ -36,13 +36,13 @@ def table_of(kind: str) -> Table:
 
 def file_keys(kind: str) -> list[dict[str, Any]]:
     """Return every key of a kind of file, section by section."""
-    from rendergraph.keys import briefly  # most topics need no keys
+    from rendergraph.keys import brief  # most topics need no keys
 
     return [
         {
             "section": section,
             "key": key.name,
-            "value": briefly(key.takes),
+            "value": brief(key.type),
             "default": list(key.default) if isinstance(key.default, tuple) else key.default,
             "unit": key.unit,
             "required": key.required,

@@ -10,7 +10,7 @@ from typing import Any
 from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, Value, YamlLimits, from_plain
 from rendergraph.errors import InputError, Option, Place, Problem, shown_file, suggestion
-from rendergraph.keys import Walk, plain
+from rendergraph.keys import Validator, plain
 from rendergraph.read import CODES, SIZE, checked, entries, read, word
 from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
@@ -165,10 +165,10 @@ def _size(tree: Value, files: Files) -> tuple[int, int]:
     value = tree.get("size")
     if value is None or value.data is None:
         return DEFAULT_SIZE
-    walk = Walk(CODES)  # what a file says has been read; this is for what was typed
-    good = walk.take(value, SIZE)
-    files.problems += walk.problems
-    return plain(good, SIZE.takes) if good is not None else DEFAULT_SIZE
+    validator = Validator(CODES)  # files have been read; this is for the command line
+    good = validator.value(value, SIZE)
+    files.problems += validator.problems
+    return plain(good, SIZE.type) if good is not None else DEFAULT_SIZE
 
 
 def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | None, Roots]:

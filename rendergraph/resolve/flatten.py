@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from rendergraph.annotations import Range, fits, words_for
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import NAME, entries, word
 from rendergraph.resolve.files import Files, display
 from rendergraph.resolve.sets import Setting, patch_of
 from rendergraph.resolve.spec import NodeSpec, PipelineParameter, Scope
+from rendergraph.typecheck import Range, fits, words_for
 
 MOST_NODES = 10_000
 MOST_NESTED = 32
@@ -190,7 +190,7 @@ class Flattener:
         for part in value.data if isinstance(value.data, list) else [value]:
             if limits != Range() and not fits(part.data, Annotated[float, limits]):
                 this = shown(part.data) if fits(part.data, float) else part.kind
-                text = f"the parameter '{name}' takes {words_for(float, limits)}, this is {this}"
+                text = f"the parameter '{name}': expected {words_for(float, limits)}, got {this}"
                 self.files.say(value.problem("RG122", text))
                 return None
         return value

@@ -114,13 +114,13 @@ def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple
                 types[setting.node] = setting.value
                 _put(root, setting.value, "nodes", setting.node, "type")
             else:
-                text = f"'{setting.text}' takes the name of a node type, this is {setting.value.kind}"
+                text = f"'{setting.text}': expected the name of a node type, got {setting.value.kind}"
                 problems.append(setting.problem("RG106", text))
         elif setting.name == "enabled":
             if isinstance(setting.value.data, bool | None):
                 _put(root, setting.value, "nodes", setting.node, "enabled")
             else:
-                text = f"'{setting.text}' takes true or false, this is {setting.value.kind}"
+                text = f"'{setting.text}': expected true or false, got {setting.value.kind}"
                 problems.append(setting.problem("RG106", text))
         else:
             known.append(setting)

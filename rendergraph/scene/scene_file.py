@@ -15,7 +15,7 @@ from msgspec.structs import replace
 
 from rendergraph.document import Value, load, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.keys import Key, Walk, plain
+from rendergraph.keys import Key, Validator, plain
 from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.environments import named
 from rendergraph.scene.geometry import rigid
@@ -46,10 +46,10 @@ def read_scene(path: Path, reading: Reading) -> Scene:
         InputError: with every mistake of the file, or the first of a mesh file it names.
     """
     document = load(path, keep_going=True)
-    reader = _Reader(path, reading, Walk(scene_keys.CODES, document.problems))
+    reader = _Reader(path, reading, Validator(scene_keys.CODES, document.problems))
     scene = reader.read(document.root)
-    if reader.walk.problems:
-        raise InputError(sorted(reader.walk.problems, key=_by_place))
+    if reader.validator.problems:
+        raise InputError(sorted(reader.validator.problems, key=_by_place))
     return scene
 
 
@@ -84,15 +84,15 @@ class _Made(Struct):
 class _Reader:
     """Reads the sections in the order they refer to each other."""
 
-    def __init__(self, path: Path, reading: Reading, walk: Walk) -> None:
-        self.path, self.reading, self.walk = path, reading, walk
+    def __init__(self, path: Path, reading: Reading, validator: Validator) -> None:
+        self.path, self.reading, self.validator = path, reading, validator
         self.recipe: dict[tuple[str, str], dict[str, Any]] = {}
         self.made = _Made()
 
     def read(self, root: Value) -> Scene:
         """The scene; only to be used where no problem was found."""
         names = {section: tuple(_entries(root, section)) for section in ("objects", "materials", "lights", "cameras")}
-        top = self.walk.root(root, scene_keys.SCENE, "`scene: 1` and `objects`")
+        top = self.validator.file(root, scene_keys.SCENE, "`scene: 1` and `objects`")
         if top is None:
             return Scene(self.path.stem)
         for name, entry in _entries(top, "materials").items():
@@ -128,7 +128,7 @@ class _Reader:
         value = entry.get(key)
         if value is not None and value.data is not None and str(value.data) not in known:
             hint = suggestion(str(value.data), known) or f"; there are no {section}"
-            self.walk.say(value, "RG322", f"there is no {key} '{shown(value.data)}'{hint}")
+            self.validator.report(value, "RG322", f"there is no {key} '{shown(value.data)}'{hint}")
 
     # Surfaces, lights, cameras ----------------------------------------------------------------------------------------
 
@@ -159,7 +159,7 @@ class _Reader:
         for found in problem.problems:
             if found.place is None or found.place.file == str(self.path):
                 found = place.relocate(found)
-            self.walk.problems.append(found)
+            self.validator.problems.append(found)
 
     def _light(self, name: str, entry: Value) -> None:
         values = plain(entry, scene_keys.LIGHT)
@@ -168,7 +168,7 @@ class _Reader:
             try:
                 self.made.lights.append(scene_values.light(name, values))
             except ValueError as problem:
-                self.walk.say(entry, "RG321", f"light '{shown(name)}': {problem}", key=True)
+                self.validator.report(entry, "RG321", f"light '{shown(name)}': {problem}", key=True)
 
     def _camera(self, name: str, entry: Value) -> None:
         values = plain(entry, scene_keys.CAMERA)
@@ -176,7 +176,7 @@ class _Reader:
         try:
             self.made.cameras[name] = scene_values.camera(name, values)
         except ValueError as problem:
-            self.walk.say(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
+            self.validator.report(entry, "RG321", f"camera '{shown(name)}': {problem}", key=True)
             self.made.cameras[name] = scene_values.camera(name, {})
 
     def _orbit(self, entry: Value | None) -> Orbit | None:
@@ -196,7 +196,7 @@ class _Reader:
         if values["file"] != "sky":
             for key in ("sun", "turbidity"):
                 if (stated := entry.get(key)) is not None and stated.data is not None:
-                    self.walk.say(stated, "RG321", f"'{key}' goes with `file: sky`", key=True)
+                    self.validator.report(stated, "RG321", f"'{key}' goes with `file: sky`", key=True)
         try:
             found = named(values["file"], self.made.lights, values)
             if found is None:
@@ -326,7 +326,7 @@ class _Reader:
         for node, entry in given.items():
             if node not in known:
                 text = f"object '{shown(name)}': its file has no node '{shown(node)}'{suggestion(node, known)}"
-                self.walk.say(entry, "RG322", text, key=True)
+                self.validator.report(entry, "RG322", text, key=True)
             self._is_named(entry, "material", materials, "materials")
             result[node] = plain(entry, scene_keys.OVERRIDE)
         return result
@@ -348,7 +348,7 @@ class _Reader:
                 continue
             if not isinstance(entry.data, dict) or not entry.data:
                 what = "empty" if entry.data == {} else entry.kind
-                self.walk.say(
+                self.validator.report(
                     entry, "RG321", f"keyframes of '{shown(path)}' are {what}, not a mapping of seconds to values"
                 )
                 continue
@@ -356,12 +356,12 @@ class _Reader:
             for time, value in entry.items():
                 if isinstance(time, bool) or not isinstance(time, int | float) or not math.isfinite(time):
                     text = f"keyframes of '{shown(path)}': '{shown(time)}' is not a time in seconds"
-                    self.walk.say(value, "RG321", text, key=True)
+                    self.validator.report(value, "RG321", text, key=True)
                     continue
                 if value.data is None:
-                    self.walk.say(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")
-                elif (good := self.walk.take(value, key)) is not None:
-                    frames.append((float(time), plain(good, key.takes)))
+                    self.validator.report(value, "RG321", f"keyframe {time:g} s of '{shown(path)}' has no value")
+                elif (good := self.validator.value(value, key)) is not None:
+                    frames.append((float(time), plain(good, key.type)))
             result[path] = tuple(sorted(frames, key=lambda frame: frame[0]))
         return result
 
@@ -370,18 +370,19 @@ class _Reader:
         section, _, rest = path.partition(".")
         if section not in scene_keys.ANIMATED:
             hint = suggestion(section, scene_keys.ANIMATED)
-            self.walk.say(entry, "RG322", f"keyframes name no section '{shown(section)}'{hint}", key=True)
+            self.validator.report(entry, "RG322", f"keyframes name no section '{shown(section)}'{hint}", key=True)
             return None
         name, word = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
         known = names.get(section, ())
         if section != "environment" and name not in known:
             hint = suggestion(name, known) or f"; there are no {section}"
-            self.walk.say(entry, "RG322", f"keyframes: there is no '{shown(name)}' under {section}{hint}", key=True)
+            text = f"keyframes: there is no '{shown(name)}' under {section}{hint}"
+            self.validator.report(entry, "RG322", text, key=True)
             return None
         moving = scene_keys.moving(section)
         if word not in moving:
             text = f"keyframes: {section} have no moving key '{shown(word)}'{suggestion(word, moving)}"
-            self.walk.say(entry, "RG322", text, key=True)
+            self.validator.report(entry, "RG322", text, key=True)
             return None
         return moving[word]
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from msgspec.structs import replace
+from typing import Annotated, Any
 
-from rendergraph.keys import Codes, Form, Key, Names, Schema, Table, schema
-from rendergraph.keys.forms import FILE, FLAG, TEXT, choice, color, number, scale, vector, version
+from rendergraph.keys import Codes, Key, MapOf, Table, schema
+from rendergraph.keys.values import FILE, TEXT, choice, color, number, scale, vector, version
 from rendergraph.scene.shapes import LENGTH, SHAPES
+from rendergraph.typecheck import Brief, JsonSchema, Schema, is_numeric
 
 _DIRECTION = "unit length is not needed"
 
-NAME = replace(TEXT, shown="name")
+NAME: Any = Annotated[TEXT, Brief("name")]
 
 _OVERRIDABLE = (
     Key("material", NAME, "A name under `materials`; a file keeps its own materials without it."),
-    Key("casts_shadow", FLAG, "Whether shadow techniques draw it.", True),
-    Key("hidden", FLAG, "Not drawn at all.", False),
+    Key("casts_shadow", bool, "Whether shadow techniques draw it.", True),
+    Key("hidden", bool, "Not drawn at all.", False),
 )
 OVERRIDE = Table("override '{}'", _OVERRIDABLE)
 OBJECT = Table(
@@ -30,7 +31,7 @@ OBJECT = Table(
     ),
     {
         "shape": {name: shape.keys for name, shape in SHAPES.items()},
-        "file": (Key("overrides", Names(OVERRIDE), "For a file: node name to material, hidden, casts_shadow."),),
+        "file": (Key("overrides", MapOf(OVERRIDE), "For a file: node name to material, hidden, casts_shadow."),),
     },
 )
 
@@ -67,8 +68,8 @@ MATERIAL = Table(
         Key("normal_scale", number(), "Factor on the normal texture's slope.", 1.0),
         Key("alpha_mode", choice("opaque", "mask", "blend"), "How alpha is used.", "opaque"),
         _unit("alpha_cutoff", "With `mask`: less alpha than this is not drawn.", 0.5),
-        Key("double_sided", FLAG, "Back faces are drawn too.", False),
-        Key("unlit", FLAG, "Base colour without lighting.", False),
+        Key("double_sided", bool, "Back faces are drawn too.", False),
+        Key("unlit", bool, "Base colour without lighting.", False),
         Key("ior", number(1, 10), "Index of refraction, which gives the dielectric f0.", 1.5),
         _unit("specular", "Factor on the dielectric's reflection.", 1.0),
         Key("specular_color", color(), "Colour of the dielectric's f0.", (1.0, 1.0, 1.0)),
@@ -93,7 +94,7 @@ LIGHT = Table(
         Key("range", LENGTH, "Where its light is faded out (point, spot); none by default.", None, "m"),
         Key("inner_degrees", number(0, 90), "Half angle of the spot's full brightness.", 0.0, "°"),
         Key("outer_degrees", number(0, 90, above=True), "Half angle where the spot ends.", 45.0, "°"),
-        Key("casts_shadow", FLAG, "Whether `shadow_map.light: auto` may choose it.", True),
+        Key("casts_shadow", bool, "Whether `shadow_map.light: auto` may choose it.", True),
     ),
 )
 
@@ -141,7 +142,7 @@ ANIMATED = {"objects": OBJECT, "materials": MATERIAL, "lights": LIGHT, "cameras"
 
 def moving(section: str) -> dict[str, Key]:
     """The keys of a section that keyframes may change."""
-    return {key.name: key for key in ANIMATED[section].keys if isinstance(key.takes, Form) and key.takes.moves}
+    return {key.name: key for key in ANIMATED[section].keys if is_numeric(key.type)}
 
 
 def _keyframes() -> Schema:
@@ -150,26 +151,26 @@ def _keyframes() -> Schema:
     for section in ANIMATED:
         name = "" if section == "environment" else r"\..+"
         for key in moving(section).values():
-            frames = {"type": "object", "minProperties": 1, "additionalProperties": schema(key.takes)}
+            frames = {"type": "object", "minProperties": 1, "additionalProperties": schema(key.type)}
             found[rf"^{section}{name}\.{key.name}$"] = {**frames, "description": key.doc}
     return {"type": "object", "patternProperties": found, "additionalProperties": False}
 
 
-_KEYFRAMES = Form("mapping", "a mapping of paths", lambda value: isinstance(value.data, dict), _keyframes)
+_KEYFRAMES: Any = Annotated[dict[Any, Any], "a mapping of paths", Brief("mapping"), JsonSchema(_keyframes)]
 SCENE = Table(
     "a scene file",
     (
         Key("scene", version(1), "Version of the format.", required=True, example="scene: 1"),
         Key("description", TEXT, "What the scene shows."),
-        Key("objects", Names(OBJECT), "Shapes and files, by name."),
-        Key("materials", Names(MATERIAL), "Surfaces, by name."),
+        Key("objects", MapOf(OBJECT), "Shapes and files, by name."),
+        Key("materials", MapOf(MATERIAL), "Surfaces, by name."),
         Key(
             "lights",
-            Names(LIGHT),
+            MapOf(LIGHT),
             "Lights, by name; without any, and without an environment, a directional key of 3 lux comes over the "
             "viewer's left shoulder, and `studio` is around.",
         ),
-        Key("cameras", Names(CAMERA), "Cameras, by name, the first is the default; without any the scene is framed."),
+        Key("cameras", MapOf(CAMERA), "Cameras, by name, the first is the default; without any the scene is framed."),
         Key("environment", ENVIRONMENT, "What is around the scene and lights it."),
         Key(
             "keyframes",

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from rendergraph.keys import Key
-from rendergraph.keys.forms import number, vector, whole
+from rendergraph.keys.values import number, vector, whole
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import clip_ears, translation
 from rendergraph.scene.model import Matrix, Mesh

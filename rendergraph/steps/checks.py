@@ -10,11 +10,11 @@ from typing import Annotated, Any, ParamSpec, TypeAlias
 
 from msgspec.structs import replace
 
-from rendergraph.annotations import Length, Range, hints_of, may_be, mistakes_in, quoted, test_of
 from rendergraph.errors import Misuse, nearest, suggestion
 from rendergraph.ports import Part, Port, WrittenPort
 from rendergraph.steps.model import UniformValue
 from rendergraph.textures import FORMATS, BufferDesc, Normal, TextureDesc
+from rendergraph.typecheck import Length, Range, accepts, hints_of, mistakes_in, quoted, test_of
 
 _ATTRIBUTE = r"[1-4]?[fiu][1248]?(?:/[vi])?\Z"
 _PADDING = r"\d+x[1248]?(?:/[vi])?\Z"
@@ -43,7 +43,7 @@ def checked(method: Callable[P, None]) -> Callable[P, None]:
     @cache
     def looked_at() -> tuple[list[str], dict[str, tuple[Any, Callable[[Any], bool]]]]:
         hints = hints_of(method)
-        return list(hints), {name: (hint, test_of(hint)) for name, hint in hints.items() if not may_be(hint, Port)}
+        return list(hints), {name: (hint, test_of(hint)) for name, hint in hints.items() if not accepts(hint, Port)}
 
     @wraps(method)
     def call(*arguments: P.args, **named: P.kwargs) -> None:

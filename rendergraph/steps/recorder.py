@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
 from msgspec import Struct, field
 
-from rendergraph.annotations import quoted
 from rendergraph.errors import Misuse, is_framework
 from rendergraph.facts import Facts, LightFacts
 from rendergraph.ports import Count, InOut, Input, Output, Part, Port, Shader, Texel, Views
@@ -18,6 +17,7 @@ from rendergraph.steps.checks import Counts, Macro, checked
 from rendergraph.steps.model import DrawOrder, MaterialLevel, Topology, UniformValue
 from rendergraph.steps.state import State
 from rendergraph.textures import BufferDesc, TextureDesc
+from rendergraph.typecheck import quoted
 
 
 class Recorder(Protocol):

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Struct
 
-from rendergraph.annotations import Range, right
+from rendergraph.typecheck import Range, validated
 
 Compare = Literal["never", "less", "equal", "lequal", "greater", "notequal", "gequal", "always"]
 StencilOp = Literal["keep", "zero", "replace", "incr", "incr_wrap", "decr", "decr_wrap", "invert"]
@@ -42,7 +42,7 @@ class Blend(Struct, frozen=True):
     op: BlendOp = "add"
 
     def __post_init__(self) -> None:
-        right(self)
+        validated(self)
 
     @property
     def takes_destination(self) -> bool:
@@ -74,7 +74,7 @@ class StencilFace(Struct, frozen=True):
     depth_pass: StencilOp = "keep"
 
     def __post_init__(self) -> None:
-        right(self)
+        validated(self)
 
 
 class Stencil(Struct, frozen=True):
@@ -84,7 +84,7 @@ class Stencil(Struct, frozen=True):
     back: StencilFace | None = None
 
     def __post_init__(self) -> None:
-        right(self)
+        validated(self)
 
 
 class State(Struct, frozen=True):
@@ -129,4 +129,4 @@ class State(Struct, frozen=True):
     wireframe: bool = False
 
     def __post_init__(self) -> None:
-        right(self)
+        validated(self)

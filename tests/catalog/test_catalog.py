@@ -218,6 +218,6 @@ def test_text_with_a_comma_within_braces_is_told_from_a_key(tmp_path: Path) -> N
     outputs = "outputs: {dimmed: {doc: The same, but darker.}}"
     file.write_text(f"/*---\n{outputs}\n---*/\nout vec4 dimmed;\nvoid main() {{ dimmed = vec4(0.0); }}\n")
     with pytest.raises(
-        InputError, match=r"dim\.frag:2:35: RG440 'but darker.' reads as a key: text with a comma stands"
+        InputError, match=r"dim\.frag:2:35: RG440 'but darker.' is read as a key; put text with a comma"
     ):
         Catalog.discover([file], installed=False).get("dim")

@@ -268,8 +268,8 @@ def test_an_unknown_choice_is_answered_with_the_plugins_too(sketch: Path) -> Non
     with pytest.raises(InputError) as caught:
         rg.load("forward", plugins=[sketch], size=(8, 8)).set("light.shading", "tooon").check()
     assert str(caught.value) == (
-        "--set light.shading=tooon: RG104 'light.shading' takes one of unlit, phong, blinn_phong, anisotropic, pbr, "
-        "toon, combed, this is 'tooon'; did you mean 'toon'?"
+        "--set light.shading=tooon: RG104 'light.shading': expected one of unlit, phong, blinn_phong, anisotropic, pbr, "
+        "toon, combed, got 'tooon'; did you mean 'toon'?"
     )
 
 

@@ -355,12 +355,12 @@ def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.M
         ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file, a folder is needed"),
         (
             "./fx",
-            "2:10: RG106 'plugins' takes a list of folders and packages, as in plugins: [./effects, some-package], this is './fx'",
+            "2:10: RG106 'plugins': expected a list of folders and packages, as in plugins: [./effects, some-package], got './fx'",
         ),
         ("[-rlist]", "2:11: RG131 '-rlist' is neither a folder of plugins nor a package's name"),
         (
             "[3]",
-            "2:10: RG106 'plugins' takes a list of folders and packages, as in plugins: [./effects, some-package], this is [3]",
+            "2:10: RG106 'plugins': expected a list of folders and packages, as in plugins: [./effects, some-package], got [3]",
         ),
         ("[/]", "2:11: RG012 '/' lies outside"),
     ],

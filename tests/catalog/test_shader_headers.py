@@ -165,19 +165,19 @@ def headed(text: str) -> str:
     ("text", "messages"),
     [
         ("docs: x", ["2:1: RG440 a header has no key 'docs'; did you mean 'doc'?"]),
-        ("- 1", ["2:1: RG440 a header is a mapping with doc, inputs, outputs, params, this is a list"]),
-        ("doc: 3", ["2:6: RG440 'doc' takes text, this is 3"]),
+        ("- 1", ["2:1: RG440 expected a header, a mapping with doc, inputs, outputs, params, got a list"]),
+        ("doc: 3", ["2:6: RG440 'doc': expected text, got 3"]),
         (
             "inputs: [color]",
-            ["2:9: RG440 'inputs' takes a mapping, as in inputs: {color: {doc: …}}, this is ['color']"],
+            ["2:9: RG440 'inputs': expected a mapping, as in inputs: {color: {doc: …}}, got ['color']"],
         ),
         (
             "inputs: {color: radiance}",
-            ["2:17: RG440 'color' takes a mapping, as in inputs: {color: {doc: …}}, this is 'radiance'"],
+            ["2:17: RG440 'color': expected a mapping, as in inputs: {color: {doc: …}}, got 'radiance'"],
         ),
         (
             "inputs: {color: {filter: smooth}}",
-            ["2:26: RG440 'filter' takes one of nearest, linear, trilinear, this is 'smooth'"],
+            ["2:26: RG440 'filter': expected one of nearest, linear, trilinear, got 'smooth'"],
         ),
         (
             "inputs: {color: {semantic: radiant}}",
@@ -203,8 +203,8 @@ def headed(text: str) -> str:
         (
             "outputs: {darkened: {size: 0}}",
             [
-                "2:28: RG440 'size' takes a factor of the picture's size, an input's name, [input, factor], or "
-                "[width, height] in texels, this is 0"
+                "2:28: RG440 'size': expected a factor of the picture's size, an input's name, [input, factor], or "
+                "[width, height] in texels, got 0"
             ],
         ),
         (
@@ -273,9 +273,9 @@ def headed(text: str) -> str:
         (
             "doc: 1\ninputs: 2\nparams: {strength: {min: x, uint: EV}}",
             [
-                "2:6: RG440 'doc' takes text, this is 1",
-                "3:9: RG440 'inputs' takes a mapping, as in inputs: {color: {doc: …}}, this is 2",
-                "4:26: RG440 'min' takes a number, this is 'x'",
+                "2:6: RG440 'doc': expected text, got 1",
+                "3:9: RG440 'inputs': expected a mapping, as in inputs: {color: {doc: …}}, got 2",
+                "4:26: RG440 'min': expected a number, got 'x'",
                 "4:29: RG440 a parameter has no key 'uint'; did you mean 'unit'?",
             ],
         ),
@@ -284,7 +284,9 @@ def headed(text: str) -> str:
 def test_a_wrong_header_is_told_at_its_line(tmp_path: Path, text: str, messages: list[str] | None) -> None:
     found = mistakes(tmp_path, headed(text))
     if messages is None:
-        assert found[0].startswith("2:30: RG440 'format' takes a format; did you mean 'rgba8'?") or "rgba" in found[0]
+        assert (
+            found[0].startswith("2:30: RG440 'format': expected a format; did you mean 'rgba8'?") or "rgba" in found[0]
+        )
     else:
         assert found == messages
 
@@ -355,7 +357,7 @@ CONTRADICTIONS = {
     "a limit that is none": (
         "outputs: {c: {doc: C.}}\nparams: {k: {default: 1, min: .nan, doc: K.}}",
         "uniform float k;\nout vec4 c;",
-        "3:31: RG440 'min' takes a number, this is nan",
+        "3:31: RG440 'min': expected a number, got nan",
     ),
     "threads of a fragment shader": (
         "threads: [8, 8]\noutputs: {c: {doc: C.}}",

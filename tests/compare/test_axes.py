@@ -83,8 +83,8 @@ def test_an_axis_that_names_nothing_is_told_once_with_the_right_name(base: rg.Pi
     assert [str(problem) for problem in caught.value.problems] == [
         "-x dispaly.curve=aces: RG109 there is no node 'dispaly'; did you mean 'display'?",
         "-x shadows.tap=1: RG103 node 'shadows' (shadow_pcf) has no param or input 'tap'; did you mean 'taps'?",
-        "-x light.shading=phnog: RG104 'light.shading' takes one of unlit, phong, blinn_phong, anisotropic, pbr, "
-        "this is 'phnog'; did you mean 'phong'?",
+        "-x light.shading=phnog: RG104 'light.shading': expected one of unlit, phong, blinn_phong, anisotropic, pbr, "
+        "got 'phnog'; did you mean 'phong'?",
     ]
 
 
@@ -117,12 +117,12 @@ def test_wrong_files_get_all_their_mistakes(tmp_path: Path) -> None:
         read_sweep(path)
     told = [f"{p.place.line if p.place else 0} {p.message}" for p in caught.value.problems]
     assert told == [
-        "1 'sweep' takes 1, the version of the format that this program reads, as in sweep: 1, this is 2",
+        "1 'sweep': expected 1, the version of the format that this program reads, as in sweep: 1, got 2",
         "2 a sweep has no key 'axis'; did you mean 'axes'?",
-        "3 'size' takes width and height in pixels, 1 to 16384, as in size: [1280, 720], this is [48]",
-        "4 'a.b' takes a list of values, or a range such as 8:64:8 or log:0.1:10:5, as in axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}, this is []",
-        "4 'c.d' takes a list of values, or a range such as 8:64:8 or log:0.1:10:5, as in axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}, this is 3",
-        "5 'frames' takes a whole number from 1 to 10000, this is 1000000000000",
+        "3 'size': expected width and height in pixels, 1 to 16384, as in size: [1280, 720], got [48]",
+        "4 'a.b': expected a list of values, or a range such as 8:64:8 or log:0.1:10:5, as in axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}, got []",
+        "4 'c.d': expected a list of values, or a range such as 8:64:8 or log:0.1:10:5, as in axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}, got 3",
+        "5 'frames': expected a whole number from 1 to 10000, got 1000000000000",
         "1 a sweep needs 'pipeline'; add pipeline: NAME",
         "4 axis 'e.f' has the value 1 twice",
     ]
@@ -395,8 +395,8 @@ def test_mistakes_in_a_file_are_told_at_their_place(tmp_path: Path) -> None:
         read_sweep(path)
     told = [str(problem).splitlines()[0].removeprefix(f"{path}:") for problem in caught.value.problems]
     assert told == [
-        "5:18: RG030 'light.ambient' takes a list of values, or a range such as 8:64:8 or log:0.1:10:5, as in "
-        "axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}, this is '0..1'",
+        "5:18: RG030 'light.ambient': expected a list of values, or a range such as 8:64:8 or log:0.1:10:5, as in "
+        "axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}, got '0..1'",
         "4:18: RG030 axis 'shadows.taps': '1:4:0': steps of 0 do not lead from 1 to 4",
     ]
 

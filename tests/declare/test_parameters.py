@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 import pytest
 
-from rendergraph.annotations import Range
 from rendergraph.api import Node, define, param, structural
 from rendergraph.declare import declaration_mistakes
 from rendergraph.errors import Misuse
+from rendergraph.typecheck import Range
 
 
 class Curved(Node):
@@ -62,11 +62,11 @@ def test_what_a_file_may_give_is_said_in_words() -> None:
 
 def test_limits_hold_for_each_component() -> None:
     tint = Curved.parameters()["tint"]
-    assert tint.beyond((0.0, 0.5, 1.0)) is None
-    assert tint.beyond((0.0, 1.5, 1.0)) == "must be at most 1"
-    assert tint.beyond(float("nan")) == "must be finite"
-    assert Hard.parameters()["gain"].beyond(0.5) == "must be at least 1"
-    assert Curved.parameters()["light"].beyond("auto") is None
+    assert tint.violation((0.0, 0.5, 1.0)) is None
+    assert tint.violation((0.0, 1.5, 1.0)) == "must be at most 1"
+    assert tint.violation(float("nan")) == "must be finite"
+    assert Hard.parameters()["gain"].violation(0.5) == "must be at least 1"
+    assert Curved.parameters()["light"].violation("auto") is None
 
 
 def test_a_node_takes_values_as_a_file_has_them() -> None:
@@ -82,18 +82,18 @@ def test_a_node_takes_values_as_a_file_has_them() -> None:
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "beyond": ({"tint": (0.0, 1.5, 1.0)}, "'tint' must be at most 1, this is (0.0, 1.5, 1.0)"),
-    "text": ({"gain": "1.5"}, "'gain' takes a number from 0 to 4, this is '1.5'"),
-    "a switch": ({"gain": True}, "'gain' takes a number from 0 to 4, this is True"),
-    "too few": ({"tint": [0.5, 0.5]}, "'tint' takes a number up to 1 or a list of 3 numbers, this is [0.5, 0.5]"),
-    "no choice": ({"taps": 3}, "'taps' takes one of 1, 2, 4, this is 3"),
-    "a fraction": ({"taps": 2.0}, "'taps' takes one of 1, 2, 4, this is 2.0"),
-    "a mixed list": ({"light": ["sun", 1]}, "'light' takes text or a list of words, this is ['sun', 1]"),
-    "endless": ({"gain": 10**400}, "'gain' must be from -3.4028235e+38 to 3.4028235e+38, this is 100"),
+    "beyond": ({"tint": (0.0, 1.5, 1.0)}, "'tint': must be at most 1, got (0.0, 1.5, 1.0)"),
+    "text": ({"gain": "1.5"}, "'gain': expected a number from 0 to 4, got '1.5'"),
+    "a switch": ({"gain": True}, "'gain': expected a number from 0 to 4, got True"),
+    "too few": ({"tint": [0.5, 0.5]}, "'tint': expected a number up to 1 or a list of 3 numbers, got [0.5, 0.5]"),
+    "no choice": ({"taps": 3}, "'taps': expected one of 1, 2, 4, got 3"),
+    "a fraction": ({"taps": 2.0}, "'taps': expected one of 1, 2, 4, got 2.0"),
+    "a mixed list": ({"light": ["sun", 1]}, "'light': expected text or a list of words, got ['sun', 1]"),
+    "endless": ({"gain": 10**400}, "'gain': must be from -3.4028235e+38 to 3.4028235e+38, got 100"),
     "unknown": ({"gian": 1.0}, "it has no parameter 'gian'; did you mean 'gain'?"),
     "all at once": (
         {"gain": 5, "taps": 3},
-        "'gain' must be at most 4, this is 5; 'taps' takes one of 1, 2, 4, this is 3",
+        "'gain': must be at most 4, got 5; 'taps': expected one of 1, 2, 4, got 3",
     ),
 }
 

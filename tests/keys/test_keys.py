@@ -13,25 +13,12 @@ import pytest
 
 from rendergraph.document import Source, Value, from_plain, parse
 from rendergraph.errors import InputError
-from rendergraph.keys import Codes, Form, Key, Later, Names, Naming, Table, Walk, as_markdown, file_schema, plain
+from rendergraph.keys import Codes, Key, MapOf, Naming, Recursive, Table, Validator, as_markdown, file_schema, plain
 from rendergraph.keys import schema as schema_of
-from rendergraph.keys.forms import (
-    ANYTHING,
-    FLAG,
-    TEXT,
-    choice,
-    color,
-    either,
-    listed,
-    number,
-    row,
-    scale,
-    vector,
-    version,
-    whole,
-)
+from rendergraph.keys.values import TEXT, choice, color, listed, number, scale, vector, version, whole
 from rendergraph.reference import FILE_KINDS, table_of
 from rendergraph.resources import shipped_scenes
+from rendergraph.typecheck import conversion_to, fits, words_for
 
 CODES = Codes("UNKNOWN", "WRONG", "NAME", "FILE")
 LAMP = Table(
@@ -55,26 +42,26 @@ ROOM: Table = Table(
     "a room",
     (
         Key("room", version(1), "Version.", code="VERSION"),
-        Key("lamps", Names(LAMP, Naming(re.compile(r"[a-z]+\Z"), "small letters make one"), "lamp"), "Lamps."),
-        Key("boxes", Names(BOX, refused={"self": "a box cannot be called 'self'"}), "Boxes."),
+        Key("lamps", MapOf(LAMP, Naming(re.compile(r"[a-z]+\Z"), "small letters"), "lamp"), "Lamps."),
+        Key("boxes", MapOf(BOX, refused={"self": "a box cannot be called 'self'"}), "Boxes."),
         Key("tags", listed(TEXT, "tags", 1, 3), "Words.", example="tags: [old]"),
-        Key("lists", Names(listed(ANYTHING, "values"), null=False, least=1), "Lists."),
-        Key("inner", Later(TEXT, lambda: ROOM), "Another room, or its file."),
-        Key("open", FLAG, "Whether."),
+        Key("lists", MapOf(listed(Any, "values"), null=False, least=1), "Lists."),
+        Key("inner", Recursive(TEXT, lambda: ROOM), "Another room, or its file."),
+        Key("open", bool, "Whether."),
     ),
     refused={"door": "a room has no door, say open: true"},
     code="TOP",
 )
 
 
-def walked(text: str) -> tuple[Value | None, Walk]:
+def validate(text: str) -> tuple[Value | None, Validator]:
     document = parse(text, keep_going=True)
-    walk = Walk(CODES, document.problems)
-    return walk.root(document.root, ROOM, "`lamps`"), walk
+    validator = Validator(CODES, document.problems)
+    return validator.file(document.root, ROOM, "`lamps`"), validator
 
 
-def told(text: str) -> list[str]:
-    return [f"{p.place.line}:{p.place.column} {p.code} {p.message}" for p in walked(text)[1].problems if p.place]
+def messages(text: str) -> list[str]:
+    return [f"{p.place.line}:{p.place.column} {p.code} {p.message}" for p in validate(text)[1].problems if p.place]
 
 
 def test_what_is_right_stays_and_means_something() -> None:
@@ -85,8 +72,8 @@ boxes: {c: {shape: cube, side: 3}, d: {file: x.obj, page: 2, at: [0, 0, 1]}}
 inner: {room: 1, inner: there.yaml}
 lists: {x: [1, null]}
 """
-    root, walk = walked(text)
-    assert not walk.problems
+    root, validator = validate(text)
+    assert not validator.problems
     assert root is not None
     assert plain(root, ROOM) == {
         "room": 1,
@@ -101,60 +88,60 @@ lists: {x: [1, null]}
 
 
 WRONG = {
-    "- 1": "1:1 FILE a room is a mapping with `lamps`, this is a list",
+    "- 1": "1:1 FILE expected a room, a mapping with `lamps`, got a list",
     "rooms: 1": "1:1 TOP a room has no key 'rooms'; did you mean 'room'?",
     "door: 1": "1:1 TOP a room has no door, say open: true",
-    "room: 2": "1:7 VERSION 'room' takes 1, the version of the format that this program reads, this is 2",
-    "room: true": "1:7 VERSION 'room' takes 1, the version of the format that this program reads, this is true",
-    "open: yes": "1:7 WRONG 'open' takes true or false, this is 'yes'",
-    "lamps: 3": "1:8 WRONG 'lamps' takes a mapping, this is 3",
-    "lamps: {A: {kind: long}}": "1:9 NAME 'A' is no lamp; small letters make one",
-    "lamps: {a: 3}": "1:12 WRONG 'a' takes a mapping, this is 3",
+    "room: 2": "1:7 VERSION 'room': expected 1, the version of the format that this program reads, got 2",
+    "room: true": "1:7 VERSION 'room': expected 1, the version of the format that this program reads, got true",
+    "open: yes": "1:7 WRONG 'open': expected true or false, got 'yes'",
+    "lamps: 3": "1:8 WRONG 'lamps': expected a mapping, got 3",
+    "lamps: {A: {kind: long}}": "1:9 NAME 'A' is not a lamp; use small letters",
+    "lamps: {a: 3}": "1:12 WRONG 'a': expected a mapping, got 3",
     "lamps: {a: }": "1:9 WRONG lamp 'a' needs 'kind'; add kind: round",
     "lamps: {a: {kind: null}}": "1:9 WRONG lamp 'a' needs 'kind'; add kind: round",
-    "lamps: {a: {kind: log}}": "1:19 WRONG 'kind' takes one of round, square, long, as in kind: round, this is 'log'; did you mean 'long'?",
+    "lamps: {a: {kind: log}}": "1:19 WRONG 'kind': expected one of round, square, long, as in kind: round, got 'log'; did you mean 'long'?",
     "lamps: {a: {kind: long, pwr: 1}}": "1:25 UNKNOWN lamp 'a' has no key 'pwr'; did you mean 'power'?",
-    "lamps: {a: {kind: long, power: 0}}": "1:32 WRONG 'power' takes a number above 0, this is 0",
-    "lamps: {a: {kind: long, color: [1, 2, 0]}}": "1:32 WRONG 'color' takes 3 or 4 numbers from 0 to 1, this is [1, 2, 0]",
-    "lamps: {a: {kind: long, size: [1, 2]}}": "1:31 WRONG 'size' takes one number or 3 numbers, this is [1, 2]",
+    "lamps: {a: {kind: long, power: 0}}": "1:32 WRONG 'power': expected a number above 0, got 0",
+    "lamps: {a: {kind: long, color: [1, 2, 0]}}": "1:32 WRONG 'color': expected a list of 3 or 4 numbers from 0 to 1, got [1, 2, 0]",
+    "lamps: {a: {kind: long, size: [1, 2]}}": "1:31 WRONG 'size': expected a number or a list of 3 numbers, got [1, 2]",
     "boxes: {a: {}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
     "boxes: {a: {shape: cube, file: x}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
     "boxes: {a: {shape: cube, radius: 1}}": "1:26 UNKNOWN box 'a' has no key 'radius'; available: at, file, shape, side",
     "boxes: {self: {shape: cube}}": "1:9 NAME a box cannot be called 'self'",
-    "boxes: {a: {shape: cube, at: [1, .nan, 1]}}": "1:30 WRONG 'at' takes 3 numbers, this is [1, nan, 1]",
-    "tags: []": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is []",
-    "tags: [a, b, c, d]": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is ['a', 'b', 'c', 'd']",
-    "tags: [' ']": "1:7 WRONG 'tags' takes a list of tags, as in tags: [old], this is [' ']",
-    "lists: {}": "1:8 WRONG 'lists' takes a mapping, this is a mapping",
-    "lists: {x: null}": "1:12 WRONG 'x' takes a list of values, this is null",
-    "inner: {tags: 1}": "1:15 WRONG 'tags' takes a list of tags, as in tags: [old], this is 1",
-    "inner: 3": "1:8 WRONG 'inner' takes text, this is 3",
-    "tags: [old, very old, and so on]\n? a key, which is none\n": "2:3 TOP 'a key, which is none' reads as a key: text with a "
-    "comma stands in quotes within {…}",
+    "boxes: {a: {shape: cube, at: [1, .nan, 1]}}": "1:30 WRONG 'at': expected a list of 3 numbers, got [1, nan, 1]",
+    "tags: []": "1:7 WRONG 'tags': expected a list of tags, as in tags: [old], got []",
+    "tags: [a, b, c, d]": "1:7 WRONG 'tags': expected a list of tags, as in tags: [old], got ['a', 'b', 'c', 'd']",
+    "tags: [' ']": "1:7 WRONG 'tags': expected a list of tags, as in tags: [old], got [' ']",
+    "lists: {}": "1:8 WRONG 'lists': expected a mapping, got a mapping",
+    "lists: {x: null}": "1:12 WRONG 'x': expected a list of values, got null",
+    "inner: {tags: 1}": "1:15 WRONG 'tags': expected a list of tags, as in tags: [old], got 1",
+    "inner: 3": "1:8 WRONG 'inner': expected text, got 3",
+    "tags: [old, very old, and so on]\n? a key, which is none\n": "2:3 TOP 'a key, which is none' is read as a key; put text with "
+    "a comma in quotes within {…}",
 }
 
 
 @pytest.mark.parametrize("text", WRONG)
 def test_a_mistake_is_told_at_its_place(text: str) -> None:
-    assert told(text) == [WRONG[text]]
+    assert messages(text) == [WRONG[text]]
 
 
 def test_what_is_left_out_is_remembered() -> None:
-    root, walk = walked("lamps: {a: {kind: lng, power: 1}, B: {}}\ntags: 1\nopen: *nowhere\n")
+    root, validator = validate("lamps: {a: {kind: lng, power: 1}, B: {}}\ntags: 1\nopen: *nowhere\n")
     assert root is not None
     assert root.plain() == {"lamps": {"a": {"power": 1}}}
-    assert walk.dropped == {("lamps", "a", "kind"), ("lamps", "B"), ("tags",), ("open",)}
-    assert [problem.code for problem in walk.problems] == ["RG006", "WRONG", "NAME", "WRONG"]
+    assert validator.dropped == {("lamps", "a", "kind"), ("lamps", "B"), ("tags",), ("open",)}
+    assert [problem.code for problem in validator.problems] == ["RG006", "WRONG", "NAME", "WRONG"]
 
 
 def test_nobody_reads_a_thousand_mistakes() -> None:
     with pytest.raises(InputError) as caught:
-        walked("".join(f"k{number}: 1\n" for number in range(1000)))
+        validate("".join(f"k{number}: 1\n" for number in range(1000)))
     assert len(caught.value.problems) == 100
 
 
 @pytest.mark.parametrize(
-    ("form", "words"),
+    ("type", "words"),
     [
         (number(), "a number"),
         (number(0), "a number from 0 up"),
@@ -162,12 +149,13 @@ def test_nobody_reads_a_thousand_mistakes() -> None:
         (number(0.5, 1000), "a number from 0.5 to 1000"),
         (number(0, 90, above=True), "a number above 0 to 90"),
         (whole(1), "a whole number from 1 up"),
-        (either(whole(1, 3), TEXT, FLAG), "a whole number from 1 to 3, text, or true or false"),
-        (row(TEXT, FLAG), "a list of text, true or false"),
+        (whole(1, 3) | TEXT | bool, "a whole number from 1 to 3, text or true or false"),
+        (tuple[TEXT, bool], "a list of text, true or false"),
+        (vector(2, 0, 1), "a list of 2 numbers from 0 to 1"),
     ],
 )
-def test_limits_in_words(form: Form, words: str) -> None:
-    assert form.wanted == words
+def test_limits_in_words(type: Any, words: str) -> None:
+    assert words_for(type, file=True) == words
 
 
 @pytest.mark.parametrize("kind", FILE_KINDS)
@@ -177,8 +165,7 @@ def test_every_key_of_every_file_is_documented_and_has_a_legal_default(kind: str
             assert key.doc.endswith((".", ")")), key.name
             if key.default is not None:
                 default = list(key.default) if isinstance(key.default, tuple) else key.default
-                assert isinstance(key.takes, Form)
-                assert key.takes.fits(from_plain(default, Source("here"))), key.name
+                assert fits(conversion_to(key.type)(default), key.type), key.name
 
 
 # --- the schema says the same ----------------------------------------------------------------------------------------
@@ -248,11 +235,11 @@ def test_shipped_files_are_valid_and_mutants_are_as_the_walk_says(kind: str) -> 
         assert accepts(validate, data)
         found = mutants(data)
         for mutant in found[:: len(found) // 100 + 1]:
-            walk = Walk(CODES)
-            walk.root(from_plain(mutant, Source("mutant")), table, "keys")
+            validator = Validator(CODES)
+            validator.file(from_plain(mutant, Source("mutant")), table, "keys")
             checked += 1
-            if walk.problems:
-                assert not accepts(validate, mutant), (mutant, walk.problems)
+            if validator.problems:
+                assert not accepts(validate, mutant), (mutant, validator.problems)
     assert checked > 100
 
 

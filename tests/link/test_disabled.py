@@ -134,9 +134,9 @@ def test_its_own_links_may_lack_and_its_mistakes_are_mistakes(toy_catalog: Catal
 
 def test_what_is_no_switch_is_said_at_its_place(toy_catalog: Catalog) -> None:
     (written,) = problems(CHAIN.replace("{type: shadow_map}", "{type: shadow_map, enabled: no}"), toy_catalog)
-    assert written.startswith("<text>:3:36: RG106 'enabled' takes true or false, this is 'no'")
+    assert written.startswith("<text>:3:36: RG106 'enabled': expected true or false, got 'no'")
     (typed,) = problems(CHAIN, toy_catalog, "sun.enabled=3")
-    assert typed.startswith("--set sun.enabled=3: RG106 'sun.enabled' takes true or false, this is a number")
+    assert typed.startswith("--set sun.enabled=3: RG106 'sun.enabled': expected true or false, got a number")
 
 
 def test_files_patches_and_settings_put_it_back(toy_catalog: Catalog, tmp_path: Path) -> None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rendergraph.document import Source, from_plain
-from rendergraph.keys import Form
 from rendergraph.projection import unit
 from rendergraph.scene.geometry import face_normals
 from rendergraph.scene.model import Mesh
 from rendergraph.scene.shapes import SHAPES, build, mesh
+from rendergraph.typecheck import conversion_to, fits
 
 SOLIDS = sorted(set(SHAPES) - {"plane"})
 SMALL = {
@@ -110,5 +109,4 @@ def test_every_key_has_a_doc_and_a_legal_default(shape: str) -> None:
     for key in SHAPES[shape].keys:
         assert key.doc.endswith(".")
         default = list(key.default) if isinstance(key.default, tuple) else key.default
-        assert isinstance(key.takes, Form)
-        assert key.takes.fits(from_plain(default, Source("here")))
+        assert fits(conversion_to(key.type)(default), key.type)

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
 import pytest
+from msgspec import Struct
+from msgspec.structs import force_setattr
 
-from rendergraph.annotations import (
+from rendergraph.errors import Misuse
+from rendergraph.typecheck import (
+    Brief,
     Known,
     Length,
     Matching,
     Range,
+    brief,
     conversion_to,
     fits,
     mistakes_in,
     mistakes_of,
-    right,
+    validated,
     words_for,
 )
-from rendergraph.errors import Misuse
 
 Count: TypeAlias = Annotated[int, Range(0)]
 Factor: TypeAlias = Annotated[float, Range(0, above=True)]
@@ -53,7 +56,7 @@ FITS: list[tuple[Any, list[object], list[object]]] = [
     (Annotated[int, Range(1, 16)], [1, 16], [0, 17]),
     (Texel, [0, (1, 2), (0.5,) * 4], [(), (1,) * 5, "a"]),
     (Annotated[str, Known(("r8", "rg8"))], ["r8"], ["r9", 8]),
-    (Annotated[str, Matching("[a-z]+")], ["ab"], ["ab\n", "A", 1]),
+    (Annotated[str, Matching(r"[a-z]+\Z")], ["ab"], ["ab\n", "A", 1]),
     (Range, [Range()], [Range, 1]),
 ]
 
@@ -103,7 +106,7 @@ BEYOND: list[tuple[Range, float, str | None]] = [
 
 @pytest.mark.parametrize(("limits", "value", "said"), BEYOND)
 def test_limits_of_a_number(limits: Range, value: float, said: str | None) -> None:
-    assert (limits.beyond(value), limits.holds(value)) == (said, said is None)
+    assert (limits.violation(value), limits.accepts(value)) == (said, said is None)
 
 
 SAID: list[tuple[object, Any, str]] = [
@@ -135,28 +138,43 @@ def test_what_is_said(value: object, annotation: Any, said: str) -> None:
     assert (mistake.subject, mistake.text) == ("subject", said)
 
 
+BRIEF: list[tuple[Any, str]] = [
+    (int | None, "whole number | null"),
+    (tuple[float, ...], "[number, …]"),
+    (tuple[float, float], "[2 numbers]"),
+    (tuple[str, float], "[text, number]"),
+    (str | list[str], "text | [text, …]"),
+    (Annotated[str, Brief("name")] | Side, "name | left | right"),
+    (Any, "any value"),
+]
+
+
+@pytest.mark.parametrize(("annotation", "text"), BRIEF)
+def test_a_type_in_a_table(annotation: Any, text: str) -> None:
+    assert brief(annotation) == text
+
+
 def test_a_file_gives_other_values_than_python() -> None:
     annotation = bool | tuple[float, float, float] | None
     assert words_for(annotation) == "True or False, 3 numbers or None"
     assert words_for(annotation, file=True) == "true or false or a list of 3 numbers"
 
 
-@dataclass(frozen=True)
-class Lens:
+class Lens(Struct, frozen=True):
     """Something with fields."""
 
     side: Side
     count: Count = 1
 
     def __post_init__(self) -> None:
-        right(self)
+        validated(self)
 
 
-def test_a_dataclass_refuses_what_its_fields_do_not_say() -> None:
-    assert right(Lens("left"), "a lens") == Lens("left")
+def test_a_struct_refuses_what_its_fields_do_not_say() -> None:
+    assert validated(Lens("left"), "a lens") == Lens("left")
     with pytest.raises(Misuse, match=r"^Lens: count is -1, not a whole number from 0 up$"):
         Lens("left", -1)
     wrong = Lens("left")
-    object.__setattr__(wrong, "side", 7)
-    object.__setattr__(wrong, "count", None)
+    force_setattr(wrong, "side", 7)
+    force_setattr(wrong, "count", None)
     assert [mistake.subject for mistake in mistakes_of(wrong, "a lens")] == ["side", "count"]

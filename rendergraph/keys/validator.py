@@ -1,0 +1,163 @@
+"""One pass over a file: unknown keys and values that do not fit are reported with their places and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from msgspec import Struct
+
+from rendergraph.document import BROKEN, Value, said, shown
+from rendergraph.errors import InputError, Problem, suggestion
+from rendergraph.keys.tables import Key, MapOf, Recursive, Table, Type
+from rendergraph.typecheck import conversion_to, hint_for, test_of, words_for
+
+MOST_PROBLEMS = 100
+"""Limit of mistakes: nobody reads more, and finding the nearest name for each of a million takes hours."""
+
+
+class Codes(Struct, frozen=True):
+    """The codes of the mistakes in one kind of file.
+
+    Attributes:
+        unknown: an unknown key.
+        wrong: a value that does not fit, or is missing.
+        name: an illegal name.
+        file: the whole is not a mapping.
+    """
+
+    unknown: str
+    wrong: str
+    name: str
+    file: str
+
+
+class Validator:
+    """Checks the values of one file against tables.
+
+    Attributes:
+        problems: the mistakes so far, in the order of the file.
+        dropped: paths of what was left out, so that it is not reported as missing.
+    """
+
+    def __init__(self, codes: Codes, problems: Iterable[Problem] = ()) -> None:
+        """`problems` are those of parsing: values may then be `BROKEN`, which has been reported."""
+        self.codes = codes
+        self.problems = list(problems)
+        self.dropped: set[tuple[str, ...]] = set()
+        self._has_broken = bool(self.problems)
+        self._path: list[str] = []
+        self._checks: dict[int, Any] = {}  # by identity, because hashing an annotation takes long
+
+    def report(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
+        """Note a mistake at a value, or at its key.
+
+        Raises:
+            InputError: there are too many.
+        """
+        self.problems.append(value.problem(code, text, key=key))
+        if len(self.problems) >= MOST_PROBLEMS:
+            raise InputError(self.problems)
+
+    def file(self, value: Value, table: Table, holds: str) -> Value | None:
+        """Return the valid part of a file's outermost value; `holds` says in words what a file usually has."""
+        if isinstance(value.data, dict):
+            return self._table(value, table, "")
+        if value.data is not BROKEN:
+            self.report(value, self.codes.file, f"expected {table.what}, a mapping with {holds}, got {value.kind}")
+        return None
+
+    def value(self, value: Value, key: Key) -> Value | None:
+        """Return the valid part of a key's value; None where nothing of it is valid, or it is null."""
+        return self._value(value, key, key.type, key.name)
+
+    def _value(self, value: Value, key: Key, type: Type, name: str) -> Value | None:
+        size = len(value.data) if isinstance(value.data, dict) else -1
+        if isinstance(type, Recursive):
+            type = type.table() if size >= 0 else type.type
+        if isinstance(type, Table) and size >= 0:
+            return self._table(value, type, name)
+        if isinstance(type, MapOf) and size >= type.least:
+            return self._map(value, key, type)
+        expected, hint = "a mapping", ""
+        if not isinstance(type, Table | MapOf):
+            if self._has_broken and _is_broken(value):
+                return None
+            found = value.plain()
+            if self._accepts(type, found):
+                return value
+            expected, hint = words_for(type, file=True), hint_for(found, type)
+        if value.data is not BROKEN:
+            example = f", as in {key.example}" if key.example else ""
+            text = f"'{shown(name)}': expected {expected}{example}, got {said(value)}{hint}"
+            self.report(value, key.code or self.codes.wrong, text)
+        return None
+
+    def _accepts(self, type: Any, value: Any) -> bool:
+        check = self._checks.get(id(type))
+        if check is None:
+            self._checks[id(type)] = check = conversion_to(type), test_of(type)
+        convert, test = check
+        return bool(test(convert(value)))
+
+    def _enter(self, valid: dict[str, Value], name: str, child: Value, key: Key, type: Type) -> None:
+        """Add the valid part of a child to a mapping, or note that it was left out."""
+        self._path.append(name)
+        if child.data is None:
+            valid[name] = child
+        elif (part := self._value(child, key, type, name)) is not None:
+            valid[name] = part
+        else:
+            self.dropped.add(tuple(self._path))
+        self._path.pop()
+
+    def _table(self, value: Value, table: Table, name: str) -> Value:
+        what = table.what.format(shown(name))
+        keys = table.keys_of(value)
+        valid: dict[str, Value] = {}
+        for word, child in value.items():
+            if word in keys:
+                self._enter(valid, word, child, keys[word], keys[word].type)
+                continue
+            if word in table.refused:
+                text = table.refused[word]
+            elif child.data is None and " " in str(word):
+                text = f"'{shown(word)}' is read as a key; put text with a comma in quotes within {{…}}"
+            else:
+                text = f"{what} has no key '{shown(word)}'{suggestion(str(word), keys)}"
+            self.report(child, table.code or self.codes.unknown, text, key=True)
+        self._missing(value, table, what)
+        return value.with_data(valid)
+
+    def _missing(self, value: Value, table: Table, what: str) -> None:
+        given = {name for name, child in value.items() if child.data is not None}
+        if table.alternatives and len(given & table.alternatives.keys()) != 1:
+            words = " or ".join(f"'{name}'" for name in table.alternatives)
+            self.report(value, self.codes.wrong, f"{what} needs either {words}", key=True)
+        for key in table.keys:
+            if key.required and key.name not in given:
+                example = f"; add {key.example}" if key.example else ""
+                self.report(value, self.codes.wrong, f"{what} needs '{key.name}'{example}", key=True)
+
+    def _map(self, value: Value, key: Key, type: MapOf) -> Value:
+        valid: dict[str, Value] = {}
+        for name, child in value.items():
+            if not isinstance(name, str) or name in type.refused or not type.naming.pattern.match(name):
+                text = type.refused.get(str(name)) or f"'{shown(name)}' is not a {type.what}; use {type.naming.words}"
+                text += "; a space is needed between the ':' and the value" if ":" in str(name) else ""
+                self.report(child, self.codes.name, text, key=True)
+                self.dropped.add((*self._path, str(name)))
+            elif child.data is None and isinstance(type.of, Table):
+                valid[name] = child
+                self._missing(child, type.of, type.of.what.format(shown(name)))
+            elif child.data is None and not type.null:
+                self._value(child, key, type.of, name)
+            else:
+                self._enter(valid, name, child, key, type.of)
+        return value.with_data(valid)
+
+
+def _is_broken(value: Value) -> bool:
+    data = value.data
+    parts = data if isinstance(data, list) else data.values() if isinstance(data, dict) else ()
+    return data is BROKEN or any(map(_is_broken, parts))

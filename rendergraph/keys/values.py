@@ -1,0 +1,78 @@
+"""Types of the values in files, as annotations: see `rendergraph.typecheck`. Null means absent and is of no type."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from rendergraph.typecheck import MOST, Brief, Converted, JsonSchema, Length, Matching, Range, words_for
+
+TEXT: Any = Annotated[str, Matching(r"\s*\S")]
+FILE: Any = Annotated[TEXT, "a file's name", Brief("path")]
+NUMBER: Any = Annotated[float, Range()]
+
+
+def version(number: int) -> Any:
+    """The version of a file format."""
+    return Annotated[Literal[number], f"{number}, the version of the format that this program reads"]
+
+
+def word(pattern: re.Pattern[str], words: str, short: str = "name") -> Any:
+    """Text that a pattern matches, with its description for messages and for tables."""
+    return Annotated[str, Matching(pattern), words, Brief(short)]
+
+
+def shipped(names: Callable[[], Mapping[str, Path]]) -> Any:
+    """The name of something shipped, which an editor offers, or the path of a file, which it does not."""
+    path = {"type": "string", "pattern": "[./]"}
+    schema = JsonSchema(lambda: {"anyOf": [{"enum": list(names())}, path]})
+    return Annotated[TEXT, schema, Brief("name | path")]
+
+
+def choice(*words: str) -> Any:
+    """One of some words."""
+    return Literal[words]
+
+
+def number(low: float = -MOST, high: float = MOST, *, above: bool = False, infinite: bool = False) -> Any:
+    """A number within limits; see `Range`."""
+    return Annotated[float, Range(low, high, above, infinite)]
+
+
+def whole(low: int, high: float = MOST) -> Any:
+    """A whole number within limits, inclusive."""
+    return Annotated[int, Range(low, high)]
+
+
+def vector(count: int = 3, low: float = -MOST, high: float = MOST, *, above: bool = False) -> Any:
+    """A list of `count` numbers, each within limits."""
+    return tuple[(number(low, high, above=above),) * count]  # type: ignore[misc]  # made at run time
+
+
+def color(high: float = MOST, *, alpha: bool = False) -> Any:
+    """Red, green and blue from 0 up; with `alpha` a fourth number, 1 by default."""
+    three, four = vector(3, 0, high), vector(4, 0, high)
+    if not alpha:
+        return Annotated[three, Brief("[r, g, b]")]
+    words = words_for(four, file=True).replace("4", "3 or 4", 1)
+    opaque = Converted(lambda value: (*value, 1.0) if isinstance(value, tuple) and len(value) == 3 else value)
+    return Annotated[four | three, words, Brief("[r, g, b]"), opaque]
+
+
+def scale() -> Any:
+    """A factor for each axis, or one for all."""
+    uniform = Converted(lambda value: (value,) * 3 if isinstance(value, float) else value)
+    return Annotated[number() | vector(), "a number or a list of 3 numbers", Brief("number | [x, y, z]"), uniform]
+
+
+def row(*types: Any) -> Any:
+    """A list with a type for each entry."""
+    return tuple[types]  # type: ignore[valid-type]  # made at run time
+
+
+def listed(of: Any, words: str, least: int = 0, most: float = math.inf) -> Any:
+    """A list; `words` says of what, in the plural."""
+    return Annotated[list[of], Length(least, most), f"a list of {words}"]
