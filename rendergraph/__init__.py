@@ -17,13 +17,25 @@ if TYPE_CHECKING:
     from rendergraph.compare import sweep
     from rendergraph.errors import RendergraphError
     from rendergraph.session import Frame, Pipeline, RenderOptions, Selection, Session, load
+    from rendergraph.settings import CacheLimits
     from rendergraph.viewer import view
 
 _around = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 if os.path.isfile(os.path.join(_around, "pyproject.toml")) and os.path.isdir(os.path.join(_around, "nodes")):
     __path__.append(_around)  # a checkout has its own nodes, shaders and pipelines, wherever another one is installed
 
-__all__ = ["Frame", "Pipeline", "RenderOptions", "RendergraphError", "Selection", "Session", "load", "sweep", "view"]
+__all__ = [
+    "CacheLimits",
+    "Frame",
+    "Pipeline",
+    "RenderOptions",
+    "RendergraphError",
+    "Selection",
+    "Session",
+    "load",
+    "sweep",
+    "view",
+]
 
 
 def __dir__() -> list[str]:
@@ -36,6 +48,7 @@ __getattr__ = lazy_exports(
         "compare": ("sweep",),
         "errors": ("RendergraphError",),
         "session": ("Frame", "Pipeline", "RenderOptions", "Selection", "Session", "load"),
+        "settings": ("CacheLimits",),
         "viewer": ("view",),
     },
 )

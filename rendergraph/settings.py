@@ -1,4 +1,4 @@
-"""The project's settings file, and the folders that files may be read from.
+"""The project's settings file, what a session keeps, and the folders that files may be read from.
 
 Pipelines and scenes are untrusted data: whatever they refer to must lie, links followed, inside a root. The settings
 file `rendergraph.toml` marks a project's folder as one. What it says beyond that (more roots, plugins, which are code)
@@ -20,10 +20,46 @@ from rendergraph.errors import InputError, Place, Problem
 from rendergraph.keys import Codes, Key, Table, Validator, plain
 from rendergraph.keys.values import listed
 from rendergraph.stamps import record_read
-from rendergraph.typecheck import Brief, Matching
+from rendergraph.typecheck import Brief, Matching, Range
 
 FILE_NAME = "rendergraph.toml"
 _PATHS = listed(Annotated[str, Matching(r"\s*[^\s\0][^\0]*\Z"), Brief("path")], "paths")
+_SIZE = Annotated[int, Range(0, 1_000_000)]
+
+
+class CacheLimits(Struct, frozen=True):
+    """What a session keeps on the GPU; what was used least recently goes first.
+
+    Attributes:
+        programs: compiled programs, each of which takes some MB on a software driver.
+        mebibytes: textures and buffers of compiled pipelines, and copies of kept values, in MiB.
+
+    The last four compiled pipelines are kept, as far as `mebibytes` allows, with all their programs. What is drawn is
+    kept whatever it takes.
+    """
+
+    programs: int = 32
+    mebibytes: int = 1024
+
+    @property
+    def bytes(self) -> int:
+        """The second limit in bytes."""
+        return self.mebibytes << 20
+
+
+_CACHE = Table(
+    "`cache`",
+    (
+        Key("programs", _SIZE, "Compiled programs.", default=CacheLimits().programs),
+        Key(
+            "mebibytes",
+            _SIZE,
+            "Textures and buffers of compiled pipelines, and copies of kept values.",
+            default=CacheLimits().mebibytes,
+            unit="MiB",
+        ),
+    ),
+)
 SETTINGS = Table(
     "a settings file",
     (
@@ -31,6 +67,7 @@ SETTINGS = Table(
             "asset_roots", _PATHS, "Further folders that files may be read from.", example='asset_roots = ["../assets"]'
         ),
         Key("plugins", _PATHS, "Files and folders with nodes: code.", example='plugins = ["my_effects"]'),
+        Key("cache", _CACHE, "What a session keeps on the GPU.", example="cache = {programs = 64}"),
     ),
 )
 """What `rendergraph.toml` holds; its paths are relative to it."""
@@ -45,11 +82,13 @@ class Settings(Struct, frozen=True):
         file: the file.
         asset_roots: further folders that files may be read from.
         plugins: files and folders with node modules.
+        cache: what a session keeps.
     """
 
     file: Path
     asset_roots: tuple[Path, ...] = ()
     plugins: tuple[Path, ...] = ()
+    cache: CacheLimits = CacheLimits()
 
     @property
     def folder(self) -> Path:
@@ -75,7 +114,7 @@ def load(file: Path) -> Settings:
     """A settings file; its paths are relative to it.
 
     Raises:
-        InputError: it is no TOML, or has other keys than `asset_roots` and `plugins`, each a list of paths.
+        InputError: it is not valid TOML, or a key or value of it is wrong.
     """
     import tomllib  # most projects have no such file
 
@@ -85,11 +124,13 @@ def load(file: Path) -> Settings:
     except (ValueError, RecursionError) as error:
         raise InputError(source.problem("RG017", f"not a valid settings file: {shown(error, 120)}")) from None
     validator = Validator(_CODES)
-    root = validator.file(from_plain(table, source), SETTINGS, "lists of paths")
+    root = validator.file(from_plain(table, source), SETTINGS, "settings")
     if validator.problems or root is None:
         raise InputError(validator.problems)
-    paths = {key: tuple(file.parent / at_home(path) for path in found) for key, found in plain(root, SETTINGS).items()}
-    return Settings(file, **paths)
+    settings = plain(root, SETTINGS)
+    cache = CacheLimits(**settings.pop("cache", {}))
+    paths = {key: tuple(file.parent / at_home(path) for path in found) for key, found in settings.items()}
+    return Settings(file, **paths, cache=cache)
 
 
 class Roots(Struct, frozen=True):

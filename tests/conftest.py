@@ -72,7 +72,7 @@ def shared() -> Path:
 @pytest.fixture(scope="session")
 def gl() -> Iterator[rg.Session]:
     """One GL session for all tests."""
-    with rg.Session() as session:
+    with rg.Session(cache=rg.CacheLimits(programs=128)) as session:
         yield session
 
 

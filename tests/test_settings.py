@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rendergraph.errors import InputError, Place
-from rendergraph.settings import Roots, load, nearest
+from rendergraph.settings import CacheLimits, Roots, load, nearest
 
 
 def test_the_nearest_above(tmp_path: Path) -> None:
@@ -35,6 +35,7 @@ def test_the_nearest_above(tmp_path: Path) -> None:
             'plugins = "nodes"',
             r"RG017 'plugins': expected a list of paths, as in plugins = \[\"my_effects\"\], got 'nodes'",
         ),
+        ("cache = {programs = -1}", "RG017 'programs': expected a whole number"),
         ("plugins = [1]", "RG017 'plugins': expected a list of paths"),
         ('plugins = ["a\\u0000b"]', "RG017 'plugins': expected a list of paths"),
     ],
@@ -46,6 +47,11 @@ def test_wrong_settings(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "rendergraph.toml").write_bytes(b"\xff")
     with pytest.raises(InputError, match="RG017"):
         load(tmp_path / "rendergraph.toml")
+
+
+def test_limits_of_the_cache(tmp_path: Path) -> None:
+    (tmp_path / "rendergraph.toml").write_text("[cache]\nmebibytes = 64\n")
+    assert load(tmp_path / "rendergraph.toml").cache == CacheLimits(mebibytes=64)
 
 
 def test_the_home_of_nobody_is_a_path_like_any(tmp_path: Path) -> None:

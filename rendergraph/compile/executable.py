@@ -186,6 +186,11 @@ class Executable(Struct, eq=False, dict=True):
         steps = self.plan.schedule.steps
         return {s.key: s for s in steps if any(resources[write.resource].role == "kept" for write in s.writes)}
 
+    @property
+    def programs(self) -> set[Program]:
+        """All programs that it runs."""
+        return {draw.program for steps in self.steps for step in steps for draw in step.all_draws}
+
     def renew(self) -> None:
         """Let the next frame make everything, what is kept included: nothing has, or what did failed."""
         self.due = set(self.kept)
@@ -209,6 +214,11 @@ class Executable(Struct, eq=False, dict=True):
         missing = {key for key in self.due if any(w.resource not in resources for w in self.kept[key].writes)}
         self.due = self._with_dependents(missing)
         self.assemble()
+
+    def take_over(self) -> None:
+        """Another executable has drawn meanwhile: shared programs hold its uniforms, shared textures its texels."""
+        self.fresh = True
+        self.reuse.forget()
 
     def break_off(self) -> None:
         """A step was broken off in its middle: leave nothing of it to what is drawn after."""

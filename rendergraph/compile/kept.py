@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from rendergraph.compile.executable import Executable
     from rendergraph.gl.device import Device
 
-MOST_BYTES = 64 << 20
-"""Bytes of the copies; those that were asked for longest ago go first."""
-
 Content: TypeAlias = Hashable
 """All that decides what a kept resource holds: equal ones hold the same bits."""
 
@@ -31,9 +28,15 @@ _Held: TypeAlias = "GpuTexture | moderngl.Buffer"
 
 
 class KeptValues(Struct, eq=False):
-    """The last few values that were made, whichever pipeline, scene or parameters they are of."""
+    """The last few values that were made, whichever pipeline, scene or parameters they are of.
+
+    Attributes:
+        device: where they are.
+        limit: bytes of all copies together; the least recently used ones are freed first.
+    """
 
     device: Device
+    limit: int
     _held: dict[Content, _Held] = field(default_factory=dict)
 
     def save(self, executable: Executable) -> None:
@@ -47,7 +50,7 @@ class KeptValues(Struct, eq=False):
                 held = self._like(made)
                 self._copy(made, held)
             self._held[content] = held
-        while sum(_bytes(held) for held in self._held.values()) > MOST_BYTES:
+        while sum(_bytes(held) for held in self._held.values()) > self.limit:
             self._delete(self._held.pop(next(iter(self._held))))
 
     def restore(self, executable: Executable) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -67,6 +68,37 @@ class Region(Struct, eq=False):
         raw.glDepthBoundsEXT(*self.depth_bounds)
 
 
+class _PooledTexture(Struct, eq=False):
+    texture: GpuTexture
+    users: int = 0
+
+
+class TexturePool(Struct, eq=False):
+    """Textures that several executables share: only one draws at a time, and none reads what another left in them.
+
+    So variants of a pipeline, which differ in little more than a program, have one set of textures.
+    """
+
+    device: Device
+    _pooled: dict[TextureDesc, list[_PooledTexture]] = field(default_factory=dict)
+
+    def acquire(self, desc: TextureDesc, number: int, label: str) -> GpuTexture:
+        """The texture of this description with this number, counted from 0 in each executable."""
+        of_desc = self._pooled.setdefault(desc, [])
+        if number == len(of_desc):
+            of_desc.append(_PooledTexture(textures.create(self.device, desc, label)))
+        pooled = of_desc[number]
+        pooled.users += 1
+        return pooled.texture
+
+    def release(self, texture: GpuTexture) -> None:
+        """Free a texture when its last user releases it."""
+        of_desc = self._pooled[texture.desc]
+        next(pooled for pooled in of_desc if pooled.texture is texture).users -= 1
+        while of_desc and not of_desc[-1].users:  # executables use the first ones
+            textures.delete(self.device, of_desc.pop().texture)
+
+
 class Memory(Struct, eq=False, dict=True):
     """Everything a pipeline allocates for one size.
 
@@ -77,6 +109,7 @@ class Memory(Struct, eq=False, dict=True):
     device: Device
     plan: ResourcePlan
     environment: Callable[[], GpuTexture]
+    pool: TexturePool
     physicals: list[GpuTexture | moderngl.Buffer | Block] = field(default_factory=list)
     regions: dict[tuple[str, int], Region] = field(default_factory=dict)
     _views: dict[tuple[object, ...], GpuTexture] = field(default_factory=dict)
@@ -85,6 +118,7 @@ class Memory(Struct, eq=False, dict=True):
     _dummies: dict[tuple[int, bool], moderngl.Renderbuffer] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        numbers: Counter[TextureDesc] = Counter()
         blocks = [physical for physical in self.plan.physicals if physical.block]
         descs = [[self._desc(id) for id in physical.members] for physical in blocks]
         made_blocks = iter(make_blocks(self.device, descs))
@@ -98,7 +132,11 @@ class Memory(Struct, eq=False, dict=True):
                     self.physicals.append(self.device.ctx.buffer(reserve=max(16, physical.desc.bytes)))
                 else:
                     label = ", ".join(physical.members)
-                    made = textures.create(self.device, physical.desc, label)
+                    if self._is_kept(physical):
+                        made = textures.create(self.device, physical.desc, label)
+                    else:
+                        made = self.pool.acquire(physical.desc, numbers[physical.desc], label)
+                        numbers[physical.desc] += 1
                     self.physicals.append(made)
                     if self.device.ctx.supports_labels:
                         self.device.ctx.mglo.set_label(_TEXTURE_LABEL, made.glo, label[:200])
@@ -107,6 +145,9 @@ class Memory(Struct, eq=False, dict=True):
                 block.release()
             self.release()
             raise
+
+    def _is_kept(self, physical: Physical) -> bool:
+        return any(self.plan.resources[id].role == "kept" for id in physical.members)
 
     def _is_scenes(self, physical: Physical) -> bool:
         return self.plan.resources[physical.members[0]].role == "scene"
@@ -267,7 +308,9 @@ class Memory(Struct, eq=False, dict=True):
         for planned, physical in zip(self.plan.physicals, self.physicals, strict=False):  # it may have failed midway
             if self._is_scenes(planned):
                 continue
-            if isinstance(physical, GpuTexture):
+            if isinstance(physical, GpuTexture) and not self._is_kept(planned):
+                self.pool.release(physical)
+            elif isinstance(physical, GpuTexture):
                 textures.delete(self.device, physical)
             else:
                 physical.release()

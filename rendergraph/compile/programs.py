@@ -1,7 +1,8 @@
-"""Programs by source: compiled once a session, errors at the author's line."""
+"""Programs by source, compiled once while they are in use or were lately; errors at the author's line."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 from collections.abc import Mapping, Sequence, Set
 from typing import Any
@@ -17,12 +18,25 @@ from rendergraph.resources import folder
 
 
 class ProgramCache(Struct, eq=False):
-    """Programs by their text, their outputs and the binding points of their blocks."""
+    """Programs by their text, their outputs and the binding points of their blocks, least recently used first.
+
+    Attributes:
+        device: what compiles them.
+        limit: how many programs are kept; all that kept executables run are kept in any case.
+        compiled: how many programs have been compiled so far.
+    """
 
     device: Device
+    limit: int
     compiled: int = 0
+    _compiled_before: int = 0
     _programs: dict[tuple[object, ...], Program] = field(default_factory=dict)
     _vertex_arrays: dict[tuple[object, ...], Any] = field(default_factory=dict)
+
+    @property
+    def alive(self) -> int:
+        """How many programs there are."""
+        return len(self._programs)
 
     def get(self, texts: Mapping[str, StageText], blocks: Mapping[str, int], outputs: Sequence[str]) -> Program:
         """The program of these texts.
@@ -33,7 +47,8 @@ class ProgramCache(Struct, eq=False):
         sources = {stage: text.text for stage, text in texts.items()}
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:
-            return self._programs[key]
+            program = self._programs[key] = self._programs.pop(key)
+            return program
         shipped = os.path.join(folder("rendergraph.shaders"), "")
         for text in texts.values():
             if not all(str(file).startswith(shipped) for file in text.source.files):
@@ -68,13 +83,23 @@ class ProgramCache(Struct, eq=False):
         for key in [key for key in self._vertex_arrays if len(key) > 1 and key[1] == marker]:
             self._vertex_arrays.pop(key).release()
 
-    def discard(self, programs: Set[Program]) -> None:
-        """Free programs whose text is out of date, so that a day of editing does not fill the driver's memory."""
-        for key in [key for key, program in self._programs.items() if program in programs]:
+    def trim(self, used: Set[Program]) -> None:
+        """Free the least recently used programs: each costs Mesa's software driver about 3 MB.
+
+        Args:
+            used: programs that kept executables run; none of them is freed.
+        """
+        unused = [key for key, program in self._programs.items() if program not in used]
+        for key in unused[: max(0, len(self._programs) - self.limit)]:
             program = self._programs.pop(key)
             for full in [full for full in self._vertex_arrays if full[0] == program.glo]:
                 self._vertex_arrays.pop(full).release()
             program.release()
+        for key in [key for key, program in self._programs.items() if program in used]:
+            self._programs[key] = self._programs.pop(key)
+        if self.compiled != self._compiled_before:
+            self._compiled_before = self.compiled
+            _return_free_memory()
 
     def release(self) -> None:
         """Free everything."""
@@ -84,3 +109,10 @@ class ProgramCache(Struct, eq=False):
             program.release()
         self._vertex_arrays.clear()
         self._programs.clear()
+
+
+def _return_free_memory() -> None:
+    """Return to the system what compiling left in the C library's heap, several times what programs take."""
+    malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc's alone
+    if malloc_trim is not None:
+        malloc_trim(0)

@@ -25,7 +25,7 @@ from rendergraph.compile.executable import CompiledStep, Draw, Executable, Sorte
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.limits import check_plan, groups_of
-from rendergraph.compile.memory import Call, ClearTarget, Memory, Region
+from rendergraph.compile.memory import Call, ClearTarget, Memory, Region, TexturePool
 from rendergraph.compile.programs import ProgramCache
 from rendergraph.compile.stored import check_stored
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
@@ -61,6 +61,7 @@ def compile_plan(
     views: Mapping[str, ViewTable],
     scene: GpuScene,
     programs: ProgramCache,
+    pool: TexturePool,
     *,
     poison: bool = False,
 ) -> Executable:
@@ -73,6 +74,7 @@ def compile_plan(
         views: view tables by id.
         scene: the scene on the GPU.
         programs: the session's programs.
+        pool: the session's textures.
         poison: overwrite released textures with a value that no picture should show.
 
     Raises:
@@ -80,7 +82,7 @@ def compile_plan(
         InputError: a shader does not compile.
     """
     check_plan(device, plan, views, len(FIXED_BLOCKS))
-    memory = Memory(device, plan, scene.environment)
+    memory = Memory(device, plan, scene.environment, pool)
     buffers = ViewBuffers(device, views)
     compiler = _Compiler(device, plan, types, views, scene, programs, memory, buffers, poison)
     try:

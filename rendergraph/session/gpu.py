@@ -6,12 +6,14 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.session.gpu_cache import GpuCache
+from rendergraph.settings import CacheLimits, nearest
 
 if TYPE_CHECKING:
     import moderngl
@@ -25,19 +27,30 @@ class Gpu:
         cache: programs, the scene and compiled pipelines, kept from one drawing to the next.
     """
 
-    def __init__(self, device: int | None = None, *, ctx: moderngl.Context | None = None) -> None:
+    def __init__(
+        self,
+        device: int | None = None,
+        *,
+        ctx: moderngl.Context | None = None,
+        cache: CacheLimits | None = None,
+    ) -> None:
         """Open a context.
 
         Args:
             device: EGL device number as `doctor` lists them.
             ctx: the caller's own current context, borrowed: drawn in whatever its state, given back as it was found.
+            cache: how much is kept; by default what `rendergraph.toml` says in the current project.
 
         Raises:
-            DeviceError: there is no usable GL device.
+            DeviceError: no GL device is usable.
+            InputError: the settings file is malformed.
         """
+        if cache is None:
+            settings = nearest(Path.cwd())
+            cache = CacheLimits() if settings is None else settings.cache
         self._thread, self._process = threading.get_ident(), os.getpid()
         self.device: Device = open_device(device) if ctx is None else borrow_device(ctx)
-        self.cache = GpuCache(self.device)
+        self.cache = GpuCache(self.device, cache)
         self._closed = False
 
     def __enter__(self) -> Self:

@@ -1,48 +1,75 @@
-"""What stays on the GPU from one drawing to the next: programs, a scene, compiled pipelines."""
+"""What stays on the GPU from one drawing to the next: programs, a scene, compiled pipelines, values of kept steps."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from rendergraph import stamps
-from rendergraph.compile import Executable, GpuScene, KeptValues, ProgramCache, compile_plan
+from rendergraph.compile import Executable, GpuScene, KeptValues, ProgramCache, TexturePool, compile_plan
+from rendergraph.declare import Node
 from rendergraph.errors import Problem
+from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device
 from rendergraph.gl.memory import check_memory
 from rendergraph.images import decode, decode_light
 from rendergraph.scene import pack
 from rendergraph.scene.model import ImageSource, MadeImage, Scene
-from rendergraph.session.executables import ExecutableCache, key_of
 from rendergraph.session.scenes import scene_limits
 from rendergraph.session.values import Expanded, Linked, Planned
+from rendergraph.settings import CacheLimits
+from rendergraph.stamps import Stamps
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+_MOST_EXECUTABLES = 4
+
+
+class _Entry(Struct, eq=False):
+    """A compiled pipeline and the shader files that it was compiled from."""
+
+    executable: Executable
+    files: Stamps
+
+    @property
+    def bytes(self) -> int:
+        return self.executable.plan.memory.allocated_bytes
+
 
 class GpuCache:
-    """Programs, and what kept steps have made, live as long as it does; one scene, and the last few pipelines compiled
-    for it, until others come.
+    """What a session keeps within its limits, the least recently used things going first; and one scene.
 
     Attributes:
-        programs: the programs that were compiled.
+        limits: how much is kept.
+        programs: compiled programs.
+        kept: what kept steps have made.
         scenes_made: how many scenes have been put on the GPU so far.
         image_warnings: what was replaced in the images of the scene that is there.
         active: what was compiled or taken last.
         drawing: who draws it; whoever drew before comes too late.
     """
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: Device, limits: CacheLimits) -> None:
         self._device = device
-        self.programs = ProgramCache(device)
+        self.limits = limits
+        self.programs = ProgramCache(device, limits.programs)
+        self.kept = KeptValues(device, limits.bytes // 16)
+        self._pool = TexturePool(device)
         self.scenes_made = 0
         self.image_warnings: list[Problem] = []
         self.active: Executable | None = None
         self.drawing: object = None
-        self._kept = KeptValues(device)
-        self._executables = ExecutableCache()
+        self._entries: dict[Hashable, _Entry] = {}  # the one drawn longest ago first
         self._scene: tuple[Scene, GpuScene] | None = None
+
+    @property
+    def executables(self) -> list[Executable]:
+        """The compiled pipelines that are kept, the one that was drawn longest ago first."""
+        return [entry.executable for entry in self._entries.values()]
 
     def upload(self, linked: Linked) -> GpuScene:
         """A pipeline's scene on the GPU, in place of another that was there.
@@ -52,34 +79,41 @@ class GpuCache:
         """
         if self._scene is not None and self._scene[0] is linked.scene:
             return self._scene[1]
-        self._forget()
+        self.clear_scene()
         limits = scene_limits(linked.selection)
         warnings: list[Problem] = []
 
         def decoded(source: ImageSource, srgb: bool) -> npt.NDArray[Any]:
             return decode(source, srgb=srgb, warn=warnings.append, limits=limits)
 
-        def around(source: ImageSource | MadeImage) -> npt.NDArray[Any]:
+        def decoded_light(source: ImageSource | MadeImage) -> npt.NDArray[Any]:
             return decode_light(source, warn=warnings.append, limits=limits)
 
         self.scenes_made += 1
         self.image_warnings = warnings
-        scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded, around)
+        scene = GpuScene(self._device, linked.scene, pack.pack(linked.scene), decoded, decoded_light)
         if linked.selection.environment is not None:
-            scene.environment()  # named by the user: a broken one is said, used or not
+            scene.environment()  # the user named it: a broken one is an error whether or not it is read
         self._scene = linked.scene, scene
         return scene
 
     def take(self, expanded: Expanded) -> tuple[Hashable, Executable | None]:
         """What was compiled of the same before, with the values of these steps, and the key it is kept by."""
         key = key_of(expanded)
-        executable = self._executables.take(key, losing=self._save)
-        if executable is not None:
-            values = {step.key: step for step in expanded.expansion.steps}
-            if executable is not self.active or not executable.changed(values).isdisjoint(executable.kept):
-                self._save()
-            executable.set_uniforms(values)
-            self._kept.restore(executable)
+        entry = self._entries.pop(key, None)
+        if entry is None:
+            return key, None
+        if not stamps.unchanged(entry.files):
+            self._save()
+            entry.executable.release()
+            return key, None
+        self._entries[key] = entry
+        executable = entry.executable
+        values = {step.key: step for step in expanded.expansion.steps}
+        if executable is not self.active or not executable.changed(values).isdisjoint(executable.kept):
+            self._save()
+        executable.set_uniforms(values)
+        self.kept.restore(executable)
         return key, executable
 
     def make(self, key: Hashable, planned: Planned, scene: GpuScene) -> Executable:
@@ -92,34 +126,78 @@ class GpuCache:
         self._save()
         linked, needed = planned.linked, planned.plan.memory.allocated_bytes
         types = {node.id: node.type for node in linked.graph.nodes}
-        self._executables.make_room(needed)
+        self._make_room(needed)
         check_memory(self._device, needed, linked.selection.allowed("plan").get("memory"))
         views, poison = planned.expansion.views, planned.options.poison
-        with stamps.track_reads() as files:
-            executable = compile_plan(self._device, planned.plan, types, views, scene, self.programs, poison=poison)
-        self._executables.add(key, executable, files)
+        try:
+            with stamps.track_reads() as files:
+                executable = compile_plan(
+                    self._device, planned.plan, types, views, scene, self.programs, self._pool, poison=poison
+                )
+            self._entries[key] = _Entry(executable, files)
+        finally:
+            self.programs.trim({program for kept in self.executables for program in kept.programs})
         executable.shares_kept = planned.options.shares
-        self._kept.restore(executable)
-        self.programs.discard(self._executables.unused())
+        self.kept.restore(executable)
         return executable
 
     def release(self) -> None:
         """Free everything."""
         self.active = None  # nobody is left to pass anything on to
-        self._forget()
-        self._kept.release()
+        self.clear_scene()
+        self.kept.release()
         self.programs.release()
 
-    def _save(self) -> None:
-        """What was drawn last has made, others may want: this comes before it is lost or something else is drawn."""
-        if self.active is not None:
-            self._kept.save(self.active)
-
-    def _forget(self) -> None:
+    def clear_scene(self) -> None:
         """Free the scene and all that was compiled for it."""
         self._save()
-        self._executables.clear()
+        for executable in self.executables:
+            executable.release()
+        self._entries.clear()
         self.active = self.drawing = None
         scene, self._scene = self._scene, None  # what follows may fail, and a released scene must not be met again
         if scene is not None:
             scene[1].release(self.programs)
+
+    def _make_room(self, needed: int) -> None:
+        """Free the executables that were drawn longest ago, until one more of `needed` bytes may be kept."""
+        while self._entries and (
+            len(self._entries) >= _MOST_EXECUTABLES
+            or needed + sum(entry.bytes for entry in self._entries.values()) > self.limits.bytes
+        ):
+            self._entries.pop(next(iter(self._entries))).executable.release()
+
+    def _save(self) -> None:
+        """Copy the kept values of what was drawn last, before they are lost or something else is drawn."""
+        if self.active is not None:
+            self.kept.save(self.active)
+
+
+def key_of(expanded: Expanded) -> Hashable:
+    """What decides that a compiled pipeline can be drawn in place of another: all but the values of uniforms."""
+    linked, options = expanded.linked, expanded.options
+    sources = tuple(
+        (node.id, node.type.shaders, node.type.inherited, _declaration(node.type.cls)) for node in linked.graph.nodes
+    )
+    modes = options.alias, options.heap, options.poison, options.shuffle
+    return _structure(expanded.expansion), sources, id(linked.scene), modes
+
+
+def _declaration(cls: type[Node]) -> tuple[Any, ...]:
+    """What program text takes from a class beside the steps it recorded: a module that is imported anew may differ."""
+    words = ("kind", "semantic", "signature")
+    return tuple((name, type(p), *(getattr(p, word, None) for word in words)) for name, p in cls.ports().items())
+
+
+def _structure(expansion: Expansion) -> tuple[Any, ...]:
+    """An expansion without the values that can change in a compiled pipeline."""
+    steps = tuple(
+        replace(
+            step,
+            uniforms=tuple((name, None) for name, _ in step.uniforms),
+            functions=tuple(replace(f, uniforms=()) for f in step.functions),
+        )
+        for step in expansion.steps
+    )
+    resources = tuple(expansion.resources.values())
+    return steps, resources, tuple(expansion.wanted.items()), tuple(expansion.views.items())

@@ -181,7 +181,7 @@ def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
         planned = expanded if isinstance(expanded, Planned) else plan(expanded)
         executable = gpu.cache.make(key, planned, scene)
     if executable is not gpu.cache.active:
-        executable.fresh = True  # another pipeline may have written other values into shared programs
+        executable.take_over()
     drawing = Drawing(expanded, executable, scene, gpu)
     gpu.cache.active, gpu.cache.drawing = executable, drawing
     return drawing

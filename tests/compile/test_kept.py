@@ -80,8 +80,8 @@ outputs: {image: b.color}
 def nothing_made(gl: rg.Session) -> None:
     """What another test has made is not taken over."""
     with gl.device.current():
-        gl.cache._forget()
-        gl.cache._kept.release()
+        gl.cache.clear_scene()
+        gl.cache.kept.release()
 
 
 @pytest.fixture
@@ -258,7 +258,7 @@ def test_kept_memory_is_freed_with_its_executable(bench: Any) -> None:
     with session.device.current():
         memory = session.cache.active.memory
         names = [texture.glo for texture in memory.physicals]
-        session.cache._forget()
+        session.cache.clear_scene()
         assert not any(session.device.raw.glIsTexture(name) for name in names)
 
 

@@ -27,7 +27,6 @@ from rendergraph.api import (
 from rendergraph.api import (
     Any as Anything,
 )
-from rendergraph.compile import kept
 from rendergraph.errors import InputError
 
 SHADERS = {
@@ -169,14 +168,14 @@ def test_what_broke_off_is_not_passed_on(bench: Any, session: rg.Session, monkey
     assert sorted(ran(drawn(session, other))) == [*MADE, "b", "c"]
 
 
-def test_copies_keep_to_a_budget_and_are_freed(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_copies_keep_to_a_budget_and_are_freed(bench: Any) -> None:
     with rg.Session() as session:
         pipeline = bench.pipeline(ONE, Table, Show, shaders=SHADERS)
         one = 16 * (64 + 16 + 4 + 1) + 64  # bytes of the levels and of the buffer
-        monkeypatch.setattr(kept, "MOST_BYTES", 2 * one)
+        session.cache.kept.limit = 2 * one
         for value in (1.0, 2.0, 3.0, 4.0):
             drawn(session, pipeline.set("a.value", value))
-        values = session.cache._kept
+        values = session.cache.kept
         assert len(values._held) == 4  # two of each; the last is in the executable alone
         assert ran(drawn(session, pipeline.set("a.value", 1.0))) == [*MADE, "b"]
         assert ran(drawn(session, pipeline.set("a.value", 4.0))) == ["b"]

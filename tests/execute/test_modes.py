@@ -178,7 +178,7 @@ def test_shipped_pipelines(gl: rg.Session, name: str) -> None:
 
 def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
     """The check of the check: release a texture one step before its last reader, and the poison must show."""
-    from rendergraph.compile import compile_plan
+    from rendergraph.compile import TexturePool, compile_plan
     from rendergraph.execute import Runner
     from rendergraph.scene.cameras import view_matrices
 
@@ -199,7 +199,16 @@ def test_a_lifetime_that_ends_too_early_is_caught(bench: Any) -> None:
         wrong = replace(plan, released=early)
         with session.device.current():
             scene = session.cache.upload(pipeline.link())
-            broken = compile_plan(session.device, wrong, types, views, scene, session.cache.programs, poison=True)
+            broken = compile_plan(
+                session.device,
+                wrong,
+                types,
+                views,
+                scene,
+                session.cache.programs,
+                TexturePool(session.device),
+                poison=True,
+            )
             runner = Runner(broken, pipeline.link().graph)
             runner.run(1, 0.0, 0.0, pipeline.link().scene, camera)
             caught += not np.array_equal(runner.read("n4.mixed"), right)

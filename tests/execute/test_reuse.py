@@ -141,11 +141,13 @@ def test_random_graphs_under_edits(
     bench: Any, parents: Parents, outputs: list[int], edits: list[tuple[int, float]]
 ) -> None:
     pipeline = bench.pipeline(graph(parents, outputs), Source, Mix, Tally, Stamp, shaders=SHADERS)
-    left_out = 0
+    edited = [pipeline]
     for node, seed in edits:
-        pipeline = pipeline.set(f"n{node}.seed", seed)
-        reused = bench.session.render(pipeline, warm_up=False)
-        plain = bench.session.render(pipeline, warm_up=False, reuse=False, alias=False)
+        edited.append(edited[-1].set(f"n{node}.seed", seed))
+    left_out = 0
+    reusing = [bench.session.render(each, warm_up=False) for each in edited]
+    for each, reused in zip(edited, reusing, strict=True):
+        plain = bench.session.render(each, warm_up=False, reuse=False, alias=False)
         left_out += plain.times[-1].ran - reused.times[-1].ran
         for name in plain:
             np.testing.assert_array_equal(reused[name], plain[name])
@@ -171,15 +173,16 @@ def test_shipped_pipelines_under_edits(gl: rg.Session, name: str, values: dict[s
     base = rg.load(name, size=(48, 32))
     if "sun.resolution" in {f"{node.id}.{word}" for node in base.link().graph.nodes for word in node.node.parameters()}:
         base = base.set("sun.resolution", 256)
-    for path, value in [("", None), *values.items(), ("", None)]:
-        pipeline = base.set(path, value) if path else base
-        for camera in (None, OTHER, None):
-            both = []
-            for reuse, alias in ((True, True), (False, False)):
+    pictures: list[list[rg.Frame]] = [[], []]
+    for frames, reuse in zip(pictures, (True, False), strict=True):
+        for path, value in [("", None), *values.items(), ("", None)]:
+            pipeline = base.set(path, value) if path else base
+            for camera in (None, OTHER, None):
                 with gl.current():
-                    drawing = gl.compile(pipeline, warm_up=False, reuse=reuse, alias=alias)
+                    drawing = gl.compile(pipeline, warm_up=False, reuse=reuse, alias=reuse)
                     drawing.begin()
                     drawing.draw(1, camera)
-                    both.append(drawing.read())
-            for output in both[1]:
-                np.testing.assert_array_equal(both[0][output], both[1][output])
+                    frames.append(drawing.read())
+    for reused, plain in zip(*pictures, strict=True):
+        for output in plain:
+            np.testing.assert_array_equal(reused[output], plain[output])

@@ -68,7 +68,9 @@ BOMBS = {
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_is_refused_in_time(name: str) -> None:
     start = time.perf_counter()
-    with pytest.raises(InputError, match=r"RG409 (macros may expand this line to more than 1,000,000|more than 256 macros)"):
+    with pytest.raises(
+        InputError, match=r"RG409 (macros may expand this line to more than 1,000,000|more than 256 macros)"
+    ):
         check_expansion(text_of(BOMBS[name]))
     assert time.perf_counter() - start < 10
 

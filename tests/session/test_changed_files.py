@@ -10,7 +10,6 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.errors import InputError
-from rendergraph.session import executables
 
 
 def load(project: Path) -> rg.Pipeline:
@@ -109,30 +108,12 @@ def test_a_changed_mesh_is_read_again_and_an_unchanged_one_is_not(gl: rg.Session
     assert gl.cache.scenes_made == scenes + 1
 
 
-def test_executables_are_kept_within_a_budget_of_bytes(
-    gl: rg.Session, project: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    variants = [load(project).set("flat.steps", steps) for steps in (1, 2, 3)]
-    for variant in variants:
-        gl.render(variant)
-    before = made(gl)
-    for variant in variants:
-        gl.render(variant)
-    assert made(gl) == before
-    largest = gl.cache.active.plan.memory.allocated_bytes if gl.cache.active else 0
-    monkeypatch.setattr(executables, "MOST_BYTES", largest)
-    gl.render(variants[0].set("flat.steps", 4))
-    assert len(gl.cache._executables._entries) == 1
-    gl.render(variants[2])
-    assert made(gl)[1] == before[1] + 4
-
-
-def test_programs_of_a_text_that_is_gone_are_freed(project: Path, edit: Any) -> None:
-    with rg.Session() as session:
+def test_programs_of_texts_that_are_gone_are_freed(project: Path, edit: Any) -> None:
+    with rg.Session(cache=rg.CacheLimits(programs=0)) as session:
         pipeline = load(project)
         value(session, pipeline)
-        count = len(session.cache.programs._programs)
+        count = session.cache.programs.alive
         for number in range(5):
             edit("fx/inner.glsl", "0.5" if number == 0 else str(number), str(number + 1))
             assert value(session, pipeline) == number + 1
-        assert len(session.cache.programs._programs) == count
+        assert session.cache.programs.alive == count
