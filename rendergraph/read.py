@@ -110,19 +110,7 @@ def read(
     keep_going: bool = False,
     patch: bool = False,
 ) -> Document:
-    """A pipeline file as a Document of known keys.
-
-    Args:
-        path: the file; to which relative paths in it are relative.
-        text: its text, where it is at hand.
-        limits: budgets of the YAML.
-        name: how messages name it; the path by default.
-        keep_going: put mistakes that do not stop the reading into `Document.problems`.
-        patch: it is a merge patch, which cannot say `extends`.
-
-    Raises:
-        InputError: it cannot be read, or is no pipeline; with all mistakes.
-    """
+    """Return a pipeline file as a document of known keys; `patch` reads a merge patch, which cannot have `extends`."""
     name = name or str(path or "<text>")
     if text is None:
         if path is None:
@@ -133,17 +121,12 @@ def read(
 
 @lru_cache(maxsize=32)
 def _read(path: Path | None, text: str, limits: YamlLimits, name: str, keep_going: bool, patch: bool) -> Document:
-    """The same text of the same place is the same document, as often as it is read."""
     document = parse(text, name, path=path, limits=limits, keep_going=True)
     return checked(document, keep_going=keep_going, patch=patch)
 
 
 def checked(document: Document, *, keep_going: bool = False, patch: bool = False) -> Document:
-    """A document with everything left out that is no pipeline's, and problems that say so.
-
-    Raises:
-        InputError: something was left out and `keep_going` is off, or the whole is not a mapping.
-    """
+    """Return the document without the parts that are not a pipeline's, and problems that say so."""
     validator, value = Validator(CODES, document.problems), document.root
     if value.data is None and not patch:
         validator.report(value, CODES.file, f"the file is empty; a pipeline has at least {_HOLDS}")
@@ -164,13 +147,13 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
 
 
 def entries(value: Value | None, *path: str) -> dict[str, Value]:
-    """The entries of a mapping at a path of a read document, without those that are null; empty where there is none."""
+    """Return the non-null entries of a mapping at a path; empty where it does not exist."""
     found = value.get(*path) if value is not None else None
     data = found.data if found is not None else None
     return {key: child for key, child in data.items() if child.data is not None} if isinstance(data, dict) else {}
 
 
 def word(value: Value | None, *path: str) -> str | None:
-    """The text at a path of a read document, None where there is none."""
+    """Return the text at a path, None where it does not exist."""
     found = value.get(*path) if value is not None else None
     return found.data if found is not None and isinstance(found.data, str) else None

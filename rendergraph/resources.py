@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache, lru_cache
 from importlib import import_module
 from itertools import takewhile
 from pathlib import Path
 
+_NAME = re.compile(r"[A-Za-z0-9_-]+\Z")
+
+
+def is_name(text: str) -> bool:
+    """Whether a text names something shipped or installed, rather than a path."""
+    return bool(_NAME.match(text))
+
 
 @cache
 def folder(package: str) -> Path:
-    """The folder a package's files lie in.
-
-    Raises:
-        ModuleNotFoundError: there is no such package.
-    """
+    """Return the folder of a package's files."""
     return Path(import_module(package).__path__[0])
 
 
 def opening(path: Path) -> str:
-    """The comment that a shipped file begins with, in one line: what it shows."""
+    """Return the comment at the beginning of a shipped file, in one line."""
     lines = path.read_text(encoding="utf-8").splitlines()
     return " ".join(line.lstrip("# ").strip() for line in takewhile(lambda line: line.startswith("#"), lines))
 
 
 def shipped_pipelines() -> dict[str, Path]:
-    """Name to file of every shipped pipeline."""
     return _by_name(folder("rendergraph.pipelines"))
 
 
 def shipped_scenes() -> dict[str, Path]:
-    """Name to file of every shipped scene."""
     return _by_name(folder("rendergraph.pipelines") / "scenes")
 
 
@@ -40,5 +42,5 @@ def _by_name(home: Path) -> dict[str, Path]:
 
 @lru_cache
 def _listed(home: Path, changed: int) -> dict[str, Path]:
-    """The files of a folder, which is `changed` when one comes or goes."""
+    """`changed` is the folder's time stamp, which changes when a file comes or goes."""
     return {path.stem: path for path in sorted(home.glob("*.yaml"), key=lambda path: path.stem)}

@@ -30,7 +30,7 @@ from msgspec import Struct
 from rendergraph import images
 from rendergraph.cli.app import main as rendergraph
 from rendergraph.document import Source, from_plain, load
-from rendergraph.resolve.merge import merge_patch
+from rendergraph.resolve import merge_patch
 from rendergraph.resources import folder
 
 HERE = Path(__file__).resolve().parent

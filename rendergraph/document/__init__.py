@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rendergraph.document.events import YamlLimits, build, over_limit
-from rendergraph.document.scalars import scalar
+from rendergraph.document.parsing import YamlLimits, build, over_limit, scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
 from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.stamps import record_read
@@ -19,28 +18,14 @@ from rendergraph.stamps import record_read
 def load(
     path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = False, name: str | None = None
 ) -> Document:
-    """The values of a YAML file.
-
-    Args:
-        path: the file, opened as it is: whether it may be read is the caller's question.
-        limits: budgets.
-        keep_going: put mistakes that do not stop the reading into `Document.problems`.
-        name: how messages name it; the path as given by default.
-
-    Raises:
-        InputError: it cannot be read or is no YAML of ours; with all mistakes.
-    """
+    """Return the values of a YAML file; `keep_going` collects mistakes that do not stop the reading in `problems`."""
     name = name or str(path)
     text = read_text(path, limits, name)
     return build(text, Source(name, path, text), limits, keep_going)
 
 
 def read_text(path: Path, limits: YamlLimits, name: str) -> str:
-    """The text of a file, without a byte order mark; `name` is how messages name it.
-
-    Raises:
-        InputError: it cannot be read, or is not UTF-8.
-    """
+    """Return the text of a file without its byte order mark; `name` is how messages name it."""
     raw = read_bytes(path, limits.bytes, name)
     try:
         return raw.decode("utf-8-sig")
@@ -59,28 +44,13 @@ def parse(
     limits: YamlLimits = YamlLimits(),
     keep_going: bool = False,
 ) -> Document:
-    """The values of a YAML text.
-
-    Args:
-        text: the text.
-        origin: how messages name it.
-        path: the file it comes from, to which its relative paths are relative.
-        limits: budgets.
-        keep_going: put mistakes that do not stop the reading into `Document.problems`.
-
-    Raises:
-        InputError: it is no YAML of ours; with all mistakes.
-    """
+    """Return the values of a YAML text; `path` is the file it comes from, to which its relative paths are relative."""
     text = text.removeprefix("\ufeff")
     return build(text, Source(origin, path, text), limits, keep_going)
 
 
 def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
-    """The bytes of a regular file of at most `most` bytes.
-
-    Raises:
-        InputError: there is none, it is a folder or a device, it may not be read, or it is longer.
-    """
+    """Return the bytes of a regular file of at most `most` bytes."""
     name = shown(name or str(path))
     record_read(path)
     try:

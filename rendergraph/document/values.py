@@ -22,13 +22,7 @@ _LONGEST_LINE = 400
 
 
 class Source(Struct, eq=False, dict=True):
-    """Where values come from: a file, or an option of the command line.
-
-    Attributes:
-        origin: a file as messages name it, or an option.
-        path: the file, None where there is none.
-        text: its text, to show the line of a mistake.
-    """
+    """The file, option or argument that values come from; the text is kept to show the line of a mistake."""
 
     origin: str | Option
     path: Path | None = None
@@ -39,7 +33,7 @@ class Source(Struct, eq=False, dict=True):
         return [0, *(match.end() for match in re.finditer(_BREAK, self.text))]
 
     def line(self, number: int) -> str:
-        """The text of a line, from 1; empty where there is none or where it is too long to show."""
+        """Return a line's text, counted from 1; empty where it does not exist or is too long to show."""
         if not 0 < number <= len(self._starts):
             return ""
         text = self.text[self._starts[number - 1] : self._starts[number - 1] + _LONGEST_LINE + 1]
@@ -47,17 +41,16 @@ class Source(Struct, eq=False, dict=True):
         return text if len(text) <= _LONGEST_LINE and text.expandtabs(1).isprintable() else ""
 
     def at(self, offset: int) -> tuple[int, int]:
-        """Line and column, from 1, of a character."""
+        """Return line and column, from 1, of a character."""
         line = bisect_right(self._starts, offset)
         return line, offset - self._starts[line - 1] + 1
 
     def problem(self, code: str, text: str, line: int = 0, column: int = 0) -> Problem:
-        """A mistake in this source."""
         return Problem(code, text, Place(self.origin, line, column), self.line(line))
 
 
 class Broken:
-    """What stands for a value that is wrong and has been reported, where the reading goes on."""
+    """Stands in for a value that is wrong and has been reported, while reading goes on."""
 
     def __repr__(self) -> str:
         return "BROKEN"
@@ -67,14 +60,7 @@ BROKEN = Broken()
 
 
 class Value:
-    """One value of a document with its place; `data` holds further `Value`s in mappings and lists.
-
-    Attributes:
-        data: a scalar, a list of values, or a dict of values; `BROKEN` in a document with problems.
-        source: the file it stands in.
-        line, column: where it starts, from 1; 0 where the source has no lines.
-        key_line, key_column: where its key starts, the value's own place where it has none.
-    """
+    """One value with its position, counted from 1, and that of its key; lists and mappings hold further values."""
 
     __slots__ = ("column", "data", "key_column", "key_line", "line", "source")
 
@@ -97,39 +83,32 @@ class Value:
 
     @property
     def place(self) -> Place:
-        """Where the value starts."""
         return Place(self.source.origin, self.line, self.column)
 
     @property
     def key_place(self) -> Place:
-        """Where its key starts."""
         return Place(self.source.origin, self.key_line, self.key_column)
 
     @property
     def kind(self) -> str:
-        """What it is, in words for messages."""
         return kind_of(self.data)
 
     def with_data(self, data: Data) -> Value:
-        """The same place with other contents."""
         return Value(data, self.source, self.line, self.column, (self.key_line, self.key_column))
 
     def problem(self, code: str, text: str, *, key: bool = False) -> Problem:
-        """A mistake at this value, or at its key."""
         line, column = (self.key_line, self.key_column) if key else (self.line, self.column)
         return self.source.problem(code, text, line, column)
 
     def relocate(self, problem: Problem, *, key: bool = False, code: str = "", context: str = "") -> Problem:
-        """A problem that was found elsewhere, as one of this value, or of its key."""
         place = self.key_place if key else self.place
         return problem.relocate(place, self.source.line(place.line), code=code, context=context)
 
     def items(self) -> Iterator[tuple[Any, Value]]:
-        """Keys and values of a mapping, nothing for anything else."""
+        """Iterate over a mapping; over nothing for other values."""
         return iter(self.data.items() if isinstance(self.data, dict) else ())
 
     def get(self, *path: Index) -> Value | None:
-        """The value that lies at a path of keys and positions, or None."""
         found: Value = self
         for step in path:
             data = found.data
@@ -142,7 +121,7 @@ class Value:
         return found
 
     def plain(self) -> Any:
-        """The same as Python's own dict, list and scalars; what an alias repeats is one object, not copies."""
+        """Return Python data; what an alias repeats is one object, not copies."""
         return _plain(self, {})
 
 
@@ -164,10 +143,8 @@ class Document(Struct, frozen=True, eq=False, dict=True):
     """The values of one YAML file.
 
     Attributes:
-        root: the outermost value.
-        source: the file.
-        problems: mistakes that did not stop the reading, where the caller asked to keep going.
-        dropped: paths of what was left out because it was wrong, so that nobody complains that it is missing.
+        problems: mistakes that did not stop the reading.
+        dropped: paths of what was left out because it was wrong, so that nothing else reports it as missing.
     """
 
     root: Value
@@ -177,29 +154,22 @@ class Document(Struct, frozen=True, eq=False, dict=True):
 
     @property
     def file(self) -> str:
-        """How messages name the file."""
         return str(self.source.origin)
 
     @property
     def path(self) -> Path | None:
-        """The file, None for text without one."""
         return self.source.path
 
     @cached_property
     def value(self) -> Any:
-        """Everything as plain Python data; not to be changed, for aliases share it."""
+        """The whole document as plain Python data; not to be changed, for aliases share it."""
         return self.root.plain()
 
     def place(self, path: Sequence[Index] = (), *, key: bool = False) -> Place:
-        """Where the value at a path of keys and positions starts, or its key.
-
-        The nearest place that exists stands in for a path that does not.
-        """
         found, rest = self._nearest(path)
         return found.key_place if key and not rest else found.place
 
     def problem(self, code: str, text: str, path: Sequence[Index] = (), *, key: bool = False) -> Problem:
-        """A mistake at the value of a path, or at its key, with the line it stands in."""
         found, rest = self._nearest(path)
         return found.problem(code, text, key=key and not rest)
 
@@ -214,11 +184,7 @@ class Document(Struct, frozen=True, eq=False, dict=True):
 
 
 def from_plain(data: Any, source: Source) -> Value:
-    """Python's own values as values of a source; tuples are lists, NumPy scalars and arrays what they hold.
-
-    Raises:
-        InputError: something else is among them.
-    """
+    """Return Python data as values; tuples become lists, NumPy scalars and arrays become what they hold."""
     if hasattr(data, "tolist"):
         data = data.tolist()
     if isinstance(data, Mapping):
@@ -235,7 +201,6 @@ def from_plain(data: Any, source: Source) -> Value:
 
 
 def kind_of(data: object) -> str:
-    """What a value is, in words for messages."""
     if data is None:
         return "null"
     if isinstance(data, bool):
@@ -248,7 +213,7 @@ def kind_of(data: object) -> str:
 
 
 def said(value: Value) -> str:
-    """What a value is, itself where it is short, for messages."""
+    """Describe a value for messages, or quote it where it is short."""
     data = value.data
     if isinstance(data, str):
         return f"'{shown(data, 40)}'"
@@ -259,7 +224,7 @@ def said(value: Value) -> str:
 
 
 def shown(text: object, most: int = 60) -> str:
-    """Text of a user's for a message: one line, no control characters, not too long."""
+    """Quote a user's text for a message: one line, no control characters, at most `most` characters."""
     word = str(text)
     if len(word) > most:
         word = word[: most - 1] + "…"

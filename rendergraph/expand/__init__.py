@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rendergraph.expand.ending import ended
-from rendergraph.expand.keeping import check_kept
+from rendergraph.expand.finalize import check_kept, finalize_resources
 from rendergraph.expand.model import CAMERA, Expansion, ViewTable
-from rendergraph.expand.parameters import define_parameters, param_uniforms
-from rendergraph.expand.recording import record_all
-from rendergraph.expand.versions import versioned
+from rendergraph.expand.recording import define_parameters, param_uniforms, record_all
+from rendergraph.expand.versions import assign_versions
 from rendergraph.link import Endpoint, Graph
 
 __all__ = [
@@ -27,19 +25,11 @@ __all__ = [
 
 
 def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:
-    """Record every node that `wanted` needs.
-
-    Args:
-        graph: a checked graph.
-        wanted: name to port for everything that must exist at the end of the frame; the file's outputs by default.
-
-    Raises:
-        InputError: a node recorded something that its declaration does not allow.
-    """
+    """Record every node that `wanted` (name to port, the file's outputs by default) needs at the end of the frame."""
     outputs = dict(graph.outputs if wanted is None else wanted)
     order = graph.reading_order()
     recorded, idle = record_all(graph, order, outputs)
     idle |= dict.fromkeys(graph.unlit, "the scene has no environment")
-    expansion = ended(graph, versioned(graph, recorded, idle), outputs)
+    expansion = finalize_resources(graph, assign_versions(graph, recorded, idle), outputs)
     check_kept(expansion.steps, expansion.resources)
     return expansion

@@ -15,45 +15,39 @@ ENVIRONMENT = Endpoint("", "the scene's environment")
 
 
 class ViewTable(Struct, frozen=True):
-    """A table of views: how many, and the scene's light index of each (empty where views are not lights')."""
+    """A table of views: how many, and each one's light index in the scene (empty where views are not lights')."""
 
     count: int = 1
     lights: tuple[int, ...] = ()
 
 
-class Versioned(Struct, frozen=True):
-    """What was recorded, with resources and versions in place of ports.
+class VersionedSteps(Struct, frozen=True):
+    """Recorded steps with resources and versions in place of ports.
 
     Attributes:
-        steps: in the order of nodes and of recording.
-        resources: by id.
         newest: resource id to its last version.
-        at_end: port to its resource and the version it has when its node is done.
-        passed: port of an idle node to what it would continue.
-        firsts: resource id to what whoever continues it says of the first frame.
+        final: port to its resource and the version it has when its node is done.
+        forwarded: port of an idle node to the port that it would continue.
+        firsts: resource id to the value in the first frame that a node which continues it declares.
         idle: nodes that recorded nothing, with the reason.
-        views: view tables by id.
     """
 
     steps: Sequence[Step]
     resources: Mapping[str, Resource]
     newest: Mapping[str, int]
-    at_end: Mapping[Endpoint, tuple[str, int]]
-    passed: Mapping[Endpoint, Endpoint]
+    final: Mapping[Endpoint, tuple[str, int]]
+    forwarded: Mapping[Endpoint, Endpoint]
     firsts: Mapping[str, float]
     idle: Mapping[str, str]
     views: Mapping[str, ViewTable]
 
 
 class Expansion(Struct, frozen=True):
-    """All steps of a graph with the resources they touch.
+    """All steps of a graph with their resources.
 
     Attributes:
-        steps: in the order of the graph's nodes and of recording.
-        resources: by id.
         wanted: output name or tap to the id of the resource that must exist at the end of the frame.
         idle: nodes that recorded nothing, with the reason.
-        views: view tables by id.
         ports: port to the id of the resource that holds its texture or buffer.
     """
 
@@ -65,12 +59,12 @@ class Expansion(Struct, frozen=True):
     ports: Mapping[Endpoint, str] = field(default_factory=dict)
 
 
-def behind(passed: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
-    """The port of this frame that a link leads to, where idle nodes pass on what they would continue."""
+def follow_forwards(forwarded: Mapping[Endpoint, Endpoint], end: Endpoint) -> Endpoint:
+    """Return the port of this frame that a link leads to: idle nodes forward the input they would continue."""
     end = end.now
-    while end in passed:
-        end = passed[end]
+    while end in forwarded:
+        end = forwarded[end]
     return end
 
 
-__all__ = ["CAMERA", "ENVIRONMENT", "Expansion", "Versioned", "ViewTable", "behind"]
+__all__ = ["CAMERA", "ENVIRONMENT", "Expansion", "VersionedSteps", "ViewTable", "follow_forwards"]

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import cached_property
+from pathlib import Path
 
 from msgspec.structs import replace
 
-from rendergraph.declare import Facts, Function, InOut, Input, Part, Port, Views
+from rendergraph.declare import Facts, Function, InOut, Input, Node, Part, Port, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
 from rendergraph.expand.model import ENVIRONMENT
-from rendergraph.expand.parameters import define_parameters, param_uniforms
 from rendergraph.glsl.source import needs
 from rendergraph.link import Endpoint, Graph, GraphNode
-from rendergraph.steps import MOST_STEPS, StepRequest, Steps
+from rendergraph.steps import MOST_STEPS, StepRequest, Steps, UniformValue, define_text
 from rendergraph.textures import BufferDesc, TextureDesc
 
 _MOST_REQUESTS = 10 * MOST_STEPS
@@ -24,14 +24,11 @@ _MOST_REQUESTS = 10 * MOST_STEPS
 
 
 class Recording:
-    """The `steps.Recorder` of one node: keeps requests, answers what is known.
+    """The `steps.Recorder` of one node.
 
     Attributes:
-        requests: what the node asked for, in order.
-        unfilled: what it asked to draw and the scene has nothing of; left out where that changes nothing.
+        unfilled: selections of objects it draws that are empty in this scene; left out where that changes nothing.
         links: connected inputs whose textures have layers; `ENVIRONMENT` stands for the scene's.
-        own: the ends of the textures and buffers that the node makes or continues, by port.
-        defines, uniforms, includes: what its parameters give to each of its steps.
     """
 
     def __init__(self, graph: Graph, node: GraphNode, used: set[str]) -> None:
@@ -57,7 +54,6 @@ class Recording:
 
     @property
     def facts(self) -> Facts:
-        """What the node may ask."""
         return self._facts
 
     @cached_property
@@ -74,7 +70,6 @@ class Recording:
         return replace(facts, inputs=inputs)
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
-        """What a port's texture or buffer is allocated from."""
         if isinstance(port, Input):
             found = self.facts.input(port.name).desc
             return found if found is not None else BufferDesc(self.facts.input(port.name).bytes)
@@ -82,15 +77,13 @@ class Recording:
         return info.desc if info.desc is not None else BufferDesc(info.bytes)
 
     def used(self, port: Port) -> bool:
-        """Whether anybody reads an output."""
         return port.name in self.used_ports
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """What the choice of a parameter needs."""
         return needs(self.node.choices[parameter]) if parameter in self.node.choices else ()
 
     def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
-        """The inputs that a step reads which names none: those connected; what is kept reads those that are kept."""
+        """The inputs of a step that names none: all connected ones; only kept ones if it writes a kept port."""
         connected = {name: port for name, port in self.node.type.read.items() if self.links.get(name)}
         if any(is_kept(part.port) for part in out):
             return {name: port for name, port in connected.items() if all(map(self._lasts, self.links[name]))}
@@ -100,7 +93,7 @@ class Recording:
         return end == ENVIRONMENT or is_kept(self.graph[end.node].node.ports()[end.port])
 
     def add(self, request: StepRequest) -> None:
-        """Keep a request, unless it would draw nothing onto what is there already."""
+        """Keep a request, unless it would draw nothing onto existing contents."""
         objects = request.options.get("objects")
         if isinstance(objects, tuple) and self.graph.objects is not None:
             names = [one.name for one in self.graph.objects]
@@ -123,7 +116,7 @@ class Recording:
         self.requests.append(request)
 
     def _check_condition(self, request: StepRequest) -> None:
-        """Refuse a step that is to be left out after one that is not there, or that it need not follow."""
+        """Refuse a condition on a step that does not exist or that the request does not depend on."""
         label = request.options.get("if_drawn")
         if not label:
             return
@@ -136,7 +129,7 @@ class Recording:
             raise Misuse(f"if_drawn is '{label}', but it neither reads nor continues what that step writes")
 
     def continues(self, port: Port) -> bool:
-        """Whether a port goes on with a texture of somebody else's."""
+        """Whether a port continues the texture of another node."""
         return isinstance(port, InOut) and bool(self.links.get(port.name))
 
     def demands(self) -> list[Endpoint]:
@@ -165,52 +158,42 @@ class Recording:
 
 
 def is_kept(port: Port) -> bool:
-    """Whether what a port makes outlives the frame."""
     return bool(getattr(port, "kept", False))
 
 
 def record_all(
     graph: Graph, order: list[str], wanted: Mapping[str, Endpoint]
 ) -> tuple[dict[str, Recording], dict[str, str]]:
-    """Record every node that something wanted needs; the others are idle, with the reason.
-
-    Args:
-        graph: a checked graph.
-        order: node ids in reading order.
-        wanted: what must exist at the end of the frame.
-
-    Returns:
-        Recordings by node id in the same order, and idle nodes with their reasons.
-    """
-    remembering = _remembering(graph, wanted)
+    """Record every node that a wanted port needs; return recordings in order, and idle nodes with their reasons."""
+    history_readers = _history_readers(graph, wanted)
     while True:
-        recordings, idle = _recorded(graph, order, wanted, remembering)
-        if not remembering & idle.keys():
+        recordings, idle = _record(graph, order, wanted, history_readers)
+        if not history_readers & idle.keys():
             return recordings, idle
-        remembering -= idle.keys()  # whoever does nothing does not read last frame's values either
+        history_readers -= idle.keys()  # whoever does nothing does not read last frame's values either
 
 
-def _remembering(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
-    """Nodes that read last frame's values and that something wanted can be reached from."""
-    remembering = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
+def _history_readers(graph: Graph, wanted: Mapping[str, Endpoint]) -> set[str]:
+    """Nodes that read last frame's values and contribute to a wanted port."""
+    history_readers = {node.id for node in graph.nodes for ends in node.inputs.values() for end in ends if end.previous}
     reached: set[str] = set()
-    stack = [end.node for end in wanted.values()] if remembering else []
+    stack = [end.node for end in wanted.values()] if history_readers else []
     while stack:
         name = stack.pop()
         if name not in reached:
             reached.add(name)
             stack += [end.node for ends in graph[name].inputs.values() for end in ends]
-    return remembering & reached
+    return history_readers & reached
 
 
-def _recorded(
-    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint], remembering: set[str]
+def _record(
+    graph: Graph, order: list[str], wanted: Mapping[str, Endpoint], history_readers: set[str]
 ) -> tuple[dict[str, Recording], dict[str, str]]:
-    """The same where it is known who reads last frame's values; those may come earlier in the order than the makers."""
+    """`history_readers` may come earlier in the order than the nodes whose last values they read."""
     demanded: dict[str, set[str]] = {name: set() for name in order}
     for end in wanted.values():
         demanded[end.node].add(end.port)
-    for name in remembering:
+    for name in history_readers:
         for ends in graph[name].inputs.values():
             for end in ends:
                 if end.previous:
@@ -222,13 +205,13 @@ def _recorded(
         node = graph[name]
         used = demanded[name]
         if not used:
-            idle[name] = _unread(graph, node, reached)
+            idle[name] = _why_unread(graph, node, reached)
             continue
         reached.add(name)
-        reason = _nothing_to_do(graph, node, used)
+        reason = _why_idle(graph, node, used)
         if reason:
             idle[name] = reason
-            _pass_on(node, used, demanded)
+            _forward_demand(node, used, demanded)
             continue
         recording = Recording(graph, node, used)
         steps = Steps(node.node.ports(), name, node.type.name, recording)
@@ -247,7 +230,7 @@ def _recorded(
                 if recording.unfilled
                 else "it recorded no step"
             )
-            _pass_on(node, used, demanded)
+            _forward_demand(node, used, demanded)
             continue
         recordings[name] = recording
         for end in recording.demands():
@@ -255,19 +238,18 @@ def _recorded(
     return {name: recordings[name] for name in order if name in recordings}, idle
 
 
-def _unread(graph: Graph, node: GraphNode, reached: set[str]) -> str:
-    """Why nobody reads a node: nothing is linked to it that is wanted, or what would be read has no layers."""
+def _why_unread(graph: Graph, node: GraphNode, reached: set[str]) -> str:
     for name in node.node.outputs():
         end = Endpoint(node.id, name)
         links = (ends for reader in graph.nodes if reader.id in reached for ends in reader.inputs.values())
         if end in graph.empty and any(end in ends for ends in links):
             reached.add(node.id)
-            return f"{end} has no layers: {_no_layers(graph, node, name)}"
+            return f"{end} has no layers: {_why_empty(graph, node, name)}"
     return "nothing that is wanted reads its outputs"
 
 
-def _no_layers(graph: Graph, node: GraphNode, name: str) -> str:
-    """Why a texture has no layers, as far as that shows in its declaration."""
+def _why_empty(graph: Graph, node: GraphNode, name: str) -> str:
+    """Explain why a texture has no layers, as far as its declaration shows."""
     ports = node.node.ports()
     named = [getattr(ports[name], rule, None) for rule in ("like", "lights", "view")]
     for source in named:
@@ -282,19 +264,17 @@ def _no_layers(graph: Graph, node: GraphNode, name: str) -> str:
     return f"it takes none of the scene's lights ({listed})" if listed else "the scene has no light"
 
 
-def _pass_on(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:
-    """What an idle node would continue is demanded as it is."""
+def _forward_demand(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:
     for port in used:
         for end in node.inputs.get(port, ()):
             demanded[end.node].add(end.port)
 
 
-def _nothing_to_do(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
-    """Why a node has nothing to record: what it would draw, or what it must read, has no layers."""
+def _why_idle(graph: Graph, node: GraphNode, used: set[str]) -> str | None:
     if not graph.empty:
         return None
     if all(Endpoint(node.id, name) in graph.empty for name in used):
-        return f"{node.id}.{min(used)} has no layers: {_no_layers(graph, node, min(used))}"
+        return f"{node.id}.{min(used)} has no layers: {_why_empty(graph, node, min(used))}"
     for name, port in node.type.read.items():
         ends = node.inputs.get(name, ())
         if ends and not port.optional and all(end.now in graph.empty for end in ends):
@@ -312,7 +292,6 @@ def _returns_nothing(value: object) -> None:
 
 
 def _author_problem(node: GraphNode, error: BaseException) -> Problem:
-    """What a node's own code raised or asked for wrongly, with the author's line."""
     who = node_named(node.id, node.type.name)
     if isinstance(error, SceneError):
         return Problem("RG209", f"{who}: {shown(error, 200)}", node.place)
@@ -320,3 +299,33 @@ def _author_problem(node: GraphNode, error: BaseException) -> Problem:
     if isinstance(error, Misuse):
         return problem.relocate(node.place, code=error.code, context=who)
     return problem.relocate(node.place, context=f"{who} failed while recording")
+
+
+def define_parameters(node: Node, choices: Mapping[str, Path]) -> tuple[tuple[str, str], ...]:
+    """Return the macros of `define` parameters: numbers and switches as they are, a choice as one of its numbers."""
+    macros: list[tuple[str, str]] = []
+    for name, parameter in node.parameters().items():
+        if parameter.role != "define":
+            continue
+        value = getattr(node, name)
+        if name in choices:
+            macros += [(f"NEEDS_{need}".upper(), "1") for need in needs(choices[name])]
+        elif isinstance(value, str):
+            words = [f"{name}_{choice}".upper().replace("-", "_") for choice in parameter.words]
+            macros += [(word, str(number)) for number, word in enumerate(words)]
+            macros.append((name.upper(), f"{name}_{value}".upper().replace("-", "_")))
+        else:
+            macros.append((name.upper(), define_text(value)))
+    return tuple(macros)
+
+
+def param_uniforms(node: Node) -> tuple[tuple[str, UniformValue], ...]:
+    """Return the values of `param` parameters; a number given for a vector fills it."""
+    uniforms: list[tuple[str, UniformValue]] = []
+    for name, parameter in node.parameters().items():
+        if parameter.role == "param":
+            value = getattr(node, name)
+            if parameter.glsl.startswith("vec") and not isinstance(value, tuple):
+                value = (float(value),) * int(parameter.glsl[3])
+            uniforms.append((name, value))
+    return tuple(uniforms)

@@ -11,7 +11,7 @@ from rendergraph.textures import FORMATS, BufferDesc, TextureDesc
 
 
 def parts_written(request: StepRequest, part: Part, desc: TextureDesc | BufferDesc) -> set[tuple[int, int | None]]:
-    """Mips and layers a request leaves something in: a clear means the whole texture, a mip chain all but mip 0."""
+    """Return the (mip, layer) pairs a request writes: a clear the whole texture, a mip chain all but mip 0."""
     mips = desc.mips if isinstance(desc, TextureDesc) else 1
     if request.kind == "mipmaps":
         return {(mip, None) for mip in range(1, mips)}
@@ -21,12 +21,11 @@ def parts_written(request: StepRequest, part: Part, desc: TextureDesc | BufferDe
 
 
 def overlap(one: tuple[int, int | None], other: tuple[int, int | None]) -> bool:
-    """Whether two parts, each mip and layer, share a texel."""
     return one[0] == other[0] and (one[1] == other[1] or None in (one[1], other[1]))
 
 
 def feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> str | None:
-    """What a step samples it must not write: drivers give old texels, new ones, or some of each."""
+    """A step must not sample what it writes: drivers return old texels, new ones, or a mixture."""
     state = request.options.get("state")
     if write.use == "depth" and state is not None and state.depth_write is False:
         return None
@@ -44,7 +43,7 @@ def feedback(request: StepRequest, write: Write, reads: Iterable[Read]) -> str |
 def target_size(
     resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
 ) -> tuple[tuple[int, int], int]:
-    """Width, height and samples of what a step writes."""
+    """Return ((width, height), samples) of a step's targets."""
     attached: Iterable[Read | Write] = chain(writes, (read for read in reads if read.use == "depth_test"))
     for touched in attached:
         desc = resources[touched.resource].desc
@@ -53,8 +52,10 @@ def target_size(
     return (1, 1), 1
 
 
-def ill_matched(resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]) -> str | None:
-    """Why the attachments of one draw do not go together: size, samples, layers, or two of depth."""
+def attachment_mismatch(
+    resources: Mapping[str, Resource], writes: Sequence[Write], reads: Iterable[Read]
+) -> str | None:
+    """Explain why attachments of one draw do not fit together: size, samples, layers, or two depth targets."""
     attached: list[Read | Write] = [write for write in writes if write.use in ("color", "depth")]
     attached += [read for read in reads if read.use == "depth_test"]
     first: tuple[str, _Extent] | None = None
@@ -70,8 +71,9 @@ def ill_matched(resources: Mapping[str, Resource], writes: Sequence[Write], read
         if first is None:
             first = name, extent
         elif extent != first[1]:
-            return f"'{first[0]}' is {_said(first[1], extent)}, but '{name}' is {_said(extent, first[1])}; " + (
-                "the targets of one step are alike in size, samples and layers"
+            return (
+                f"'{first[0]}' is {_difference(first[1], extent)}, but '{name}' is {_difference(extent, first[1])}; "
+                + ("the targets of one step are alike in size, samples and layers")
             )
     depths = list(dict.fromkeys(depths))
     if len(depths) > 1:
@@ -79,8 +81,8 @@ def ill_matched(resources: Mapping[str, Resource], writes: Sequence[Write], read
     return None
 
 
-def onto_nothing(request: StepRequest, writes: Iterable[Write]) -> str | None:
-    """Which target a draw blends onto, or tests against, before anything is in it."""
+def undefined_destination(request: StepRequest, writes: Iterable[Write]) -> str | None:
+    """Explain which target a draw blends onto, or tests against, while its contents are undefined."""
     state = request.options.get("state")
     if not isinstance(state, State) or request.kind not in ("fullscreen", "geometry", "draw"):
         return None
@@ -98,8 +100,8 @@ def onto_nothing(request: StepRequest, writes: Iterable[Write]) -> str | None:
     return None
 
 
-def no_image(kind: str, touched: Read | Write, resource: Resource | None) -> str | None:
-    """Why a texture cannot be stored into or loaded as an image."""
+def image_refusal(kind: str, touched: Read | Write, resource: Resource | None) -> str | None:
+    """Explain why a texture cannot be stored to or loaded from as an image."""
     desc = resource.desc if resource is not None else None
     if not isinstance(desc, TextureDesc):
         return None
@@ -116,8 +118,7 @@ def no_image(kind: str, touched: Read | Write, resource: Resource | None) -> str
 _Extent = tuple[int, int, int, int]  # width, height, samples, layers
 
 
-def _said(own: _Extent, other: _Extent) -> str:
-    """What differs, in words."""
+def _difference(own: _Extent, other: _Extent) -> str:
     words = []
     if own[:2] != other[:2]:
         words.append(f"{own[0]}×{own[1]}")

@@ -9,16 +9,16 @@ from msgspec.structs import replace
 
 from rendergraph.declare import Function, History, InOut, Input, Internal, Node, Part, Port, Views, WrittenPort
 from rendergraph.errors import InputError
-from rendergraph.expand.model import CAMERA, ENVIRONMENT, Versioned, ViewTable, behind
+from rendergraph.expand.model import CAMERA, ENVIRONMENT, VersionedSteps, ViewTable, follow_forwards
 from rendergraph.expand.recording import Recording, is_kept
 from rendergraph.expand.targets import (
+    attachment_mismatch,
     feedback,
-    ill_matched,
-    no_image,
-    onto_nothing,
+    image_refusal,
     overlap,
     parts_written,
     target_size,
+    undefined_destination,
 )
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import FunctionBinding, Read, Resource, Role, Step, StepRequest, Use, Where, Write
@@ -33,49 +33,34 @@ _TAKEN_OVER = frozenset(
 _PLAIN = Sampler()
 
 
-def versioned(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> Versioned:
-    """Count the versions of every resource.
-
-    Args:
-        graph: the graph.
-        recordings: what each node recorded, in reading order.
-        idle: the nodes that have nothing to record, with the reason.
-
-    Raises:
-        InputError: a step was asked for that cannot be drawn.
-    """
-    return _Versions(graph, recordings, idle).found()
+def assign_versions(graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> VersionedSteps:
+    return _VersionAssignment(graph, recordings, idle).run()
 
 
-class _Versions:
-    """The versions counted so far.
-
-    Attributes:
-        version: resource id to its newest version.
-        written: resource id to the parts (mip, layer or None for all) written.
-    """
+class _VersionAssignment:
+    """`version` is each resource's newest; `written` its written parts: mip, and layer or None for all."""
 
     def __init__(self, graph: Graph, recordings: Mapping[str, Recording], idle: Mapping[str, str]) -> None:
         self.graph = graph
         self.recordings = recordings
         self.idle = dict(idle)
         self.version: dict[str, int] = {}
-        self.at_end: dict[Endpoint, tuple[str, int]] = {}
+        self.final: dict[Endpoint, tuple[str, int]] = {}
         self.written: dict[str, set[tuple[int, int | None]]] = {}
         self.resources: dict[str, Resource] = {}
         if graph.environment is not None:
             self.resources[ENVIRONMENT.port] = Resource(ENVIRONMENT.port, graph.environment, "scene")
-            self.at_end[ENVIRONMENT] = ENVIRONMENT.port, 0
+            self.final[ENVIRONMENT] = ENVIRONMENT.port, 0
         self.views: dict[str, ViewTable] = {CAMERA: ViewTable()}
         self.steps: list[Step] = []
-        self.passed = dict(_passed(graph, recordings))
+        self.forwarded = dict(_forwarded_ports(graph, recordings))
         self.firsts: dict[str, float] = {}
 
-    def found(self) -> Versioned:
+    def run(self) -> VersionedSteps:
         for recording in self.recordings.values():
             self._node(recording)
-        return Versioned(
-            self.steps, self.resources, self.version, self.at_end, self.passed, self.firsts, self.idle, self.views
+        return VersionedSteps(
+            self.steps, self.resources, self.version, self.final, self.forwarded, self.firsts, self.idle, self.views
         )
 
     def _node(self, recording: Recording) -> None:
@@ -89,12 +74,12 @@ class _Versions:
         ):
             self.idle[recording.node.id] = "it recorded no step"
         for end in recording.own.values():
-            if end in self.at_end:
-                resource, _ = self.at_end[end]
-                self.at_end[end] = resource, self.version[resource]
+            if end in self.final:
+                resource, _ = self.final[end]
+                self.final[end] = resource, self.version[resource]
 
     def _declare(self, recording: Recording) -> None:
-        """Give every texture the node may write a resource; an `InOut` continues somebody's."""
+        """Create a resource for every texture the node may write; an `InOut` continues an existing one."""
         node = recording.node
         for name in node.type.views:
             end = Endpoint(node.id, name)
@@ -105,9 +90,9 @@ class _Versions:
             if end in self.graph.empty:
                 continue
             if isinstance(made, InOut) and recording.links.get(name):
-                before = behind(self.passed, recording.links[name][0])
-                if before in self.at_end:  # else nothing that runs touches it, here or where it comes from
-                    self.at_end[end] = self.at_end[before]
+                before = follow_forwards(self.forwarded, recording.links[name][0])
+                if before in self.final:  # else nothing that runs touches it, here or where it comes from
+                    self.final[end] = self.final[before]
                 continue
             info = self.graph.textures[end]
             desc = info.desc if info.desc is not None else BufferDesc(info.bytes)
@@ -115,10 +100,10 @@ class _Versions:
             self.resources[id] = Resource(id, desc, _role(made), made.first or 0.0, info.view, info.lights)
             self.version[id] = 0
             self.written[id] = set()
-            self.at_end[end] = id, 0
+            self.final[end] = id, 0
 
     def _maker(self, end: Endpoint) -> Endpoint:
-        """The port that first made what a port carries, however often it is continued between."""
+        """Return the port that first created a texture, however many nodes continue it."""
         end = end.now
         while True:
             node = self.graph[end.node]
@@ -170,7 +155,7 @@ class _Versions:
             writes=tuple(writes),
             functions=tuple(functions),
             includes=recording.includes,
-            defines=(*_uses(recording, request, reads, called), *recording.defines, *request.defines.items()),
+            defines=(*_use_macros(recording, request, reads, called), *recording.defines, *request.defines.items()),
             uniforms=(*recording.uniforms, *request.uniforms.items()),
             size=size,
             samples=samples,
@@ -180,7 +165,7 @@ class _Versions:
             attributes=tuple(held),
             type=node.type.name,
             where=Where(node.place, request.caller),
-            if_drawn=_numbered(recording, options.get("if_drawn", ""), index),
+            if_drawn=_condition_step(recording, options.get("if_drawn", ""), index),
             **{key: value for key, value in options.items() if key in _TAKEN_OVER},
         )
 
@@ -201,20 +186,20 @@ class _Versions:
                 if part.link in (None, number)
             ]
         own = Endpoint(recording.node.id, port.name, part.previous)
-        resource, _ = self.at_end[own.now]
+        resource, _ = self.final[own.now]
         return [self._read(name, own, part, part.sampler or _PLAIN, "sample", self.version[resource])]
 
     def _read(
         self, name: str, end: Endpoint, part: Part, sampler: Sampler, use: Use, version: int | None = None
     ) -> Read:
-        resource, at_end = self.at_end.get(behind(self.passed, end)) or (str(self._maker(end)), 0)
+        resource, final = self.final.get(follow_forwards(self.forwarded, end)) or (str(self._maker(end)), 0)
         port = self.graph[end.node].node.ports()[end.port] if end.previous else None
         if isinstance(port, InOut) and port.first is not None:
             self.firsts[resource] = port.first  # said where the texture is continued, and read from there
         desc = self._desc_of(end, resource)
         if isinstance(desc, BufferDesc):
             use = "buffer"
-        version = at_end if version is None else version
+        version = final if version is None else version
         kind = desc.kind if isinstance(desc, TextureDesc) and part.layer is None else "texture2d"
         return Read(name, resource, version, use, sampler, part.mip, part.layer, end.previous, kind)
 
@@ -230,9 +215,9 @@ class _Versions:
         port = part.port
         assert isinstance(port, WrittenPort)  # `steps` has seen to that
         end = recording.own[port.name]
-        if end not in self.at_end:
+        if end not in self.final:
             raise self._refused(recording, request, "RG421", f"it writes '{port.name}', which has no layers")
-        resource, _ = self.at_end[end]
+        resource, _ = self.final[end]
         desc = self.resources[resource].desc
         old = self.version[resource]
         self.version[resource] = old + 1
@@ -269,28 +254,27 @@ class _Versions:
     def _check_targets(
         self, recording: Recording, request: StepRequest, writes: list[Write], reads: list[Read]
     ) -> None:
-        """Refuse what no driver draws, while the author's call is known."""
+        """Refuse undefined drawing while the author's call is still known."""
         for write in writes:
             text = feedback(request, write, reads)
             if text is not None:
                 raise self._refused(recording, request, "RG422", text)
-        text = onto_nothing(request, writes)
+        text = undefined_destination(request, writes)
         if text is not None:
             raise self._refused(recording, request, "RG429", text)
         touching: tuple[Read | Write, ...] = (*writes, *reads)
         uses = {touched.use for touched in touching}
         if len(writes) > 1 or "depth_test" in uses:
-            text = ill_matched(self.resources, writes, reads)
+            text = attachment_mismatch(self.resources, writes, reads)
             if text is not None:
                 raise self._refused(recording, request, "RG425", text)
         for touched in touching if "image" in uses else ():
             if touched.use == "image":
-                text = no_image(request.kind, touched, self.resources.get(touched.resource))
+                text = image_refusal(request.kind, touched, self.resources.get(touched.resource))
                 if text is not None:
                     raise self._refused(recording, request, "RG426", text)
 
     def _refused(self, recording: Recording, request: StepRequest, code: str, text: str) -> InputError:
-        """A request that cannot be carried out, at the line where the author made it."""
         node = recording.node
         step = Step(node.id, 0, request.kind, type=node.type.name, where=Where(node.place, request.caller))
         return InputError(step.problem(code, text))
@@ -340,7 +324,7 @@ class _Versions:
                 continue
             if name in recording.own and recording.own[name] in self.graph.empty:
                 continue
-            if isinstance(source, Internal) and not self.written[self.at_end[recording.own[name]][0]]:
+            if isinstance(source, Internal) and not self.written[self.final[recording.own[name]][0]]:
                 continue
             reads += self._reads(recording, name, read if isinstance(read, Part) else source.whole)
         present = tuple((f"HAS_{read.name.upper()}", "1") for read in reads)
@@ -363,8 +347,9 @@ def _role(port: WrittenPort) -> Role:
     return "history" if isinstance(port, History) else "transient"
 
 
-def _uses(recording: Recording, request: StepRequest, reads: Iterable[Read], called: set[str]) -> list[tuple[str, str]]:
-    """What a step reads and writes, as macros."""
+def _use_macros(
+    recording: Recording, request: StepRequest, reads: Iterable[Read], called: set[str]
+) -> list[tuple[str, str]]:
     names = called.union([read.name for read in reads])
     inputs = recording.node.node.inputs().items()
     read = [name for name, port in inputs if name in names or (getattr(port, "many", False) and f"{name}_0" in names)]
@@ -373,16 +358,16 @@ def _uses(recording: Recording, request: StepRequest, reads: Iterable[Read], cal
     ]
 
 
-def _numbered(recording: Recording, label: str, index: int) -> int | None:
-    """The last step before another that has a label, by its number in the node; None without a label."""
+def _condition_step(recording: Recording, label: str, index: int) -> int | None:
+    """Return the number of the last earlier step with a label; None without a label."""
     if not label:
         return None
     numbers = [i for i, one in enumerate(recording.requests[:index]) if one.options.get("label") == label]
     return numbers[-1] if numbers else None
 
 
-def _passed(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple[Endpoint, Endpoint]]:
-    """What an idle node would continue, by its port: without it the texture is what it was."""
+def _forwarded_ports(graph: Graph, recordings: Mapping[str, Recording]) -> Iterator[tuple[Endpoint, Endpoint]]:
+    """Map ports of idle nodes to the inputs they would continue: without the node the texture is unchanged."""
     for node in graph.nodes:
         for name, port in node.node.ports().items() if node.id not in recordings else ():
             if isinstance(port, InOut) and node.inputs.get(name):

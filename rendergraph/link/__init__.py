@@ -11,12 +11,20 @@ from rendergraph.facts import ObjectFacts
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.link.check import Checker, port_kind
 from rendergraph.link.connect import Connector
-from rendergraph.link.disabled import lost, mark_unlit, past, take_out
 from rendergraph.link.graph import Endpoint, Graph, GraphNode, upstream_first
-from rendergraph.link.infer import Infer, made_ports
-from rendergraph.link.names import Draft, Link, References, line_of
+from rendergraph.link.infer import TextureInference, output_ends
+from rendergraph.link.instances import choice_files, instance
+from rendergraph.link.nodes import (
+    Link,
+    References,
+    UnlinkedNode,
+    bypass,
+    line_of,
+    mark_without_environment,
+    missing_source,
+    remove_disabled,
+)
 from rendergraph.link.order import cycles, needs, sources, versions
-from rendergraph.link.params import choice_files, instance
 from rendergraph.resolve import NodeSpec, PipelineSpec
 from rendergraph.textures import SEMANTICS, TEXTURE_KINDS, Radiance, TextureDesc
 
@@ -28,17 +36,12 @@ def link(
     objects: Sequence[ObjectFacts] | None = None,
     environment: TextureDesc | None = None,
 ) -> Graph:
-    """A checked graph.
+    """Return the checked graph, or raise with all mistakes, those in `spec.problems` included.
 
     Args:
-        spec: the resolved pipeline.
-        catalog: the node types.
         lights: the scene's lights in its order; sizes and layers may depend on them.
-        objects: the scene's objects; None where there is no scene, and any may be.
-        environment: the picture around the scene.
-
-    Raises:
-        InputError: something is wrong, here or already in `spec.problems`; with all mistakes.
+        objects: the scene's objects; None without a scene, where any may exist.
+        environment: the description of the scene's environment map.
     """
     return _Linker(spec, catalog, lights, objects, environment).graph()
 
@@ -46,14 +49,7 @@ def link(
 def sketch(
     spec: PipelineSpec, catalog: Catalog, lights: Sequence[LightFacts] = (), environment: TextureDesc | None = None
 ) -> tuple[Graph, tuple[Problem, ...]]:
-    """A graph to look at, where nothing is wrong but that node types are missing; those are drawn as far as known.
-
-    Returns:
-        The graph, and what is missing; nothing is where `link` gives the same graph.
-
-    Raises:
-        InputError: something else is wrong; with all mistakes.
-    """
+    """Return a graph to look at, although node types are missing, and the problems that say so."""
     try:
         return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
@@ -66,11 +62,7 @@ def sketch(
 
 
 def endpoint(graph: Graph, text: str) -> Endpoint:
-    """The port of a linked graph that `node.port` names, internals included; for taps.
-
-    Raises:
-        InputError: there is no such node or port, or it holds no texture and no buffer.
-    """
+    """Return the port that `node.port` names, internals included; for taps."""
     if text in graph.aliases:
         return graph.aliases[text]
     node, _, port = text.rpartition(".")
@@ -94,13 +86,7 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
 
 
 class _Linker:
-    """Links one pipeline.
-
-    Attributes:
-        problems: mistakes; a sketch has been linked before, and pays no heed to them.
-        missing: those that say that a type is not there or cannot be used.
-        warnings: what is odd and no mistake.
-    """
+    """Links one pipeline; `missing` holds the problems about types that are missing or cannot be used."""
 
     def __init__(
         self,
@@ -126,34 +112,34 @@ class _Linker:
         types = self._types()
         references = References(self.spec, types)
         nodes = {node.id: self._bind(node, types[node.id]) for node in self.spec.nodes.values() if node.id in types}
-        connector = Connector(self.spec, self.catalog, references, self._say)
+        connector = Connector(self.spec, self.catalog, references, self._report)
         for draft in nodes.values():
             connector.connect(draft)
         if self.environment is None:
-            mark_unlit(nodes)
-        written, nodes = nodes, take_out(nodes, references)
+            mark_without_environment(nodes)
+        written, nodes = nodes, remove_disabled(nodes, references)
         for draft in nodes.values():
             connector.complete(draft, written)
         outputs = self._outputs(references, written)
         order = upstream_first(sources(nodes))
-        knots = cycles(nodes) if len(order) < len(nodes) else []
+        cyclic = cycles(nodes) if len(order) < len(nodes) else []
         used = {end.source for draft in nodes.values() for links in draft.links.values() for end in links}
         used |= {found.source for found in outputs.values()}
-        infer = Infer(
+        infer = TextureInference(
             nodes, Facts(self.spec.size, self.lights, objects=self.objects or (), environment=self.environment), used
         )
         textures: dict[Endpoint, TextureInfo] = {}
-        if knots:
-            self.problems += knots
+        if cyclic:
+            self.problems += cyclic
         else:
             self.problems += needs(nodes, outputs, written) + versions(nodes)
-            self._crossings(nodes, infer)
-            self._idle(nodes)
+            self._check_subgraph_inputs(nodes, infer)
+            self._warn_of_unused_settings(nodes)
             textures = self._textures(order, nodes, infer)
             self.problems += Checker(nodes, textures, infer, self.catalog).check()
             self._check_outputs(nodes, outputs, infer)
         members = {name: _member(draft, infer) for name, draft in nodes.items()}
-        self.problems += infer.problems if not knots else ()
+        self.problems += infer.problems if not cyclic else ()
         problems = [*self.spec.problems, *self.problems]
         if problems and not self.sketching:
             raise InputError(_in_order(problems))
@@ -172,7 +158,7 @@ class _Linker:
             warnings=(*dict.fromkeys(warning for one in types.values() for warning in one.warnings), *self.warnings),
         )
 
-    def _say(self, problem: Problem) -> None:
+    def _report(self, problem: Problem) -> None:
         self.problems.append(problem)
         if len(self.problems) >= MOST_PROBLEMS and not self.sketching:
             raise InputError(_in_order([*self.spec.problems, *self.problems]))
@@ -186,7 +172,7 @@ class _Linker:
                 continue  # said by resolve
             try:
                 if node.type not in self.catalog:
-                    from rendergraph.link.unknown import unknown_type  # where one is missing alone
+                    from rendergraph.link.instances import unknown_type  # where one is missing alone
 
                     raise InputError(value.problem("RG102", unknown_type(self.spec, self.catalog, node.type)))
                 found[node.id] = self.catalog.get(node.type)
@@ -196,85 +182,91 @@ class _Linker:
                     self.problems += error.problems
                 failed.add(node.type)
                 if self.sketching:
-                    from rendergraph.link.unknown import stand_in  # where one is missing alone
+                    from rendergraph.link.instances import stand_in  # where one is missing alone
 
                     found[node.id] = stand_in(self.spec, node)
                 elif len(self.problems) >= MOST_PROBLEMS:
                     raise InputError(_in_order([*self.spec.problems, *self.problems])) from None
         return found
 
-    def _bind(self, spec: NodeSpec, node_type: NodeType) -> Draft:
+    def _bind(self, spec: NodeSpec, node_type: NodeType) -> UnlinkedNode:
         node, problems = instance(spec, node_type)
         choices, wrong = choice_files(spec, node_type, node, self.catalog.extensions)
         self.missing += wrong if self.spec.missing else ()
         for problem in (*problems, *wrong):
-            self._say(problem)
+            self._report(problem)
         ports, inputs = node_type.cls.ports(), node_type.cls.inputs()
-        return Draft(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
+        return UnlinkedNode(spec, node_type, node, ports, inputs, {name: [] for name in inputs}, set(), choices)
 
-    def _outputs(self, references: References, written: Mapping[str, Draft]) -> dict[str, Link]:
+    def _outputs(self, references: References, written: Mapping[str, UnlinkedNode]) -> dict[str, Link]:
         found: dict[str, Link] = {}
         for name, value in self.spec.outputs.items():
             try:
                 followed = references.follow("", value, name)
             except InputError as error:
                 for problem in error.problems:
-                    self._say(problem)
+                    self._report(problem)
                 continue
             if followed is None:
                 continue
-            led = past(followed, written, references)
-            if not written[led.source.node].out:
+            led = bypass(followed, written, references)
+            if not written[led.source.node].is_removed:
                 found[name] = led
             else:
-                self._say(lost(f"output '{name}' shows '{led.source}'", led, written))
+                self._report(missing_source(f"output '{name}' shows '{led.source}'", led, written))
         return found
 
-    def _textures(self, order: list[str], nodes: Mapping[str, Draft], infer: Infer) -> dict[Endpoint, TextureInfo]:
-        """What every port turns out to be; in this order a rule hardly ever asks further up."""
+    def _textures(
+        self, order: list[str], nodes: Mapping[str, UnlinkedNode], infer: TextureInference
+    ) -> dict[Endpoint, TextureInfo]:
+        """In this order a rule rarely has to look further up."""
         textures: dict[Endpoint, TextureInfo] = {}
         for name in order:
-            for end in made_ports(nodes[name]):
+            for end in output_ends(nodes[name]):
                 info = infer.info(end)
                 if info is not None:
                     textures[end] = info
         return textures
 
-    def _crossings(self, nodes: Mapping[str, Draft], infer: Infer) -> None:
-        """Links into sub-pipelines against what those declare; a wrong one is cut, so that nothing inside complains."""
+    def _check_subgraph_inputs(self, nodes: Mapping[str, UnlinkedNode], infer: TextureInference) -> None:
+        """Check links into sub-pipelines against their declarations; wrong ones are cut and reported only here."""
         for draft in nodes.values() if self.spec.scopes else ():
             for name, links in draft.links.items():
                 for found in [found for found in links if found.declared]:
                     info = infer.info(found.source)
-                    problem = self._crossing(nodes, found, info.semantic.name) if info is not None else None
+                    problem = (
+                        self._subgraph_input_problem(nodes, found, info.semantic.name) if info is not None else None
+                    )
                     if problem is not None:
-                        self._say(problem)
+                        self._report(problem)
                         links.remove(found)
                         draft.failed.add(name)
 
-    def _crossing(self, nodes: Mapping[str, Draft], found: Link, carried: str) -> Problem | None:
-        for crossing in found.declared:
-            if crossing.semantic is not None and "any" not in (crossing.semantic, carried):
-                if crossing.semantic == carried:
+    def _subgraph_input_problem(self, nodes: Mapping[str, UnlinkedNode], found: Link, carried: str) -> Problem | None:
+        for entered in found.declared:
+            if entered.semantic is not None and "any" not in (entered.semantic, carried):
+                if entered.semantic == carried:
                     continue
-                where = line_of(nodes[found.source.node].spec.place, crossing.given.place)
-                text = f"'{crossing.name}' takes {crossing.semantic}, but '{found.source}' ({where}) carries {carried}"
+                where = line_of(nodes[found.source.node].spec.place, entered.given.place)
+                text = f"'{entered.name}' takes {entered.semantic}, but '{found.source}' ({where}) carries {carried}"
                 known = [*(semantic.name for semantic in SEMANTICS), *self.catalog.extensions.semantic_names()]
-                text += "" if crossing.semantic in known else suggestion(crossing.semantic, known, most=0)
-                return crossing.given.problem("RG110", text)
+                text += "" if entered.semantic in known else suggestion(entered.semantic, known, most=0)
+                return entered.given.problem("RG110", text)
         return None
 
-    def _check_outputs(self, nodes: Mapping[str, Draft], outputs: Mapping[str, Link], infer: Infer) -> None:
+    def _check_outputs(
+        self, nodes: Mapping[str, UnlinkedNode], outputs: Mapping[str, Link], infer: TextureInference
+    ) -> None:
         for name, found in outputs.items():
             info = infer.info(found.source)
             if found.source.previous:
                 text = f"output '{name}' shows this frame; leave '@previous' out"
-                self._say(found.value.problem("RG127", text))
+                self._report(found.value.problem("RG127", text))
             elif info is not None:
                 kind = port_kind(nodes[found.source.node].ports[found.source.port], info)
                 if kind not in TEXTURE_KINDS:
                     text = f"output '{name}' shows a texture, but '{found.source}' is a {kind}"
-                    self._say(found.value.problem("RG129", text))
+                    self._report(found.value.problem("RG129", text))
                 elif name == "image" and info.semantic.name == Radiance.name:
                     text = (
                         "output 'image' is scene-linear light as it is; send it through an output transform "
@@ -282,8 +274,8 @@ class _Linker:
                     )
                     self.warnings.append(found.value.problem("RG154", text).as_warning())
 
-    def _idle(self, nodes: Mapping[str, Draft]) -> None:
-        """What was typed to see it, and is not to be seen: a file's may be for other scenes."""
+    def _warn_of_unused_settings(self, nodes: Mapping[str, UnlinkedNode]) -> None:
+        """Only for typed settings: the parameters of a file may be meant for other scenes."""
         for draft in nodes.values():
             for name, value in draft.spec.params.items():
                 parameter = draft.type.cls.parameters().get(name) if value.source.path is None else None
@@ -293,7 +285,7 @@ class _Linker:
                 text = f"'{path}' changes nothing: '{place}' takes its place; -s {place}=null disconnects that"
                 self.warnings.append(value.problem("RG155", text).as_warning())
 
-    def _aliases(self, references: References, written: Mapping[str, Draft]) -> dict[str, Endpoint]:
+    def _aliases(self, references: References, written: Mapping[str, UnlinkedNode]) -> dict[str, Endpoint]:
         found: dict[str, Link] = {}
         for scope, inner in self.spec.scopes.items():
             for name, value in inner.outputs.items():
@@ -301,14 +293,14 @@ class _Linker:
                 if followed is not None:
                     found[f"{scope[:-1]}.{name}"] = followed
         for draft in written.values():
-            for name in draft.type.cls.outputs() if draft.out else ():
+            for name in draft.type.cls.outputs() if draft.is_removed else ():
                 end = Endpoint(draft.spec.id, name)
                 found[str(end)] = Link(end, draft.spec.value)
-        led = {name: past(link, written, references).source for name, link in found.items()}
-        return {name: end for name, end in led.items() if not written[end.node].out}
+        led = {name: bypass(link, written, references).source for name, link in found.items()}
+        return {name: end for name, end in led.items() if not written[end.node].is_removed}
 
 
-def _member(draft: Draft, infer: Infer) -> GraphNode:
+def _member(draft: UnlinkedNode, infer: TextureInference) -> GraphNode:
     spec = draft.spec
     links = {name: tuple([found.source for found in ends]) for name, ends in draft.links.items() if ends}
     samplers = {

@@ -9,18 +9,20 @@ from rendergraph.catalog import Catalog
 from rendergraph.declare import Function, InOut, Input, Node, Output, Port, TextureInfo, Views, WrittenPort
 from rendergraph.errors import InputError, Problem
 from rendergraph.link.graph import Endpoint
-from rendergraph.link.infer import Infer
-from rendergraph.link.names import Draft, Link, line_of
+from rendergraph.link.infer import TextureInference
+from rendergraph.link.nodes import Link, UnlinkedNode, line_of
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, Semantic, Signature
 
 Accepts = Callable[[type[Node]], bool]
 
 
 class Checker:
-    """Checks links of one graph; collects problems."""
-
     def __init__(
-        self, nodes: Mapping[str, Draft], textures: Mapping[Endpoint, TextureInfo], infer: Infer, catalog: Catalog
+        self,
+        nodes: Mapping[str, UnlinkedNode],
+        textures: Mapping[Endpoint, TextureInfo],
+        infer: TextureInference,
+        catalog: Catalog,
     ) -> None:
         self.nodes = nodes
         self.textures = textures
@@ -29,7 +31,6 @@ class Checker:
         self.problems: list[Problem] = []
 
     def check(self) -> list[Problem]:
-        """Everything that is wrong with the links."""
         for draft in self.nodes.values():
             before = len(self.problems)
             for name, links in draft.links.items():
@@ -42,7 +43,7 @@ class Checker:
 
     # One link ---------------------------------------------------------------------------------------------------------
 
-    def _link(self, draft: Draft, port: Input | InOut, link: Link) -> None:
+    def _link(self, draft: UnlinkedNode, port: Input | InOut, link: Link) -> None:
         info = self.textures.get(link.source.now)
         if info is None:
             return
@@ -58,7 +59,9 @@ class Checker:
             text = f"'{link.source}' means last frame's value, but it is kept: one value in all frames"
             self.problems.append(link.value.problem("RG127", f"{text}; leave '@previous' out"))
         elif given != taken:
-            self._say(draft, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port))
+            self._report(
+                draft, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port)
+            )
         elif isinstance(port.semantic, Signature):
             self._signature(draft, port, link, source, port.semantic)
         elif (taken != "view" and not self._semantic(draft, port, link, info)) or info.desc is None:
@@ -67,12 +70,12 @@ class Checker:
             self._samples(draft, port, link, info)
             self._format(draft, port, link, info)
 
-    def _signature(self, draft: Draft, port: Input | InOut, link: Link, source: Port, wanted: Signature) -> None:
+    def _signature(self, draft: UnlinkedNode, port: Input | InOut, link: Link, source: Port, wanted: Signature) -> None:
         if isinstance(source, Function) and source.signature.name != wanted.name:
             carried = f"provides {source.signature.name}()"
-            self._say(draft, port, link, "RG210", f"calls {wanted.name}()", carried, None)
+            self._report(draft, port, link, "RG210", f"calls {wanted.name}()", carried, None)
 
-    def _semantic(self, draft: Draft, port: Input | InOut, link: Link, info: TextureInfo) -> bool:
+    def _semantic(self, draft: UnlinkedNode, port: Input | InOut, link: Link, info: TextureInfo) -> bool:
         carried = info.semantic
         wanted = port.semantic
         if not isinstance(wanted, Semantic) or "any" in (wanted.name, carried.name):
@@ -85,21 +88,23 @@ class Checker:
             code, takes, carries = "RG203", f"{wanted.encoding} {wanted.name}", f"{carried.encoding} {carried.name}"
         else:
             return True
-        self._say(draft, port, link, code, f"takes {takes}", f"carries {carries}", self._by_semantic(carried, wanted))
+        self._report(
+            draft, port, link, code, f"takes {takes}", f"carries {carries}", self._by_semantic(carried, wanted)
+        )
         return False
 
-    def _samples(self, draft: Draft, port: Input, link: Link, info: TextureInfo) -> None:
+    def _samples(self, draft: UnlinkedNode, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         samples = info.desc.samples
         if port.use == "depth_test":
             return  # attached, not sampled: what is drawn beside it follows
         if port.samples == "single" and samples > 1:
             carries = f"has {samples} samples a texel"
-            self._say(draft, port, link, "RG214", "takes one sample a texel", carries, self._resolving(info))
+            self._report(draft, port, link, "RG214", "takes one sample a texel", carries, self._resolving(info))
         elif port.samples == "multi" and samples == 1:
-            self._say(draft, port, link, "RG214", "takes several samples a texel", "has one", None)
+            self._report(draft, port, link, "RG214", "takes several samples a texel", "has one", None)
 
-    def _format(self, draft: Draft, port: Input, link: Link, info: TextureInfo) -> None:
+    def _format(self, draft: UnlinkedNode, port: Input, link: Link, info: TextureInfo) -> None:
         assert info.desc is not None
         texel = FORMATS[info.desc.format]
         takes = ""
@@ -113,10 +118,10 @@ class Checker:
             smooth = self.infer.sampler(draft, port).filter
             takes = "is filtered, so no whole numbers" if smooth != "nearest" else ""
         if takes:
-            self._say(draft, port, link, "RG215", takes, f"has the format {info.desc.format}", None)
+            self._report(draft, port, link, "RG215", takes, f"has the format {info.desc.format}", None)
 
-    def _say(
-        self, draft: Draft, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
+    def _report(
+        self, draft: UnlinkedNode, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
     ) -> None:
         text = f"'{draft.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
         way = "" if code == "RG214" else self._neighbour(port, link)  # all of a node has as many samples
@@ -125,8 +130,7 @@ class Checker:
             way = self._elsewhere(draft, port)
         self.problems.append(link.value.problem(code, text + way))
 
-    def _elsewhere(self, draft: Draft, port: Port) -> str:
-        """Ports of other nodes that would fit."""
+    def _elsewhere(self, draft: UnlinkedNode, port: Port) -> str:
         if not isinstance(port, Input) or isinstance(port.semantic, Signature):
             return ""
         fit = [
@@ -141,7 +145,6 @@ class Checker:
         return f"; {' or '.join(fit[:3])} would fit" if fit else ""
 
     def _neighbour(self, port: Port, link: Link) -> str:
-        """Another port of the same node that would fit."""
         source = self.nodes[link.source.node]
         for name, other in source.type.cls.outputs().items():
             info = self.textures.get(Endpoint(link.source.node, name))
@@ -156,13 +159,12 @@ class Checker:
         return ""
 
     def _at(self, link: Link) -> str:
-        """Where the other end stands: its line, with the file where that is another."""
         return f" ({line_of(self.nodes[link.source.node].spec.place, link.value.place)})"
 
     # The passes -------------------------------------------------------------------------------------------------------
 
-    def _sizes(self, draft: Draft) -> None:
-        """Inputs of size `same` against what the node draws."""
+    def _sizes(self, draft: UnlinkedNode) -> None:
+        """Check inputs of size `same` against the node's targets."""
         made: dict[tuple[int, int], str] = {}
         for name, port in draft.type.written.items():
             if isinstance(port, Output | InOut):
@@ -187,12 +189,12 @@ class Checker:
                 (size, target), *_ = made.items()
                 takes = f"takes the size of '{draft.spec.id}.{target}', {_size(size)}"
                 carries = f"is {_size(info.desc.size)}"
-                self._say(draft, taken, link, "RG216", takes, carries, self._resizing(info))
+                self._report(draft, taken, link, "RG216", takes, carries, self._resizing(info))
 
     # Ways out ---------------------------------------------------------------------------------------------------------
 
     def _converters(self, accepts: Accepts | None) -> str:
-        """Node types that would convert; only now are types imported that the file does not use."""
+        """Suggest node types that convert; only here are types imported that the file does not use."""
         if accepts is None:
             return ""
         found = []
@@ -240,7 +242,7 @@ class Checker:
 
 
 def port_kind(port: Port, info: TextureInfo) -> str:
-    """The kind of an output as it has turned out."""
+    """Return the actual kind of an output."""
     if isinstance(port, Function):
         return "function"
     if isinstance(port, Views):
@@ -251,7 +253,7 @@ def port_kind(port: Port, info: TextureInfo) -> str:
 
 
 def _only_input(cls: type[Node]) -> list[Input]:
-    """The input of a type that needs no other: such a node can simply be put between two."""
+    """The input of a type that needs no other: such a node can be inserted between two."""
     needed = [port for port in cls.inputs().values() if not port.optional]
     return [port for port in needed if isinstance(port, Input)] if len(needed) == 1 else []
 

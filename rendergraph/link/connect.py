@@ -8,22 +8,18 @@ from rendergraph.catalog import Catalog
 from rendergraph.declare import InOut, Input
 from rendergraph.document import Value
 from rendergraph.errors import InputError, Problem, node_named, suggestion
-from rendergraph.link.disabled import lost
-from rendergraph.link.names import Draft, References
+from rendergraph.link.nodes import References, UnlinkedNode, missing_source
 from rendergraph.resolve import PipelineSpec
 from rendergraph.textures import Signature
 
 
 class Connector:
-    """Connects the nodes of one pipeline; what is wrong goes to `say`."""
-
     def __init__(
         self, spec: PipelineSpec, catalog: Catalog, references: References, say: Callable[[Problem], None]
     ) -> None:
-        self.spec, self.catalog, self.references, self.say = spec, catalog, references, say
+        self.spec, self.catalog, self.references, self.report = spec, catalog, references, say
 
-    def connect(self, draft: Draft) -> None:
-        """Follow what a node's `inputs` say; a link that leads nowhere is left out and said."""
+    def connect(self, draft: UnlinkedNode) -> None:
         cls = draft.type.cls
         inputs, groups = draft.inputs, cls.groups()
         for name, value in draft.spec.inputs.items():
@@ -37,37 +33,36 @@ class Connector:
                 if name in cls.parameters():
                     hint = f"; '{name}' is a param, move it to `params`"
                 text = f"node type '{draft.type.name}' has no input '{name}'{hint}"
-                self.say(value.problem("RG111", text, key=True))
+                self.report(value.problem("RG111", text, key=True))
 
-    def complete(self, draft: Draft, written: Mapping[str, Draft]) -> None:
-        """Say which required inputs lack a link."""
+    def complete(self, draft: UnlinkedNode, written: Mapping[str, UnlinkedNode]) -> None:
+        """Report required inputs that have no link."""
         by_link: dict[int, list[str]] = {}
         for name, port in draft.inputs.items():
             if draft.links[name] or port.optional or name in draft.failed or self._dropped(draft, name):
                 continue
-            if isinstance(port, Input) and port.takes_scene and name not in draft.lost:
+            if isinstance(port, Input) and port.takes_scene and name not in draft.lost_links:
                 continue
-            if name in draft.lost:
-                by_link.setdefault(id(draft.lost[name].value), []).append(name)
+            if name in draft.lost_links:
+                by_link.setdefault(id(draft.lost_links[name].value), []).append(name)
             else:
                 text = f"input '{name}' of {node_named(draft.spec.id, draft.type.name)} is not connected"
-                self.say(draft.spec.value.problem("RG114", text + self._source_for(draft, port), key=True))
+                self.report(draft.spec.value.problem("RG114", text + self._source_for(draft, port), key=True))
         for inputs in by_link.values():
-            end = draft.lost[inputs[0]].source
+            end = draft.lost_links[inputs[0]].source
             needed = f"needs '{end}'" if len(inputs) == 1 else f"need '{end.node}'"
             listed = ", ".join(f"'{draft.spec.id}.{name}'" for name in inputs)
-            self.say(lost(f"{listed} {needed}", draft.lost[inputs[0]], written))
+            self.report(missing_source(f"{listed} {needed}", draft.lost_links[inputs[0]], written))
 
-    def _dropped(self, draft: Draft, name: str) -> bool:
-        """Whether a link was left out for a mistake that has been said."""
+    def _dropped(self, draft: UnlinkedNode, name: str) -> bool:
         path = ("nodes", draft.spec.id.removeprefix(draft.spec.scope), "inputs")
         return path in self.spec.dropped or (*path, name) in self.spec.dropped
 
-    def _input(self, draft: Draft, name: str, port: Input | InOut, value: Value) -> None:
+    def _input(self, draft: UnlinkedNode, name: str, port: Input | InOut, value: Value) -> None:
         if isinstance(value.data, list):
             if not (isinstance(port, Input) and port.many):
                 text = f"'{draft.spec.id}.{name}' takes one link, not a list; write one as in node.port"
-                self.say(value.problem("RG115", text))
+                self.report(value.problem("RG115", text))
                 draft.failed.add(name)
                 return
             for part in value.data:
@@ -75,19 +70,19 @@ class Connector:
         elif value.data is not None:
             self._follow(draft, name, value, name)
 
-    def _follow(self, draft: Draft, name: str, value: Value, wanted: str) -> None:
+    def _follow(self, draft: UnlinkedNode, name: str, value: Value, wanted: str) -> None:
         try:
             found = self.references.follow(draft.spec.scope, value, wanted)
         except InputError as error:
             draft.failed.add(name)
             for problem in error.problems:
-                self.say(problem)
+                self.report(problem)
         else:
             if found is not None:
                 draft.links[name].append(found)
 
-    def _group(self, draft: Draft, group: str, members: Sequence[str], value: Value) -> None:
-        """Connect every member that is not connected on its own to the port of its name."""
+    def _group(self, draft: UnlinkedNode, group: str, members: Sequence[str], value: Value) -> None:
+        """Connect every member that has no link of its own to the port of its name."""
         missing = [name for name in members if name not in draft.spec.inputs]
         if value.data is None:
             return
@@ -95,9 +90,9 @@ class Connector:
         scope = draft.spec.scope
         if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
             text = f"'{draft.spec.id}.{group}' is a group, it takes a node's id and no port"
-            self.say(value.problem("RG113", text))
+            self.report(value.problem("RG113", text))
         elif not self.references.is_known(scope, node):
-            self.say(self.references.no_node(scope, node, value))
+            self.report(self.references.no_node(scope, node, value))
         else:
             offered = self.references.outputs_of(scope, node)
             lacking = []
@@ -110,13 +105,13 @@ class Connector:
             if lacking:
                 listed = ", ".join(f"'{name}'" for name in lacking)
                 text = f"'{draft.spec.id}.{group}' takes a node with {listed}, which '{node}' lacks"
-                self.say(value.problem("RG112", f"{text}; link {listed} beside the group"))
+                self.report(value.problem("RG112", f"{text}; link {listed} beside the group"))
             if offered and not lacking:
                 return
         draft.failed.update(missing)
 
-    def _source_for(self, draft: Draft, port: Input | InOut) -> str:
-        """A port that the file already has and that would fit."""
+    def _source_for(self, draft: UnlinkedNode, port: Input | InOut) -> str:
+        """Suggest a port of the file that fits."""
         wanted = port.semantic
         for other in self.spec.nodes.values():
             if other.scope != draft.spec.scope or other.id == draft.spec.id or other.type not in self.catalog:

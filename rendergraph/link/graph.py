@@ -34,7 +34,7 @@ class Endpoint(NamedTuple):
 
     @property
     def now(self) -> Endpoint:
-        """The port itself, also where last frame's value is meant."""
+        """The same port in this frame."""
         return self._replace(previous=False) if self.previous else self
 
 
@@ -43,13 +43,9 @@ class GraphNode(Struct, frozen=True):
 
     Attributes:
         id: key in the file; inside a sub-pipeline `glow/blur`.
-        type: the type it is an instance of.
-        node: the instance, holding parameter values.
         inputs: connected inputs only, in the order of declaration; a `many` input has several endpoints.
-        place: where it stands.
-        choices: parameters whose value a plugin brings, with the include it comes by.
-        samplers: how each connected input is sampled.
-        clears: what each texture and buffer it makes first holds, None for whatever is there.
+        choices: parameters whose value a plugin provides, with the include.
+        clears: initial contents of each texture and buffer; None leaves them undefined.
     """
 
     id: str
@@ -66,19 +62,12 @@ class Graph(Struct, frozen=True, dict=True):
     """A checked pipeline.
 
     Attributes:
-        name: the file's stem.
-        members: the nodes by id, in the file's order.
-        outputs: output name to the port it shows.
-        size: width and height of the picture.
-        lights: the scene's lights.
-        textures: what every made port (outputs, internals, history, functions, views) has turned out to be, by
-            `Endpoint(node, port)`; an `InOut` shares its source's.
-        warnings: what was noticed and is no error.
-        aliases: the outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports that they stand for.
-        disabled: the nodes that `enabled: false` takes out; they are no members.
-        objects: the scene's objects; None where there is no scene.
-        environment: the picture around the scene, which inputs of an environment read that nothing is linked to.
-        unlit: the nodes that need one where the scene has none; they are no members either.
+        textures: the properties of every port, internals and functions included; an `InOut` shares its source's.
+        aliases: outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports they stand for.
+        disabled: nodes that `enabled: false` removes; they are not members.
+        objects: the scene's objects; None without a scene.
+        environment: read by inputs of an environment that have no link.
+        unlit: nodes that need an environment where the scene has none; they are not members either.
     """
 
     name: str
@@ -106,7 +95,7 @@ class Graph(Struct, frozen=True, dict=True):
 
     @cached_property
     def unfilled(self) -> frozenset[str]:
-        """What geometry steps may ask to draw and the scene has nothing of: `transparent`, `casters`, …."""
+        """Selections of objects (`transparent`, `casters`, …) that are empty in this scene."""
         if self.objects is None:
             return frozenset()
         kinds = {(one.casts_shadow, one.blended) for one in self.objects if not one.hidden}
@@ -114,22 +103,17 @@ class Graph(Struct, frozen=True, dict=True):
 
     @cached_property
     def empty(self) -> frozenset[Endpoint]:
-        """Ports whose texture has no layers: no light casts, nothing is drawn, and readers do without."""
+        """Ports whose texture has no layers."""
         descs = ((end, info.desc) for end, info in self.textures.items())
         return frozenset(end for end, desc in descs if desc is not None and desc.layers == 0)
 
     @property
     def nodes(self) -> list[GraphNode]:
-        """All nodes in the file's order."""
         return list(self.members.values())
 
     @cached_property
     def dag(self) -> nx.MultiDiGraph[str]:
-        """The same as a networkx graph, frozen: node ids with attribute `node` (a GraphNode), in the file's order.
-
-        Each link is an edge with `source_port`, `target_port` and `previous`, which says that it reads last frame's
-        value. Made when asked for: importing networkx takes longer than checking a pipeline.
-        """
+        """The graph in networkx, frozen: nodes have `node`, edges `source_port`, `target_port` and `previous`."""
         import networkx as nx  # takes longer than checking a pipeline
 
         dag: nx.MultiDiGraph[str] = nx.MultiDiGraph()
@@ -143,10 +127,7 @@ class Graph(Struct, frozen=True, dict=True):
         return dag
 
     def reading_order(self) -> list[str]:
-        """Node ids so that each stands behind what it reads in this frame, else in the file's order.
-
-        Nodes of a cycle, which only a sketch can have, come last.
-        """
+        """Return node ids behind what they read in this frame; nodes of a cycle, which only a sketch has, come last."""
         order = upstream_first(
             {
                 name: {end.node for ends in node.inputs.values() for end in ends if not end.previous}
@@ -157,7 +138,7 @@ class Graph(Struct, frozen=True, dict=True):
 
 
 def upstream_first(sources: Mapping[T, Collection[T]]) -> list[T]:
-    """Names so that each stands behind its sources, else as they come; without those of cycles and what needs them."""
+    """Sort names behind their sources, else in the given order; leaves out cycles and everything downstream of them."""
     place = {name: number for number, name in enumerate(sources)}
     readers: dict[T, list[T]] = {name: [] for name in sources}
     for name, found in sources.items():

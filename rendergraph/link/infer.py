@@ -29,7 +29,7 @@ from rendergraph.declare.blame import happened
 from rendergraph.document import shown
 from rendergraph.errors import Problem, SceneError, is_interruption, node_named
 from rendergraph.link.graph import Endpoint
-from rendergraph.link.names import Draft
+from rendergraph.link.nodes import UnlinkedNode
 from rendergraph.ports import Count, FormatName, Positive, Samples, Sides
 from rendergraph.textures import (
     MOST_SIDE,
@@ -60,13 +60,13 @@ _COUNT, _SAMPLES = Optional[Count], Optional[Samples]  # noqa: UP045
 
 
 class _Unknown(Exception):
-    """Something this depends on is wrong and has been reported."""
+    """A value this depends on is wrong and has been reported."""
 
 
-class _Infos(Sequence[TextureInfo]):
-    """What the links of one input carry, found out when looked at: asking whether there are any asks no rule."""
+class _LazyInfos(Sequence[TextureInfo]):
+    """The textures an input reads, inferred on access: asking whether there are any evaluates no rule."""
 
-    def __init__(self, infer: Infer, ends: Sequence[Endpoint]) -> None:
+    def __init__(self, infer: TextureInference, ends: Sequence[Endpoint]) -> None:
         self._infer = infer
         self._ends = ends
 
@@ -83,10 +83,8 @@ class _Infos(Sequence[TextureInfo]):
         return self._infer.known(self._ends[index])
 
 
-class _Inputs(Mapping[str, Any]):
-    """`Facts.inputs`, found out when looked at."""
-
-    def __init__(self, infer: Infer, draft: Draft) -> None:
+class _LazyInputs(Mapping[str, Any]):
+    def __init__(self, infer: TextureInference, draft: UnlinkedNode) -> None:
         self._infer = infer
         self._draft = draft
 
@@ -97,7 +95,7 @@ class _Inputs(Mapping[str, Any]):
             if isinstance(port, Input) and port.takes_scene and given:
                 return given
             raise KeyError(name)
-        return _Infos(self._infer, [link.source for link in links])
+        return _LazyInfos(self._infer, [link.source for link in links])
 
     def __iter__(self) -> Iterator[str]:
         return (name for name in self._draft.links if self.get(name))
@@ -106,10 +104,8 @@ class _Inputs(Mapping[str, Any]):
         return sum(1 for _ in self)
 
 
-class Infer:
-    """Asks the rules of all nodes; keeps the answers and what is wrong with them."""
-
-    def __init__(self, nodes: Mapping[str, Draft], scene: Facts, used: set[Endpoint]) -> None:
+class TextureInference:
+    def __init__(self, nodes: Mapping[str, UnlinkedNode], scene: Facts, used: set[Endpoint]) -> None:
         self.nodes = nodes
         self.scene = scene
         self.used = {end.now for end in used}
@@ -121,11 +117,11 @@ class Infer:
         self._samplers: dict[Endpoint, Sampler] = {}
 
     def info(self, end: Endpoint) -> TextureInfo | None:
-        """What a port has turned out to be, None where that cannot be said."""
+        """Return the properties of a port, None where they cannot be inferred."""
         end = end.now
         if end not in self.infos:
             if end in self._open:
-                self._say(end, "RG213", "its size or format depends on itself through '@previous'")
+                self._report(end, "RG213", "its size or format depends on itself through '@previous'")
                 return None
             self._open.add(end)
             try:
@@ -137,58 +133,54 @@ class Infer:
         return self.infos[end]
 
     def known(self, end: Endpoint) -> TextureInfo:
-        """The same for a rule that cannot go on without."""
+        """Return the same for a rule that cannot continue without."""
         info = self.info(end)
         if info is None:
             raise _Unknown
         return info
 
-    def sampler(self, draft: Draft, port: Input) -> Sampler:
-        """How an input is sampled; `nearest` where the rule for its filter fails, which is said."""
+    def sampler(self, draft: UnlinkedNode, port: Input) -> Sampler:
+        """Return how an input is sampled; `nearest` where the rule for its filter fails."""
         if port.sampler is not None:
             return port.sampler
         end = Endpoint(draft.spec.id, port.name)
         if end not in self._samplers:
             try:
-                smooth = self._fitting(end, "filter", port.filter, Filter)
+                smooth = self._checked_value(end, "filter", port.filter, Filter)
             except _Unknown:
                 smooth = "nearest"
             self._samplers[end] = Sampler(smooth, port.wrap, port.compare, port.anisotropy)
         return self._samplers[end]
 
-    def clear(self, draft: Draft, port: WrittenPort) -> Texel | None:
-        """What a texture or buffer first holds; None for whatever is there, and where its rule fails, which is said."""
+    def clear(self, draft: UnlinkedNode, port: WrittenPort) -> Texel | None:
+        """Return the initial contents of a texture or buffer; None where they are undefined or the rule fails."""
         if not callable(port.clear):
             return port.clear
         try:
-            value: Texel | None = self._fitting(Endpoint(draft.spec.id, port.name), "clear", port.clear, _TEXEL)
+            value: Texel | None = self._checked_value(Endpoint(draft.spec.id, port.name), "clear", port.clear, _TEXEL)
         except _Unknown:
             return None
         return value
 
-    def _fitting(self, end: Endpoint, what: str, rule: Any, annotation: Any, code: str = "RG209") -> Any:
-        """A constant, which its declaration has been held to, or what the author's function gives where that fits.
-
-        Raises:
-            _Unknown: it does not, which is said.
-        """
+    def _checked_value(self, end: Endpoint, what: str, rule: Any, annotation: Any, code: str = "RG209") -> Any:
+        """Return a constant, which was checked at its declaration, or the value of the author's function."""
         if not callable(rule):
             return rule
-        value = self._ruled(end, what, rule)
+        value = self._rule_value(end, what, rule)
         if not fits(value, annotation):
             self._stop(end, code, f"the rule for its {what} gives {quoted(value)}, not {words_for(annotation)}")
         return value
 
-    def _say(self, end: Endpoint, code: str, text: str) -> None:
-        self._report(end, Problem(code, text, subject=end.port))
+    def _report(self, end: Endpoint, code: str, text: str) -> None:
+        self._add(end, Problem(code, text, subject=end.port))
 
-    def _report(self, end: Endpoint, problem: Problem, code: str = "", doing: str = "") -> None:
+    def _add(self, end: Endpoint, problem: Problem, code: str = "", doing: str = "") -> None:
         draft = self.nodes[end.node]
         context = f"'{end}' ({draft.type.name}){doing}"
         self.problems.append(draft.spec.value.relocate(problem, key=True, code=code, context=context))
 
     def _stop(self, end: Endpoint, code: str, text: str) -> NoReturn:
-        self._say(end, code, text)
+        self._report(end, code, text)
         raise _Unknown
 
     def _evaluate(self, end: Endpoint) -> TextureInfo | None:
@@ -199,7 +191,7 @@ class Infer:
         if isinstance(port, Function):
             return TextureInfo(None, Semantic(port.signature.name, port.signature.doc))
         if isinstance(port, Views):
-            count = self._fitting(end, "count", port.count, _COUNT)
+            count = self._checked_value(end, "count", port.count, _COUNT)
             lights = self._view_lights(end, port)
             if count is None:
                 count = len(lights) if port.lights else 1
@@ -208,21 +200,21 @@ class Infer:
             return self.info(draft.links[port.name][0].source)
         return self._made(end, draft, port) if isinstance(port, WrittenPort) else None
 
-    def _facts_of(self, draft: Draft) -> Facts:
+    def _facts_of(self, draft: UnlinkedNode) -> Facts:
         found = self._facts.get(draft.spec.id)
         if found is None:
-            found = msgspec.structs.replace(self.scene, inputs=_Inputs(self, draft))
+            found = msgspec.structs.replace(self.scene, inputs=_LazyInputs(self, draft))
             self._facts[draft.spec.id] = found
         return found
 
-    def _ruled(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
-        """What the author's function gives; ports with one function get one answer."""
+    def _rule_value(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
+        """Ports that share a function share its result."""
         key = end.node, id(rule)
         if key not in self._answers:
-            self._answers[key] = self._asked(end, what, rule)
+            self._answers[key] = self._call_rule(end, what, rule)
         return self._answers[key]
 
-    def _asked(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
+    def _call_rule(self, end: Endpoint, what: str, rule: Callable[[Node, Facts], Any]) -> Any:
         draft = self.nodes[end.node]
         try:
             return rule(draft.node, self._facts_of(draft))
@@ -235,16 +227,16 @@ class Infer:
             if missing and (end not in self.used or not draft.inputs[error.args[0]].optional):
                 raise _Unknown from None  # nobody uses what lacks an input, or that it must have it is said
             if missing:
-                self._say(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
+                self._report(end, "RG212", f"its {what} needs input '{error.args[0]}', which is not connected")
             elif isinstance(error, SceneError):
                 self._refused(draft, error)
             else:
                 problem = happened(error, draft.type.cls, subject=end.port)
-                self._report(end, problem, "RG209", f": the rule for its {what} fails")
+                self._add(end, problem, "RG209", f": the rule for its {what} fails")
             raise _Unknown from None
 
-    def _refused(self, draft: Draft, error: SceneError) -> None:
-        """A rule's own complaint, where a parameter has the name that it speaks of; several rules may have the same."""
+    def _refused(self, draft: UnlinkedNode, error: SceneError) -> None:
+        """A rule's own complaint, at the parameter it names; several rules may raise the same."""
         value, key = draft.spec.value, True
         for param in draft.spec.params.values():
             for part in param.data if isinstance(param.data, list) else [param]:
@@ -255,41 +247,41 @@ class Infer:
         if problem not in self.problems:
             self.problems.append(problem)
 
-    def _made(self, end: Endpoint, draft: Draft, port: WrittenPort) -> TextureInfo:
+    def _made(self, end: Endpoint, draft: UnlinkedNode, port: WrittenPort) -> TextureInfo:
         like = self._linked(draft, port.like)
         if port.kind == "buffer":
-            size = self._fitting(end, "bytes", port.bytes, Positive)
+            size = self._checked_value(end, "bytes", port.bytes, Positive)
             return TextureInfo(None, port.semantic or textures.Any, bytes=size)
         semantic = port.semantic or (like.semantic if like is not None else textures.Any)
         view, lights = self._view(end, draft, port, semantic)
-        seen = self._seen_with(draft) if view is None and port.like is None else None
+        drawing_view = self._drawing_view(draft) if view is None and port.like is None else None
         table = draft.ports.get(port.view) if port.view else None
         lit = callable(port.lights) or (isinstance(table, Views) and table.lights is not None)
         layers = len(lights) if lit and port.kind == "texture2d_array" else 1
         desc = self._desc(end, port, like.desc if like is not None else None, layers)
         if like is not None:
             view, lights = view or like.view, lights or like.lights
-        if seen is not None and desc.size == self._view_size(seen):
-            view = str(seen)  # texel by texel what was drawn with it
+        if drawing_view is not None and desc.size == self._view_size(drawing_view):
+            view = str(drawing_view)  # texel by texel what was drawn with it
         return TextureInfo(desc, semantic, view, lights)
 
-    def _linked(self, draft: Draft, name: str | None) -> TextureInfo | None:
+    def _linked(self, draft: UnlinkedNode, name: str | None) -> TextureInfo | None:
         links = draft.links.get(name, []) if name else []
         return self.known(links[0].source) if links else None
 
     def _desc(self, end: Endpoint, port: WrittenPort, like: TextureDesc | None, usual: int) -> TextureDesc:
         draft = self.nodes[end.node]
         size = self._size(end, port, like)
-        name = self._fitting(end, "format", port.format, _FORMATNAME, "RG211")
+        name = self._checked_value(end, "format", port.format, _FORMATNAME, "RG211")
         name = name or (like.format if like is not None else DEFAULT_FORMAT)
         kind = like.kind if like is not None and port.kind == "texture2d" else port.kind
-        layers = self._fitting(end, "layers", port.layers, _COUNT)
+        layers = self._checked_value(end, "layers", port.layers, _COUNT)
         if layers is None:
             layers = like.layers if like is not None else usual
         layers = 6 if kind == "texture_cube" else layers
         full = full_mip_count(*size)
-        mips = self._fitting(end, "mips", port.mips, Count) or full
-        samples = self._fitting(end, "samples", port.samples, _SAMPLES)
+        mips = self._checked_value(end, "mips", port.mips, Count) or full
+        samples = self._checked_value(end, "samples", port.samples, _SAMPLES)
         if samples is None:
             samples = 1 if mips > 1 or kind == "texture_cube" else self._samples_of(draft, like, size)
         if kind == "texture2d" and layers != 1:
@@ -300,8 +292,8 @@ class Infer:
             self._stop(end, "RG208", f"a texture cannot have {samples} samples a texel with mips or in a cube")
         return TextureDesc(kind, name, *size, layers=layers, mips=mips, samples=samples)
 
-    def _samples_of(self, draft: Draft, like: TextureDesc | None, size: tuple[int, int]) -> int:
-        """What a texture follows that says nothing of samples: what it is like, or a depth attached beside it."""
+    def _samples_of(self, draft: UnlinkedNode, like: TextureDesc | None, size: tuple[int, int]) -> int:
+        """Samples of a texture that declares none: those of `like`, or of a depth attached beside it."""
         if like is not None:
             return like.samples
         for name in [name for name, port in draft.type.read.items() if port.use == "depth_test"]:
@@ -315,7 +307,7 @@ class Infer:
         draft = self.nodes[end.node]
         factor, base = 1.0, self.scene.viewport
         if callable(rule):
-            base = self._fitting(end, "size", rule, Sides)
+            base = self._checked_value(end, "size", rule, Sides)
         elif isinstance(rule, str) or (isinstance(rule, tuple) and isinstance(rule[0], str)):
             name, factor = (rule, 1.0) if isinstance(rule, str) else (rule[0], float(rule[1]))
             source = self._linked(draft, name)  # not connected: the viewport
@@ -326,15 +318,15 @@ class Infer:
             factor = float(rule)
             if like is not None and port.size is None:
                 base = like.size
-            elif isinstance(port, WrittenPort) and (seen := self._seen_with(draft)) is not None:
-                base = self._view_size(seen)
+            elif isinstance(port, WrittenPort) and (drawing_view := self._drawing_view(draft)) is not None:
+                base = self._view_size(drawing_view)
         width, height = base if factor == 1.0 else [max(1, math.ceil(side * factor - 1e-9)) for side in base]
         if not (1 <= width <= MOST_SIDE and 1 <= height <= MOST_SIDE):
             self._stop(end, "RG207", f"its size is {width}×{height}, width and height go from 1 to {MOST_SIDE}")
         return width, height
 
-    def _seen_with(self, draft: Draft) -> Endpoint | None:
-        """The view with a size of its own that a node draws with, or what it reads texel by texel was drawn with."""
+    def _drawing_view(self, draft: UnlinkedNode) -> Endpoint | None:
+        """The view with a size of its own that a node draws with, or that its per-texel inputs were drawn with."""
         for given, links in draft.links.items():
             port = draft.inputs[given]
             if isinstance(port, Input) and port.kind != "view" and port.size == "any":
@@ -358,12 +350,12 @@ class Infer:
     # Views and lights -------------------------------------------------------------------------------------------------
 
     def _view_lights(self, end: Endpoint, port: Views) -> tuple[int, ...]:
-        return tuple(self._fitting(end, "lights", port.lights, _LIGHTS)) if port.lights else ()
+        return tuple(self._checked_value(end, "lights", port.lights, _LIGHTS)) if port.lights else ()
 
     def _view(
-        self, end: Endpoint, draft: Draft, port: WrittenPort, semantic: Semantic
+        self, end: Endpoint, draft: UnlinkedNode, port: WrittenPort, semantic: Semantic
     ) -> tuple[str | None, tuple[int, ...]]:
-        """The view table it is drawn with, and the light of each layer."""
+        """Return the view table it is drawn with, and the light of each layer."""
         named: Port | None = draft.ports.get(port.view) if port.view else None
         view: str | None = None
         lights: tuple[int, ...] = ()
@@ -375,7 +367,7 @@ class Infer:
         elif isinstance(drawn := draft.ports.get("view"), Input) and drawn.kind == "view" and semantic.name in _DRAWN:
             view, lights = self._carried(draft, drawn)
         if callable(port.lights):
-            lights = tuple(self._fitting(end, "lights", port.lights, _LIGHTS))
+            lights = tuple(self._checked_value(end, "lights", port.lights, _LIGHTS))
         elif port.lights:
             table: Port | None = draft.ports.get(port.lights)
             if isinstance(table, Views):
@@ -385,18 +377,17 @@ class Infer:
                 lights = source.lights if source is not None else ()
         return view, lights
 
-    def _carried(self, draft: Draft, port: Input | InOut) -> tuple[str | None, tuple[int, ...]]:
+    def _carried(self, draft: UnlinkedNode, port: Input | InOut) -> tuple[str | None, tuple[int, ...]]:
         source = self._linked(draft, port.name)
         if source is not None:
             return source.view, source.lights
         return (CAMERA if port.kind == "view" else None), ()
 
 
-def made_ports(draft: Draft) -> Iterator[Endpoint]:
-    """Everything of a node that carries something."""
+def output_ends(draft: UnlinkedNode) -> Iterator[Endpoint]:
     for name, port in draft.ports.items():
         if not isinstance(port, Input):
             yield Endpoint(draft.spec.id, name)
 
 
-__all__ = ["CAMERA", "Infer", "made_ports"]
+__all__ = ["CAMERA", "TextureInference", "output_ends"]

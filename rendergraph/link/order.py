@@ -8,13 +8,11 @@ from msgspec.structs import replace
 
 from rendergraph.declare import InOut
 from rendergraph.errors import Problem
-from rendergraph.link.disabled import lost
 from rendergraph.link.graph import Endpoint
-from rendergraph.link.names import Draft, Link, line_of
+from rendergraph.link.nodes import Link, UnlinkedNode, line_of, missing_source
 
 
-def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
-    """One problem for each knot of nodes that need each other in the same frame."""
+def cycles(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
     import networkx as nx  # for the message of a mistake alone
 
     links = {
@@ -29,11 +27,11 @@ def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
     graph.add_edges_from(links)
     rank = {name: number for number, name in enumerate(nodes)}
     found = []
-    for knot in nx.strongly_connected_components(graph):
-        first = min(knot, key=rank.__getitem__)
-        if len(knot) == 1 and not graph.has_edge(first, first):
+    for component in nx.strongly_connected_components(graph):
+        first = min(component, key=rank.__getitem__)
+        if len(component) == 1 and not graph.has_edge(first, first):
             continue
-        path = [a for a, _ in nx.find_cycle(graph.subgraph(sorted(knot, key=rank.__getitem__)), first)]
+        path = [a for a, _ in nx.find_cycle(graph.subgraph(sorted(component, key=rank.__getitem__)), first)]
         steps = [(path[number], path[(number + 1) % len(path)]) for number in range(len(path))]
         ends = [str(links[step][1].source) for step in steps]
         value = links[steps[-1]][1].value
@@ -46,16 +44,17 @@ def cycles(nodes: Mapping[str, Draft]) -> list[Problem]:
     return found
 
 
-def sources(nodes: Mapping[str, Draft]) -> dict[str, set[str]]:
-    """The nodes that each one reads in the same frame."""
+def sources(nodes: Mapping[str, UnlinkedNode]) -> dict[str, set[str]]:
     return {
         name: {link.source.node for links in draft.links.values() for link in links if not link.source.previous}
         for name, draft in nodes.items()
     }
 
 
-def needs(nodes: Mapping[str, Draft], outputs: Mapping[str, Link], written: Mapping[str, Draft]) -> list[Problem]:
-    """Ports that are used although an input they need is not connected; `written` has the disabled nodes, too."""
+def needs(
+    nodes: Mapping[str, UnlinkedNode], outputs: Mapping[str, Link], written: Mapping[str, UnlinkedNode]
+) -> list[Problem]:
+    """Report used ports whose needed input is not connected; `written` includes disabled nodes."""
     problems = []
     users = [link for draft in nodes.values() for links in draft.links.values() for link in links]
     for link in [*users, *outputs.values()]:
@@ -65,19 +64,16 @@ def needs(nodes: Mapping[str, Draft], outputs: Mapping[str, Link], written: Mapp
             if not source.links.get(name) and name not in source.failed:
                 where = line_of(source.spec.place, link.value.place)
                 text = f"'{link.source}' needs input '{name}' of '{source.spec.id}' ({where})"
-                if name in source.lost:
-                    problems.append(lost(text, replace(source.lost[name], value=link.value), written))
+                if name in source.lost_links:
+                    problems.append(missing_source(text, replace(source.lost_links[name], value=link.value), written))
                 else:
                     problems.append(link.value.problem("RG116", f"{text}, which is not connected"))
     return problems
 
 
-def versions(nodes: Mapping[str, Draft]) -> list[Problem]:
-    """Mistakes about `InOut`s: each version has one writer, and its readers come before that.
-
-    An output may show a version that somebody continues: it is kept as it was.
-    """
-    writers: dict[Endpoint, tuple[Draft, Link]] = {}
+def versions(nodes: Mapping[str, UnlinkedNode]) -> list[Problem]:
+    """Check that each version has one writer (`InOut`), after all its readers; outputs keep their version."""
+    writers: dict[Endpoint, tuple[UnlinkedNode, Link]] = {}
     problems: list[Problem] = []
     for draft in nodes.values():
         for name, port in draft.inputs.items():
@@ -99,11 +95,11 @@ def versions(nodes: Mapping[str, Draft]) -> list[Problem]:
     return problems
 
 
-def _port(draft: Draft, link: Link) -> str:
+def _port(draft: UnlinkedNode, link: Link) -> str:
     return next(name for name, links in draft.links.items() if link in links)
 
 
-def _readers(nodes: Mapping[str, Draft], writers: Mapping[Endpoint, tuple[Draft, Link]]) -> list[Problem]:
+def _readers(nodes: Mapping[str, UnlinkedNode], writers: Mapping[Endpoint, tuple[UnlinkedNode, Link]]) -> list[Problem]:
     problems = []
     before = _Ancestors(nodes)
     for draft in nodes.values():
@@ -127,9 +123,9 @@ def _readers(nodes: Mapping[str, Draft], writers: Mapping[Endpoint, tuple[Draft,
 
 
 class _Ancestors(dict[str, set[str]]):
-    """Every node that a node needs in the same frame, found out when asked."""
+    """All nodes that a node needs in the same frame, computed on demand."""
 
-    def __init__(self, nodes: Mapping[str, Draft]) -> None:
+    def __init__(self, nodes: Mapping[str, UnlinkedNode]) -> None:
         super().__init__()
         self._sources = sources(nodes)
 

@@ -14,11 +14,9 @@ from rendergraph.keys import Validator, plain
 from rendergraph.read import CODES, SIZE, checked, entries, read, word
 from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
-from rendergraph.resolve.merge import diff, merge_patch
-from rendergraph.resolve.sets import patch_of, settings
-from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, PipelineParameter, PipelineSpec, Scope
-from rendergraph.resolve.words import is_bare
-from rendergraph.resources import shipped_pipelines, shipped_scenes
+from rendergraph.resolve.patches import diff, merge_patch, patch_of, settings
+from rendergraph.resolve.spec import DEFAULT_SIZE, NodeSpec, PipelineParameter, PipelineSpec, Scope, to_yaml
+from rendergraph.resources import is_name, shipped_pipelines, shipped_scenes
 from rendergraph.settings import Roots
 
 
@@ -33,24 +31,15 @@ def resolve(
     asset_roots: Sequence[Path] = (),
     limits: YamlLimits = YamlLimits(),
 ) -> PipelineSpec:
-    """A pipeline with everything applied that decides what it is.
+    """Return a pipeline with patches, `--set`, sub-pipelines and parameters applied.
+
+    Mistakes that do not stop the resolving are in its `problems`, for `link` to raise with its own.
 
     Args:
-        source: a shipped name, a path, or a document that is already read.
-        catalog: to know which types there are and what they take.
+        source: a shipped name, a path, or a document.
         patches: merge patches, files or plain data, applied in order.
         sets: `PATH=VALUE` texts or a mapping of paths to values; together one patch, types first.
-        scene: instead of the file's: a shipped name or a path.
-        size: instead of the file's.
         asset_roots: further folders that files may be read from.
-        limits: budgets of each YAML file.
-
-    Returns:
-        The spec; mistakes that do not stop the resolving are in its `problems`, for `link` to raise with its own.
-
-    Raises:
-        InputError: a file is missing, is no YAML, or leads back to itself.
-        UsageError: a setting is malformed.
     """
     wanted = settings(sets)
     files = Files(catalog, asset_roots, limits)
@@ -107,7 +96,7 @@ def _parts(tree: Value) -> dict[str, Value]:
 def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
     if isinstance(source, Document):
         return checked(source, keep_going=True)
-    if isinstance(source, str) and is_bare(source):
+    if isinstance(source, str) and is_name(source):
         shipped = shipped_pipelines()
         if source not in shipped:
             hint = suggestion(source, shipped)
@@ -148,7 +137,6 @@ def _patch(patch: Path | Mapping[str, Any], files: Files, limits: YamlLimits) ->
 
 
 def _complete(tree: Value, files: Files) -> None:
-    """Say what a pipeline lacks to be run."""
     for part, example in (("nodes", "{display: {type: tonemap, …}}"), ("outputs", "{image: display.color}")):
         if not entries(tree, part) and not files.problems:
             text = f"the pipeline has no {part}; add {part}: {example}"
@@ -175,7 +163,7 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
     value = tree.get("scene")
     if value is None or value.data is None:
         return None, files.roots_of(tree)
-    if typed is not None and not is_bare(str(value.data)):
+    if typed is not None and not is_name(str(value.data)):
         # Named by the user, so the file itself is beyond question; what it refers to is not.
         path = Path(typed)
         roots = Roots.around(path, files.asset_roots)
@@ -190,19 +178,18 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
 
 
 def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
-    """The scene as the resolved file has to name it: relative to where that file stands, if it lies there."""
+    """Write the scene relative to the folder of the resolved file, if it is inside."""
     value = tree.get("scene")
-    if value is None or found is None or is_bare(str(value.data)):
+    if value is None or found is None or is_name(str(value.data)):
         return tree
     home = (document.path.parent if document.path else Path()).resolve()
     path = found.resolve()
     text = os.path.relpath(path, home) if path.is_relative_to(home) else str(path)
-    text = text if not is_bare(text) else f"./{text}"
+    text = text if not is_name(text) else f"./{text}"
     return tree.with_data({**_parts(tree), "scene": value.with_data(text)})
 
 
 def _with_plugins(tree: Value, files: Files) -> Value:
-    """All plugins of all files as the resolved file has to name them."""
     written = files.plugins.written
     if not written:
         return tree
@@ -220,4 +207,5 @@ __all__ = [
     "diff",
     "merge_patch",
     "resolve",
+    "to_yaml",
 ]

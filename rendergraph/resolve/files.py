@@ -11,17 +11,16 @@ from rendergraph.document import Document, Source, Value, YamlLimits, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.read import checked, entries, read, word
-from rendergraph.resolve.merge import TypeNames, merge_pipeline
+from rendergraph.resolve.patches import TypeNames, merge_pipeline
 from rendergraph.resolve.plugins import Plugins, is_shader
-from rendergraph.resolve.words import is_bare
-from rendergraph.resources import shipped_pipelines
+from rendergraph.resources import is_name, shipped_pipelines
 from rendergraph.settings import Roots
 
 _MOST_EXTENDED = 32
 
 
 class Files:
-    """Reads and merges files, each once; collects what is wrong with them."""
+    """Reads and merges files, each once; collects problems."""
 
     def __init__(self, catalog: Catalog, asset_roots: Sequence[Path], limits: YamlLimits) -> None:
         self.plugins = Plugins(catalog, self.say)
@@ -38,15 +37,9 @@ class Files:
 
     @property
     def catalog(self) -> Catalog:
-        """The node types, with those that the files read so far bring along."""
         return self.plugins.catalog
 
     def say(self, problem: Problem) -> None:
-        """Note a mistake.
-
-        Raises:
-            InputError: there are so many that nobody reads on.
-        """
         self.problems.append(problem)
         if len(self.problems) >= MOST_PROBLEMS:
             raise InputError(self.problems)
@@ -54,18 +47,18 @@ class Files:
     # Roots and paths ------------------------------------------------------------------------------------------------
 
     def roots_of(self, value: Value) -> Roots:
-        """Where the file a value stands in may read from."""
+        """Where the file that contains a value may read from."""
         return self._roots.get(value.source) or Roots.around(Path("x"), self.asset_roots)
 
     def own(self, document: Document, roots: Roots | None = None) -> None:
-        """Remember where a file may read from; its own surroundings where it was named by the user."""
+        """Register where a file may read from: its own surroundings if the user named it."""
         around = document.path or Path("x")
         self._roots[document.source] = roots or Roots.around(around, self.asset_roots)
         self.dropped |= document.dropped
         self.bring(document.root)
 
     def bring(self, tree: Value) -> None:
-        """Add the node types that a file's `plugins` name, and remember what nodes it takes away."""
+        """Add the node types of a file's `plugins`, and note the nodes that it removes."""
         nodes = tree.get("nodes")
         if nodes is not None and isinstance(nodes.data, dict):
             self.removed |= {name: node for name, node in nodes.data.items() if node.data is None}
@@ -74,18 +67,17 @@ class Files:
             self.plugins.add(value, self.beside(value), self.roots_of(value))
 
     def typed_roots(self, value: Value) -> Roots:
-        """Where a `type` may lead; a path typed on the command line is the user's own."""
+        """Where a `type` may lead; a path typed on the command line may be anywhere."""
         return self._roots.get(value.source) or Roots.around(self.beside(value), self.asset_roots)
 
     def beside(self, value: Value) -> Path:
-        """A path that a file's value holds, joined to the file's folder."""
         path = value.source.path
         return Path(os.path.normpath((path.parent if path else Path()) / str(value.data)))
 
     def locate(self, value: Value, shipped: dict[str, Path], what: str) -> tuple[Path, Roots] | None:
-        """The file a value names and where it may read from; None and a problem where it names none."""
+        """Return the file a value names and where that may read from; report a problem and return None otherwise."""
         text = str(value.data)
-        if is_bare(text):
+        if is_name(text):
             if text in shipped:
                 return shipped[text], Roots((shipped[text].parent.resolve(),))
             hint = suggestion(text, shipped, most=20)  # there are more scenes than words of most kinds
@@ -105,11 +97,7 @@ class Files:
     # Merging --------------------------------------------------------------------------------------------------------
 
     def chain(self, document: Document) -> Value:
-        """A file on top of everything it extends.
-
-        Raises:
-            InputError: a file below is missing or no YAML, or extends itself.
-        """
+        """Return a file merged onto everything it extends."""
         self.problems += document.problems
         base = document.root.get("extends")
         if base is None or base.data is None:
@@ -138,7 +126,6 @@ class Files:
         return merged
 
     def patched(self, tree: Value, patch: Value) -> Value:
-        """A tree with a patch applied, as `merge_pipeline` does it."""
         merged, notes = merge_pipeline(tree, patch, self.names_of)
         self.notes += notes
         return merged
@@ -155,11 +142,11 @@ class Files:
     # Types ----------------------------------------------------------------------------------------------------------
 
     def sub_pipeline(self, value: Value) -> Value | None:
-        """The merged file that a node's `type` names, None where it names a node type or nothing that exists."""
+        """Return the merged file that a `type` names; None for node types and missing files."""
         if isinstance(value.data, dict):
             return self._inline(value)
         text = str(value.data)
-        if is_shader(text) or (is_bare(text) and (text in self.catalog or text not in shipped_pipelines())):
+        if is_shader(text) or (is_name(text) and (text in self.catalog or text not in shipped_pipelines())):
             return None
         before = len(self.problems)
         found = self.locate(value, shipped_pipelines(), "pipeline")
@@ -183,14 +170,13 @@ class Files:
         return self.chain(checked(Document(value, value.source), keep_going=True))
 
     def path_of(self, value: Value) -> Path | None:
-        """The sub-pipeline's file, to see whether it contains itself."""
         if not isinstance(value.data, str):
             return None
         text = value.data
-        return (shipped_pipelines()[text] if is_bare(text) else self.beside(value)).resolve()
+        return (shipped_pipelines()[text] if is_name(text) else self.beside(value)).resolve()
 
     def names_of(self, value: Value) -> TypeNames | None:
-        """What a type takes, None where there is no such type."""
+        """Return the ports and parameters of a type, None where it does not exist."""
         sub = self.sub_pipeline(value)
         if sub is not None:
             inputs = entries(sub, "inputs")
@@ -204,7 +190,7 @@ class Files:
         return self._names[text]
 
     def type_name(self, value: Value) -> str:
-        """The name in the catalog of what a `type` names, the text itself where there is no such file."""
+        """Return the catalog's name of a `type`; of a missing file the text itself."""
         text = str(value.data)
         if not is_shader(text) or self.missing(value):
             return text
@@ -224,14 +210,13 @@ class Files:
         return TypeNames(frozenset(cls.parameters()), taken, groups, optional, frozenset(cls.outputs()))
 
     def missing(self, value: Value) -> Problem | None:
-        """What is wrong with a `type` that is a path and leads to no sub-pipeline."""
+        """Return what is wrong with a `type` that is a path, if anything."""
         text = str(value.data)
-        if is_bare(text):
+        if is_name(text):
             return None
         mistake = self.typed_roots(value).mistake(self.beside(value), text)
         return value.problem(*mistake) if mistake else None
 
 
 def display(text: object) -> str:
-    """A type's name for messages: a sub-pipeline written in place has none."""
     return shown(text) if isinstance(text, str) else "sub-pipeline"

@@ -11,7 +11,7 @@ from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.read import NAME, entries, word
 from rendergraph.resolve.files import Files, display
-from rendergraph.resolve.sets import Setting, patch_of
+from rendergraph.resolve.patches import Setting, patch_of
 from rendergraph.resolve.spec import NodeSpec, PipelineParameter, Scope
 from rendergraph.typecheck import Range, fits, words_for
 
@@ -21,8 +21,6 @@ _REFERENCE = rf"\$({NAME.pattern})"
 
 
 class Flattener:
-    """Collects nodes and scopes of a tree and of everything nested in it."""
-
     def __init__(self, files: Files) -> None:
         self.files = files
         self.nodes: dict[str, NodeSpec] = {}
@@ -30,10 +28,9 @@ class Flattener:
         self._open: list[Path] = []
 
     def flatten(self, tree: Value, scope: str, given: Mapping[str, Value], sets: Sequence[Setting]) -> Value:
-        """Add the nodes of one level; gives the tree back with its sub-pipelines in place of their names.
+        """Add the nodes of one level; return the tree with sub-pipelines in place of their names.
 
         Args:
-            tree: a merged file.
             scope: empty, or the id of the node whose type it is, with a slash.
             given: parameter values from outside.
             sets: assignments into sub-pipelines below.
@@ -150,7 +147,6 @@ class Flattener:
         return node.with_data({**parts, "type": node_type.with_data(whole.data)})
 
     def _disabled(self, parts: Mapping[str, Value], scope: str) -> Value | None:
-        """The `false` that takes a node out."""
         own = parts.get("enabled")
         if own is not None and own.data is False:
             return own
@@ -176,7 +172,6 @@ class Flattener:
     # Parameters -----------------------------------------------------------------------------------------------------
 
     def _parameter(self, name: str, declared: Value, given: Value | None) -> Value | None:
-        """A parameter's value, checked; None where it is wrong."""
         value = given if given is not None else declared.get("default")
         if value is None or value.data is None:
             text = f"the parameter '{name}' has no default; write {name}: {{default: VALUE}}"
@@ -196,7 +191,7 @@ class Flattener:
         return value
 
     def _replaced(self, value: Value, values: Mapping[str, Value | None], used: set[str]) -> Value | None:
-        """A value with `$name` replaced; None where a name is unknown or its parameter is wrong."""
+        """Replace `$name`; return None where the name is unknown or its parameter is wrong."""
         data = value.data
         if isinstance(data, str) and data.startswith("$"):
             match = re.match(_REFERENCE, data)
@@ -224,7 +219,6 @@ class Flattener:
 
 
 def parameters(tree: Value) -> dict[str, PipelineParameter]:
-    """The declared parameters with their values as they are now."""
     found = {}
     for name, declared in entries(tree, "parameters").items():
         value = declared.get("default")
@@ -236,7 +230,7 @@ def parameters(tree: Value) -> dict[str, PipelineParameter]:
 
 
 def _typed(node: Value, node_type: Value | None, name: str) -> Value:
-    """A node whose type is written as the resolved file has to: a path relative to where that stands."""
+    """Write the type as the resolved file needs it: as a path relative to that file."""
     if node_type is None or not isinstance(node.data, dict) or not name or node_type.data == name:
         return node
     return node.with_data({**node.data, "type": node_type.with_data(name)})

@@ -14,7 +14,7 @@ from rendergraph.catalog import SHADERS, Catalog, find
 from rendergraph.document import Value, shown
 from rendergraph.errors import Place, Problem, shown_file
 from rendergraph.installed import version
-from rendergraph.resolve.words import is_bare
+from rendergraph.resources import is_name
 from rendergraph.settings import Roots
 
 _PACKAGE = r"[A-Za-z0-9](?:[A-Za-z0-9_-]{0,98}[A-Za-z0-9])?\Z"
@@ -24,11 +24,9 @@ class Plugins:
     """The catalog of a pipeline, which grows with the files that are read.
 
     Attributes:
-        catalog: the node types so far.
         missing: packages that are needed and not installed.
-        unrun: types whose Python stands in a folder that only a pipeline file names, and what `--plugin` takes for it.
-        written: what the resolved file has to name, by the text it has to use.
-        notes: warnings.
+        unrun: types whose Python is in a folder that only a pipeline file names, and the argument `--plugin` needs.
+        written: the entries of `plugins` in the resolved file, by text.
     """
 
     def __init__(self, catalog: Catalog, say: Callable[[Problem], None]) -> None:
@@ -44,18 +42,16 @@ class Plugins:
         self._told: set[tuple[str, Place]] = set()
 
     def start(self, home: Path, roots: Roots) -> None:
-        """Say where the resolved file will stand: paths in it are relative to there."""
+        """Set the folder of the resolved file: paths in it are relative to that."""
         self._home = home.resolve()
         self._roots = roots
 
     def spelled(self, path: Path) -> str:
-        """A path as the resolved file has to write it."""
         inside = path.is_relative_to(self._home) or any(path.is_relative_to(root) for root in self._roots.folders)
         text = os.path.relpath(path, self._home) if inside else str(path)
         return text if text.startswith(("..", "/")) else f"./{text}"
 
     def shader(self, path: Path) -> str:
-        """The type's name of a shader file that may be read."""
         file = path.resolve()
         name = self.spelled(file)
         if name not in self.catalog:
@@ -63,18 +59,12 @@ class Plugins:
         return name
 
     def add(self, value: Value, folder: Path, roots: Roots) -> None:
-        """One entry of `plugins`.
-
-        Args:
-            value: the entry.
-            folder: the path it holds, joined to the folder of its file.
-            roots: where its file may read from.
-        """
+        """Add one entry of `plugins`; `folder` is its path joined to the folder of its file."""
         text = str(value.data)
         if (text, value.place) in self._told:
             return
         self._told.add((text, value.place))
-        if is_bare(text):
+        if is_name(text):
             self._package(value, text)
             return
         mistake = roots.mistake(folder, text, folder=True)
@@ -88,7 +78,6 @@ class Plugins:
             self._shaders(value, text, folder, roots)
 
     def _package(self, value: Value, name: str) -> None:
-        """A package that the pipeline needs; its node types come by its entry point."""
         if not re.match(_PACKAGE, name):  # what is said is typed into a shell
             self._say(value.problem("RG131", f"'{shown(name)}' is neither a folder of plugins nor a package's name"))
             return
@@ -123,5 +112,4 @@ class Plugins:
 
 
 def is_shader(text: object) -> bool:
-    """Whether a type's text is the path of a shader file."""
     return isinstance(text, str) and text.endswith(SHADERS)

@@ -1,18 +1,89 @@
-"""What a pipeline is after resolving: plain nodes with every value's origin."""
+"""What a pipeline is after resolving: plain nodes with every value's origin, and the same as YAML text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Value
+from rendergraph.document import Source, Value, scalar
 from rendergraph.errors import InputError, Place, Problem
-from rendergraph.resolve.write import to_yaml
+from rendergraph.resources import folder
 from rendergraph.settings import Roots
+
+_PLAIN = re.compile(r"[A-Za-z_./$][A-Za-z0-9_./$@ -]*(?<! )\Z")
+_WIDTH = 60
+
+
+def to_yaml(tree: Value, origins: bool) -> str:
+    lines = list(_block(tree, 0))
+    if not origins:
+        return "".join(f"{text}\n" for text, _ in lines)
+    width = max((len(text) for text, origin in lines if origin and len(text) <= _WIDTH), default=0)
+    return "".join(f"{text.ljust(width)}  # {_origin(origin)}\n" if origin else f"{text}\n" for text, origin in lines)
+
+
+def _block(value: Value, indent: int) -> Iterator[tuple[str, Value | None]]:
+    for key, child in value.items():
+        head = f"{'  ' * indent}{_text(key)}:"
+        if isinstance(child.data, dict) and child.data:
+            yield head, None
+            yield from _block(child, indent + 1)
+        else:
+            yield f"{head} {flow(child)}", child
+
+
+def flow(value: Value) -> str:
+    data = value.data
+    if isinstance(data, dict):
+        return "{" + ", ".join(f"{_text(key)}: {flow(child)}" for key, child in data.items()) + "}"
+    if isinstance(data, list):
+        return "[" + ", ".join(flow(child) for child in data) + "]"
+    return _text(data)
+
+
+def _text(data: Any) -> str:
+    if data is None:
+        return "null"
+    if isinstance(data, bool):
+        return "true" if data else "false"
+    if isinstance(data, float):
+        if math.isfinite(data):
+            return repr(data)
+        return ".nan" if math.isnan(data) else ".inf" if data > 0 else "-.inf"
+    if isinstance(data, int):
+        return str(data)
+    if _PLAIN.match(data) and scalar(data) == data:
+        return str(data)
+    return '"' + "".join(map(_escaped, data)) + '"'
+
+
+def _escaped(char: str) -> str:
+    if char in '"\\':
+        return f"\\{char}"
+    # YAML's own escapes, not JSON's, whose pairs of surrogates PyYAML does not join.
+    if char.isprintable():
+        return char
+    return f"\\u{ord(char):04X}" if ord(char) < 0x10000 else f"\\U{ord(char):08X}"
+
+
+def _origin(value: Value) -> str:
+    name = _short(value.source)
+    return f"{name}:{value.line}" if value.line else name
+
+
+def _short(source: Source) -> str:
+    """Name shipped files without their folder."""
+    shipped = folder("rendergraph.pipelines")
+    if source.path is not None and source.path.is_relative_to(shipped):
+        return source.path.stem
+    return str(source.origin)
+
 
 DEFAULT_SIZE = (1280, 720)
 """Width and height where nothing says otherwise."""
@@ -23,12 +94,11 @@ class NodeSpec(Struct, frozen=True, eq=False):
 
     Attributes:
         id: key in the file; inside a sub-pipeline `glow/blur`.
-        type: name of its type, empty where the file gives none.
-        scope: id of the sub-pipeline it stands in with a slash behind, empty outside of any.
-        inputs: links by input or group name; a null says that nothing is connected.
-        params: values by parameter name, `$name` replaced, nulls left out.
-        value: the node in the file.
-        disabled: the `false` that takes it out, its own or that of a sub-pipeline around it; None where there is none.
+        type: empty where the file gives none.
+        scope: id of the enclosing sub-pipeline with a slash behind, or empty.
+        inputs: links by input or group name; null disconnects.
+        params: values by name, `$name` replaced, nulls left out.
+        disabled: the `false` that removes it, its own or that of an enclosing sub-pipeline.
     """
 
     id: str
@@ -41,21 +111,11 @@ class NodeSpec(Struct, frozen=True, eq=False):
 
     @property
     def place(self) -> Place:
-        """Where the node's id stands."""
         return self.value.key_place
 
 
 class Scope(Struct, frozen=True, eq=False):
-    """A sub-pipeline in its place.
-
-    Attributes:
-        parent: the scope its node stands in.
-        inputs: its declared inputs.
-        links: what the node connects to them; refers to the parent scope.
-        outputs: its outputs; refers to nodes inside.
-        value: the node whose type it is.
-        disabled: the `false` that takes it out, as a node has it.
-    """
+    """A sub-pipeline in its place: its declared `inputs` and `outputs`, and the `links` that its node gives to them."""
 
     parent: str
     inputs: Mapping[str, Value]
@@ -66,8 +126,6 @@ class Scope(Struct, frozen=True, eq=False):
 
 
 class PipelineParameter(Struct, frozen=True):
-    """A knob of the whole pipeline."""
-
     name: str
     value: Any
     place: Place
@@ -80,24 +138,15 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     """A pipeline with `extends`, patches, settings, parameters and sub-pipelines applied.
 
     Attributes:
-        name: the file's stem.
-        path: the file, None for text.
-        description: from the file.
-        size: width and height.
-        scene: the scene's file, None where none is named.
         roots: where the scene may read from; `roots.check(path, place)`.
-        nodes: by id, in the file's order.
-        outputs: links by output name.
-        parameters: by name.
         scopes: sub-pipelines by scope (`glow/`).
-        tree: the resolved file, sub-pipelines in place of their names; prints as `to_yaml`.
-        notes: warnings: what was dropped, what is unused.
-        problems: mistakes found so far. `link` raises them together with its own, so that a user sees all at once.
+        tree: the resolved file, sub-pipelines in place of their names.
+        notes: warnings.
+        problems: mistakes found so far; `link` raises them with its own, so that a user sees all at once.
         dropped: paths of what was left out because of them.
-        removed: the `null` of each node that a file takes away from what it extends.
-        catalog: the node types, with the shader files that the pipeline brings along.
+        removed: the `null` of each node that a file removes from what it extends.
         missing: packages that it needs and that are not installed.
-        unrun: types whose Python stands in a folder that only a pipeline file names, and what `--plugin` takes for it.
+        unrun: types whose Python is in a folder that only a pipeline file names, and the argument `--plugin` needs.
     """
 
     name: str
@@ -120,32 +169,15 @@ class PipelineSpec(Struct, frozen=True, eq=False):
     unrun: Mapping[str, str] = {}
 
     def check(self) -> None:
-        """Stop here if anything is wrong so far; for callers that do not go on to `link`.
-
-        Raises:
-            InputError: with all mistakes found while resolving.
-        """
+        """Raise the problems found so far; for callers that do not go on to `link`."""
         if self.problems:
             raise InputError(self.problems)
 
     def plain(self) -> dict[str, Any]:
-        """The resolved file as plain data.
-
-        Raises:
-            InputError: something is wrong with it.
-        """
         self.check()
         data: dict[str, Any] = self.tree.plain()
         return data
 
     def to_yaml(self, origins: bool = False) -> str:
-        """The resolved file, which reads back to the same spec.
-
-        Args:
-            origins: say behind every value where it comes from.
-
-        Raises:
-            InputError: something is wrong with it.
-        """
         self.check()
         return to_yaml(self.tree, origins)

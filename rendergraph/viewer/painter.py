@@ -22,8 +22,7 @@ from rendergraph.compile import Executable
 from rendergraph.document import Source, from_plain
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 from rendergraph.metrics import measure
-from rendergraph.resolve.merge import diff
-from rendergraph.resolve.write import to_yaml
+from rendergraph.resolve import diff, to_yaml
 from rendergraph.scene.cameras import bounding_sphere
 from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rendergraph.document import Document, YamlLimits, load, parse
-from rendergraph.document import events as events_module
+from rendergraph.document import Document, YamlLimits, load, parse, parsing
 from rendergraph.errors import InputError, Place, Problem
 
 TEXT = """\
@@ -31,7 +30,7 @@ def _parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     if request.param == "python":
         from yaml import SafeLoader
 
-        monkeypatch.setattr(events_module, "_parser", SafeLoader)
+        monkeypatch.setattr(parsing, "_parser", SafeLoader)
 
 
 @pytest.mark.usefixtures("_parser")

@@ -406,7 +406,7 @@ values = st.recursive(scalars, lambda inner: st.lists(inner) | st.dictionaries(n
 @given(values)
 @settings(max_examples=300, deadline=None)
 def test_any_value_is_written_so_that_it_reads_back(value: Any) -> None:
-    from rendergraph.resolve.write import to_yaml
+    from rendergraph.resolve.spec import to_yaml
 
     tree = from_plain({"params": {"x": value}}, Source("here"))
     try:

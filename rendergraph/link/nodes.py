@@ -1,16 +1,16 @@
-"""References to ports: `node.port`, `node`, `inputs.x`, a sub-pipeline's output, `@previous`."""
+"""Nodes while they are being linked, and those taken out: disabled, or in need of an environment that is missing."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
 from rendergraph.catalog import NodeType
-from rendergraph.declare import InOut, Input, Node, Port
+from rendergraph.declare import Function, InOut, Input, Node, Port, WrittenPort
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
@@ -21,14 +21,8 @@ _ID = NAME.pattern.removesuffix(r"\Z")
 _LINK = re.compile(rf"({_ID}(?:/{_ID})*)(?:\.({_ID}))?(@previous)?\Z")
 
 
-class Crossing(Struct, frozen=True, eq=False):
-    """An input of a sub-pipeline that a link passes through.
-
-    Attributes:
-        name: `glow.radiance`.
-        semantic: what it is declared to take, None where nothing is said.
-        given: the link outside.
-    """
+class SubgraphInput(Struct, frozen=True, eq=False):
+    """An input of a sub-pipeline that a link passes through: `glow.radiance`, its semantic, and the outer link."""
 
     name: str
     semantic: str | None
@@ -36,32 +30,21 @@ class Crossing(Struct, frozen=True, eq=False):
 
 
 class Link(Struct, frozen=True, eq=False, gc=False):
-    """One link as it was written, with what it leads to.
-
-    Attributes:
-        source: the port it reads.
-        value: where it is written.
-        declared: the sub-pipeline inputs it passes through, whose semantics it has to have.
-    """
+    """One link as it was written, the port it leads to, and the sub-pipeline inputs it passes through."""
 
     source: Endpoint
     value: Value
-    declared: tuple[Crossing, ...] = ()
+    declared: tuple[SubgraphInput, ...] = ()
 
 
-class Draft(Struct, eq=False):
+class UnlinkedNode(Struct, eq=False):
     """A node with its type, while it is being linked.
 
     Attributes:
-        spec: from the file.
-        type: its type.
         node: the instance; defaults stand in for parameters that are wrong.
-        ports: every port by name.
-        inputs: the ports that take links.
-        links: by input, what is connected.
-        failed: inputs whose link is wrong, so that nobody says they lack one.
-        lost: inputs that lack a link because it leads to a node that is out and that nothing stands in for.
-        choices: parameters whose value a plugin brings.
+        failed: inputs whose link is wrong, so that they are not reported as unconnected.
+        lost_links: links of inputs that lead to a removed node for which nothing stands in.
+        choices: parameters whose value a plugin provides, with its include.
         unlit: it needs an environment, and neither the file nor the scene has one.
     """
 
@@ -73,32 +56,25 @@ class Draft(Struct, eq=False):
     links: dict[str, list[Link]]
     failed: set[str]
     choices: Mapping[str, Path]
-    lost: dict[str, Link] = field(default_factory=dict)
+    lost_links: dict[str, Link] = field(default_factory=dict)
     unlit: bool = False
 
     @property
-    def out(self) -> bool:
-        """Whether it is no node of the graph: disabled, or without the environment that it needs."""
+    def is_removed(self) -> bool:
         return self.unlit or self.spec.disabled is not None
 
 
 class References:
-    """Follows references through sub-pipelines to ports."""
-
     def __init__(self, spec: PipelineSpec, types: Mapping[str, NodeType]) -> None:
         self.spec = spec
         self.types = types
 
     def follow(self, scope: str, value: Value, wanted: str) -> Link | None:
-        """The port a reference leads to.
+        """Return the link to the port that a reference names; None for an optional sub-pipeline input without a link.
 
         Args:
-            scope: the sub-pipeline it stands in.
-            value: the reference.
+            scope: the sub-pipeline that contains the reference.
             wanted: the port that a node's id alone stands for.
-
-        Returns:
-            None where it leads to an optional input of a sub-pipeline that is not connected.
 
         Raises:
             InputError: it leads nowhere; without problems where the reason has been reported.
@@ -115,7 +91,6 @@ class References:
         return found if source is found.source and value is found.value else replace(found, source=source, value=value)
 
     def outputs_of(self, scope: str, name: str) -> list[str]:
-        """What a node or sub-pipeline of a scope offers, empty where it is unknown."""
         inner = self.spec.scopes.get(f"{scope}{name}/")
         if inner is not None:
             return list(inner.outputs)
@@ -123,18 +98,16 @@ class References:
         return list(node_type.cls.outputs()) if node_type is not None else []
 
     def is_known(self, scope: str, name: str) -> bool:
-        """Whether a scope has a node or sub-pipeline of that name."""
         return f"{scope}{name}" in self.spec.nodes or f"{scope}{name}/" in self.spec.scopes
 
     def no_node(self, scope: str, name: str, value: Value) -> Problem:
-        """What is said of a link to nobody: who took the node away, or who else may be meant."""
         hint = suggestion(name, self.nodes_of(scope))
         if not scope and (removed := self.spec.removed.get(name)) is not None:
             hint = f", {line_of(removed.key_place, value.place)} removes it; link to another node here, or to null"
         return value.problem("RG109", f"there is no node '{name}'{hint}")
 
     def nodes_of(self, scope: str) -> list[str]:
-        """Names that can be linked to in a scope, not all of very many: the nearest is searched among them."""
+        """Names that can be linked to in a scope, at most 500: the nearest name is searched among them."""
         names = [node.id for node in self.spec.nodes.values() if node.scope == scope]
         names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
         return [name.removeprefix(scope) for name in names[:500]] + (["inputs"] if scope else [])
@@ -166,7 +139,6 @@ class References:
         return Link(Endpoint(node.id, port or wanted), value)
 
     def _outside(self, scope: str, port: str, value: Value, depth: int) -> Link | None:
-        """The link from outside that `inputs.x` stands for."""
         found = self.spec.scopes[scope]
         if port not in found.inputs:
             text = f"the sub-pipeline has no input '{port}'{suggestion(port, found.inputs)}"
@@ -185,11 +157,10 @@ class References:
         if link is None:
             return None
         source = _last(link.source) if match[3] else link.source
-        crossing = Crossing(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
-        return replace(link, source=source, declared=(*link.declared, crossing))
+        entered = SubgraphInput(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
+        return replace(link, source=source, declared=(*link.declared, entered))
 
     def _inside(self, scope: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
-        """The port inside that a sub-pipeline's output stands for."""
         outputs = self.spec.scopes[scope].outputs
         inner = outputs.get(port or wanted)
         if inner is None:
@@ -222,7 +193,97 @@ def _last(source: Endpoint) -> Endpoint:
 
 
 def line_of(place: Place, here: Place) -> str:
-    """A place for a message that already names a file: its line, with the file where that is another one."""
+    """Name a place in a message about another place: its line, and its file only where that differs."""
     if not place.line:
         return str(place.origin)
     return f"line {place.line}" if place.origin == here.origin else f"{place.origin}:{place.line}"
+
+
+def mark_without_environment(nodes: Mapping[str, UnlinkedNode]) -> None:
+    """Mark nodes that need an environment which neither another node nor the scene provides."""
+    waiting = list(nodes.values())
+    while waiting:
+        without = [draft for draft in waiting if not draft.is_removed and _lacks_environment(draft, nodes)]
+        for draft in without:
+            draft.unlit = True
+        waiting = waiting if without else []
+
+
+def _lacks_environment(draft: UnlinkedNode, nodes: Mapping[str, UnlinkedNode]) -> bool:
+    return any(
+        isinstance(port, Input)
+        and port.takes_scene
+        and not port.optional
+        and name not in draft.failed
+        and all(nodes[link.source.node].is_removed for link in draft.links[name])
+        for name, port in draft.inputs.items()
+    )
+
+
+def remove_disabled(nodes: Mapping[str, UnlinkedNode], references: References) -> dict[str, UnlinkedNode]:
+    """Return the remaining nodes with their links bypassing the removed ones."""
+    enabled = {name: draft for name, draft in nodes.items() if not draft.is_removed}
+    for draft in enabled.values() if len(enabled) < len(nodes) else ():
+        for name, links in draft.links.items():
+            led = [bypass(link, nodes, references) for link in links]
+            draft.links[name] = [link for link in led if link.source.node in enabled]
+            if gone := [link for link in led if link.source.node not in enabled]:
+                draft.lost_links[name] = gone[0]
+    return enabled
+
+
+def bypass(link: Link, nodes: Mapping[str, UnlinkedNode], references: References) -> Link:
+    """Lead a link past removed nodes; it still ends at one where no input can stand in for the output."""
+    seen = set()
+    while (draft := nodes[link.source.node]).is_removed and link.source.now not in seen:
+        seen.add(link.source.now)
+        into = next(_stand_ins(draft, link.source.port, references), None)
+        if into is None:
+            break
+        source = into.source._replace(previous=into.source.previous or link.source.previous)
+        link = replace(link, source=source, declared=(*link.declared, *into.declared))
+    return link
+
+
+def missing_source(user: str, link: Link, nodes: Mapping[str, UnlinkedNode]) -> Problem:
+    """The problem of a `user` (`'display.radiance' needs 'light.radiance'`) that needs a removed node."""
+    value = nodes[link.source.node].spec.disabled
+    if value is None:
+        text = f"{user}, but '{link.source.node}' is left out: the scene has no environment"
+        return link.value.problem("RG132", f"{text}; give it one (--environment), or link another node here")
+    where = line_of(value.place, link.value.place)
+    text = f"{user}, but '{link.source.node}' is disabled ({where}) and nothing that goes into it can stand in"
+    return link.value.problem("RG132", f"{text}; enable it, or link another node here")
+
+
+def _stand_ins(draft: UnlinkedNode, port: str, references: References) -> Iterator[Link]:
+    """Links that may stand in for an output: the node's own, then those of disabled sub-pipelines around it."""
+    made = _meaning(draft, draft.ports[port])
+    meaning = made.signature if isinstance(made, Function) else getattr(made, "semantic", None)
+    like = [made.name] if made.name in draft.inputs else []
+    kind = getattr(made, "kind", "function")
+    same = [name for name, one in draft.inputs.items() if one.kind == kind and meaning and one.semantic == meaning]
+    yield from _single_links(draft.links[name] for name in [*like, *same])
+    scope = draft.spec.scope
+    while scope and (found := references.spec.scopes[scope]).disabled is not None:
+        for name, declared in found.inputs.items():
+            if meaning is not None and word(declared, "semantic") == meaning.name:
+                try:
+                    link = references.follow(scope, declared.with_data(f"inputs.{name}"), name)
+                except InputError:  # reported at the node
+                    continue
+                yield from [link] if link is not None else []
+        scope = found.parent
+
+
+def _meaning(draft: UnlinkedNode, port: Port) -> Port:
+    """Follow `like` to the port that defines the semantic."""
+    while isinstance(port, WrittenPort) and not isinstance(port, InOut) and port.semantic is None and port.like:
+        port = draft.ports[port.like]
+    return port
+
+
+def _single_links(inputs: Iterable[list[Link]]) -> Iterator[Link]:
+    """Links that are their input's only one; those to last frame's values last."""
+    found = [links[0] for links in inputs if len(links) == 1]
+    yield from sorted(found, key=lambda link: link.source.previous)

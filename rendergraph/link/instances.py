@@ -1,25 +1,28 @@
-"""Parameter values to a node's instance, and what is wrong with them in words a user knows."""
+"""A node's instance from its parameter values, and stand-ins for node types that are missing."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
-from rendergraph.catalog import NodeType
-from rendergraph.declare import Extensions, Node, Parameter
+from rendergraph.catalog import Catalog, NodeType
+from rendergraph.declare import Extensions, Input, Node, Output, Parameter
 from rendergraph.declare.blame import happened
 from rendergraph.document import Value, said, shown
-from rendergraph.errors import InputError, Problem, is_interruption, node_named, suggestion
+from rendergraph.errors import InputError, Problem, is_interruption, nearest, node_named, shown_file, suggestion
 from rendergraph.glsl.source import needs, needs_place
 from rendergraph.keys import MOST_PROBLEMS
-from rendergraph.resolve import NodeSpec
+from rendergraph.resolve import NodeSpec, PipelineSpec
+from rendergraph.settings import nearest as nearest_settings
+from rendergraph.textures import Any as AnyTexture
 
 
 def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
-    """The node with its parameter values, defaults for those that are wrong, and what is wrong."""
+    """Return the node, with defaults for parameters that are wrong, and the problems."""
     cls, parameters = node_type.cls, node_type.cls.parameters()
     unknown = [name for name in spec.params if name not in parameters]
     problems = [_unknown(spec.params[name], name, node_type) for name in unknown[:MOST_PROBLEMS]]
@@ -39,7 +42,6 @@ def instance(spec: NodeSpec, node_type: NodeType) -> tuple[Node, list[Problem]]:
 def _unfit(
     spec: NodeSpec, parameters: Mapping[str, Parameter], values: Mapping[str, Any]
 ) -> Iterator[tuple[str, Problem]]:
-    """The values that their parameters do not take."""
     for name, plain in values.items():
         value = spec.params[name]
         try:
@@ -52,7 +54,7 @@ def _unfit(
 
 
 def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], error: BaseException) -> Problem:
-    """What a node's own check says; at the value without which it would say nothing, where there is one such."""
+    """Report a node's own check at the value without which it passes, if there is exactly one."""
     who = node_named(spec.id, node_type.name)
     if not isinstance(error, ValueError):
         problem = happened(error, node_type.cls)
@@ -72,10 +74,7 @@ def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], err
 def choice_files(
     spec: NodeSpec, node_type: NodeType, node: Node, extensions: Extensions
 ) -> tuple[dict[str, Path], list[Problem]]:
-    """The includes of the parameters that plugins add choices to, the node's own choices and theirs alike.
-
-    Plugins are asked for words that the node does not know, and for no others.
-    """
+    """Return the includes of extensible choices; plugins are imported only for words that the node does not know."""
     found: dict[str, Path] = {}
     problems: list[Problem] = []
     for name, parameter in node.parameters().items():
@@ -103,7 +102,6 @@ def choice_files(
 
 
 def _unmet(parameter: Parameter, file: Path) -> list[Problem]:
-    """What the include of a choice needs and its parameter does not offer."""
     text = "'{}' offers no '{}' to need{}"
     return [
         Problem("RG495", text.format(parameter.name, need, suggestion(need, parameter.needs)), *needs_place(file))
@@ -119,3 +117,63 @@ def _unknown(value: Value, name: str, node_type: NodeType) -> Problem:
     else:
         hint = suggestion(name, cls.parameters()) if cls.parameters() else "; it takes none"
     return value.problem("RG103", f"node type '{node_type.name}' has no param '{shown(name)}'{hint}", key=True)
+
+
+_LINK = re.compile(r"([^.@]+)(?:\.([^.@]+))?(?:@previous)?\Z")
+
+
+def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
+    if name in spec.unrun:
+        return f"node type '{name}' is Python, which no pipeline file runs; say --plugin {spec.unrun[name]}"
+    text = f"there is no node type '{shown(name)}'"
+    near = nearest(name, catalog.names())
+    if near is not None:
+        text += f"; did you mean '{near}'?"
+    if spec.missing:
+        return f"{text}; it may come with what is not installed: {', '.join(spec.missing)}"
+    project = nearest_settings(spec.path.parent) if spec.path is not None else None
+    if project is not None and project.plugins and not Path.cwd().resolve().is_relative_to(project.folder):
+        return f"{text}; {shown_file(project.file)} names plugins, but only for those who stand in its folder"
+    if near is not None:
+        return text
+    return f"{text}; install the plugin that brings it, or name its file: --plugin; explain RG102 has all ways"
+
+
+def stand_in(spec: PipelineSpec, node: NodeSpec) -> NodeType:
+    """Return a type with all inputs and outputs that the file uses; it can be shown, not run."""
+    taken = {name: Input(AnyTexture, optional=True, many=_is_list(value)) for name, value in node.inputs.items()}
+    made = {name: Output(AnyTexture) for name in _asked_of(spec, node.id)}
+    ports = {name: port for name, port in {**taken, **made}.items() if not hasattr(Node, name)}
+    params = {
+        name: Parameter("structural", None, type=Any)
+        for name in node.params
+        if name.isidentifier() and not name.startswith("_") and not hasattr(Node, name) and name not in ports
+    }
+    about = {"__module__": __name__, "__doc__": "A node of unknown type."}
+    cls = type("Unknown", (Node,), {**about, **ports, **params})
+    return NodeType(node.type, "", cls, Path(), Path(), "", missing=True)
+
+
+def _is_list(value: Value) -> bool:
+    return isinstance(value.data, list)
+
+
+def _asked_of(spec: PipelineSpec, wanted: str) -> list[str]:
+    found: dict[str, None] = {}
+    for scope, name, value in _links(spec):
+        for part in value.data if isinstance(value.data, list) else [value]:
+            match = _LINK.match(part.data) if isinstance(part.data, str) else None
+            if match is not None and f"{scope}{match[1]}" == wanted:
+                found[match[2] or name] = None
+    return list(found)
+
+
+def _links(spec: PipelineSpec) -> Iterator[tuple[str, str, Value]]:
+    """Everything that may name a port: the scope that contains it, the port it is for, the value."""
+    tables: list[tuple[str, Mapping[str, Value]]] = [("", spec.outputs)]
+    tables += [(node.scope, node.inputs) for node in spec.nodes.values()]
+    for scope, inner in spec.scopes.items():
+        tables += [(inner.parent, inner.links), (scope, inner.outputs)]
+    for scope, table in tables:
+        for name, value in table.items():
+            yield scope, name, value

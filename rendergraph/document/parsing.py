@@ -1,15 +1,56 @@
-"""PyYAML's parse events to values, under budgets, with its complaints in words a user knows."""
+"""YAML text to values: PyYAML's parse events, read by YAML 1.2's core schema, under budgets."""
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
 from msgspec import Struct
 
-from rendergraph.document.scalars import scalar
 from rendergraph.document.values import BROKEN, Broken, Document, Scalar, Source, Value, kind_of, shown
 from rendergraph.errors import InputError, Place, Problem
+
+_NULL = frozenset(["", "~", "null", "Null", "NULL"])
+_BOOL = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_INT = re.compile(r"[-+]?[0-9]+\Z")
+_BASED = re.compile(r"0o[0-7]+\Z|0x[0-9a-fA-F]+\Z")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
+# Few values begin like a number and are none: this is compiled where one does.
+_SPECIAL = r"([-+]?)\.(?:inf|Inf|INF)\Z|\.(?:nan|NaN|NAN)\Z"
+_MOST_WHOLE = 2**63
+
+
+def scalar(text: str) -> Scalar:
+    """Return the value of a plain scalar in YAML 1.2's core schema."""
+    if text in _NULL:
+        return None
+    if text in _BOOL:
+        return _BOOL[text]
+    if text[0] not in "+-.0123456789":
+        return text
+    if _INT.match(text):
+        return _whole(text, 10)
+    if _BASED.match(text):
+        return _whole(text[2:], 8 if text[1] == "o" else 16)
+    if _FLOAT.match(text):
+        number = float(text)
+        if math.isinf(number):
+            raise ValueError("the number is too large; infinity is written .inf")
+        return number
+    special = re.match(_SPECIAL, text)
+    if special is None:
+        return text
+    if special[1] is None:
+        return math.nan
+    return -math.inf if special[1] == "-" else math.inf
+
+
+def _whole(digits: str, base: int) -> int:
+    number = int(digits, base) if len(digits) < 100 else _MOST_WHOLE
+    if not -_MOST_WHOLE <= number < _MOST_WHOLE:
+        raise ValueError("the whole number needs more than 64 bits; write a smaller one, or one with a point")
+    return number
 
 
 class YamlLimits(Struct, frozen=True):
@@ -39,13 +80,10 @@ _UNITS = {
 
 
 def over_limit(what: str, limit: int) -> str:
-    """What to say about a text that passes one of its `YamlLimits`."""
     return f"the text {_UNITS[what].format(f'more than {limit:,}')}; --limit yaml-{what}=N allows more"
 
 
 class _Builder:
-    """Values from parse events; holds what several events share."""
-
     def __init__(self, source: Source, limits: YamlLimits) -> None:
         self.source = source
         self.limits = limits
@@ -102,7 +140,7 @@ class _Builder:
         return value
 
     def entry(self, parser: Any, event: Any, depth: int, into: dict[Any, Value]) -> bool:
-        """Add one key with its value; false where nobody can say what the mapping would hold."""
+        """Add one key with its value; return false where the contents of the mapping cannot be known."""
         mark = event.start_mark
         merge = getattr(event, "value", None) == "<<" and event.implicit[0]
         name = self.build(parser, event, depth).data
@@ -149,17 +187,7 @@ class _Builder:
 
 
 def build(text: str, source: Source, limits: YamlLimits, keep_going: bool) -> Document:
-    """The values of a text.
-
-    Args:
-        text: without a byte order mark.
-        source: where it stands.
-        limits: budgets.
-        keep_going: leave mistakes that do not stop the reading to the caller.
-
-    Raises:
-        InputError: it is no YAML of ours.
-    """
+    """Return the values of a text without a byte order mark."""
     import yaml  # loaded with the first file
 
     if len(text) > limits.bytes or len(text.encode("utf-8", "surrogatepass")) > limits.bytes:
@@ -204,7 +232,7 @@ def _parser(text: str) -> object:
 
 
 def _syntax(source: Source, error: Any) -> Problem:
-    """PyYAML's complaint in our words: its own name tokens, differ between its two parsers, and point at the end."""
+    """Reword PyYAML's message, which names tokens, differs between its two parsers, and points at the end."""
     mark = error.problem_mark or error.context_mark
     problem, context = error.problem or "", error.context or ""
     line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)

@@ -1,0 +1,328 @@
+"""Merge patches: of YAML values, of a pipeline whose nodes change their types, and of `--set` options."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from typing import Any
+
+from msgspec import Struct
+
+from rendergraph.document import Source, Value, from_plain, parse, shown
+from rendergraph.errors import InputError, Option, Place, Problem, UsageError, nearest, suggestion
+from rendergraph.read import entries, word
+
+
+class TypeNames(Struct, frozen=True):
+    """The parameters and ports of a node type, as far as merging asks; `optional` inputs need no link."""
+
+    params: frozenset[str]
+    inputs: frozenset[str]
+    groups: Mapping[str, tuple[str, ...]]
+    optional: frozenset[str]
+    outputs: frozenset[str]
+
+
+NamesOf = Callable[[Value], TypeNames | None]
+"""From the value of `type` to what it takes, None where there is no such type."""
+
+
+def merge_patch(target: Value | None, patch: Value) -> Value:
+    """RFC 7386: mappings merge, null removes, everything else replaces; each value keeps its own place."""
+    if not isinstance(patch.data, dict):
+        return patch
+    merged: dict[str, Value] = {}
+    if target is not None and isinstance(target.data, dict):
+        merged.update(target.data)
+    for key, value in patch.data.items():
+        if value.data is None:
+            merged.pop(key, None)
+        else:
+            merged[key] = merge_patch(merged.get(key), value)
+    return patch.with_data(merged)
+
+
+def diff(old: Any, new: Any) -> Any:
+    """Return the merge patch that turns `old` into `new`, both plain data without nulls; `{}` where they are equal."""
+    if not isinstance(old, dict) or not isinstance(new, dict):
+        return new
+    patch: dict[str, Any] = {key: None for key in old if key not in new}
+    for key, value in new.items():
+        if key not in old:
+            patch[key] = value
+        elif old[key] != value or type(old[key]) is not type(value):
+            patch[key] = diff(old[key], value)
+    return patch
+
+
+def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Value, list[Problem]]:
+    """Apply a patch; return the result and notes of what was dropped.
+
+    A node that changes its type loses inherited parameters and inputs that the new type lacks, and optional inputs of
+    others lose inherited links to outputs that it lacks. What the patch itself writes or removes is not touched.
+    """
+    notes: list[Problem] = []
+    old_nodes, new_nodes = entries(target, "nodes"), entries(patch, "nodes")
+    kept = dict(old_nodes)
+    disconnected: dict[str, dict[str, Value]] = {}
+    fed: list[tuple[str, Value, Value, frozenset[str]]] = []
+    for name, change in new_nodes.items():
+        node = old_nodes.get(name)
+        if node is None:
+            continue
+        new_type = change.get("type")
+        retyped = new_type is not None and new_type.data is not None and _differ(node.get("type"), new_type)
+        if retyped and new_type is not None and (names := names_of(new_type)):
+            kept[name] = _drop(name, node, change, new_type, names, notes)
+            fed.append((name, node, new_type, names.outputs))
+        elif not retyped and (names := names_of(node.get("type") or node)) and names.groups:
+            inputs = change.get("inputs")
+            disconnected[name] = {
+                key: link
+                for key, link in (inputs.items() if inputs is not None else ())
+                if link.data is None and any(key in members for members in names.groups.values())
+            }
+    for name, node, new_type, outputs in fed:
+        before = names_of(node.get("type") or node)
+        lost = before.outputs - outputs if before is not None else frozenset[str]()
+        for other, key, port in _unlinked(name, lost, kept, new_nodes, names_of):
+            text = f"node '{name}' is now '{word(new_type) or 'the new type'}', which has no output '{port}' of "
+            text += f"'{word(node, 'type')}'; '{other}.{key}' does without"
+            notes.append(_note(new_type, text))
+    if "nodes" in (target.data if isinstance(target.data, dict) else {}):
+        nodes = target.get("nodes")
+        assert nodes is not None
+        target = target.with_data({**_mapping(target), "nodes": nodes.with_data(kept)})
+    merged = merge_patch(target, patch)
+    # Merging takes a null away, but beside a group it still has to say that this one member is not connected.
+    for name, links in disconnected.items():
+        present = merged.get("nodes", name, "inputs")
+        if links and present is not None:
+            _mapping(present).update(links)
+    return merged, notes
+
+
+def _mapping(value: Value) -> dict[str, Value]:
+    return value.data if isinstance(value.data, dict) else {}
+
+
+def _differ(old: Value | None, new: Value) -> bool:
+    if old is None:
+        return False
+    if isinstance(old.data, str) and isinstance(new.data, str):
+        return old.data != new.data
+    return True
+
+
+def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNames, notes: list[Problem]) -> Value:
+    parts = dict(_mapping(node))
+    old, new = word(node, "type"), word(new_type) or "the new type"
+    for part, known in (("params", names.params), ("inputs", names.inputs)):
+        inherited = entries(node, part)
+        written = change.get(part)
+        own = _mapping(written) if written is not None else {}
+        lost = [key for key in inherited if key not in known and key not in own]
+        if part in parts and lost:
+            parts[part] = parts[part].with_data({key: value for key, value in inherited.items() if key not in lost})
+            word_for = part.removesuffix("s") if len(lost) == 1 else part
+            listed = ", ".join(f"'{key}'" for key in lost)
+            text = f"node '{name}' is now '{new}', which has no {word_for} {listed} of '{old}'; dropped"
+            notes.append(_note(new_type, text))
+    return node.with_data(parts)
+
+
+def _note(new_type: Value, text: str) -> Problem:
+    return new_type.problem("RG150", text).as_warning()
+
+
+def _unlinked(
+    name: str, lost: Set[str], nodes: dict[str, Value], patch: Mapping[str, Value], names_of: NamesOf
+) -> Iterator[tuple[str, str, str]]:
+    """Remove inherited links to a node's lost outputs from optional inputs; yield node, input and output of each."""
+    for other, node in list(nodes.items()) if lost else ():
+        change = patch.get(other)
+        own = _mapping(change.get("inputs") or change) if change is not None else {}
+        for key, link in entries(node, "inputs").items():
+            parts = link.data if isinstance(link.data, list) else [link]
+            left = [part for part in parts if _port_of(name, key, part) not in lost]
+            if key in own or len(left) == len(parts):
+                continue
+            names = names_of((change.get("type") if change is not None else None) or node.get("type") or node)
+            inputs = nodes[other].get("inputs")
+            if names is None or key not in names.optional or inputs is None:
+                continue
+            rest = {name: value for name, value in _mapping(inputs).items() if name != key}
+            rest |= {key: link.with_data(left)} if left else {}
+            nodes[other] = nodes[other].with_data({**_mapping(nodes[other]), "inputs": inputs.with_data(rest)})
+            for port in sorted({str(_port_of(name, key, part)) for part in parts} & lost):
+                yield other, key, port
+
+
+def _port_of(node: str, key: str, link: Value) -> str | None:
+    source, _, port = str(link.data).partition("@")[0].partition(".")
+    return (port or key) if source == node else None
+
+
+_ID = "[A-Za-z_][A-Za-z0-9_-]*"
+_PATH = rf"((?:{_ID}/)*)(?:({_ID})\.)?({_ID})\Z"
+
+
+class Setting(Struct, frozen=True):
+    """One assignment: the path as typed, the sub-pipelines it descends into, a node or None, a name, a value."""
+
+    scope: tuple[str, ...]
+    node: str | None
+    name: str
+    value: Value
+    text: str
+
+    def problem(self, code: str, text: str) -> Problem:
+        return self.value.problem(code, text)
+
+
+def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
+    """Parse assignments: `PATH=VALUE` texts, or a mapping of paths to values."""
+    problems: list[Problem] = []
+    found: list[Setting] = []
+    given = sets.items() if isinstance(sets, Mapping) else (_split(text) for text in sets)
+    for path, raw in given:
+        is_text = not isinstance(sets, Mapping)
+        source = Source(Option("--set", f"{path}={raw}" if is_text and raw is not None else path))
+        match = re.match(_PATH, path)
+        if raw is None and is_text:
+            problems.append(source.problem("RG120", "a setting is written PATH=VALUE, as in light.ambient=0.1"))
+        elif match is None or (match[1] and match[2] is None):
+            words = "NODE.PARAM, NODE.INPUT, NODE.type, NODE.enabled or the NAME of a parameter"
+            problems.append(source.problem("RG120", f"'{shown(path)}' is no path; write {words}"))
+        else:
+            try:
+                value = _value(str(raw), source) if is_text else from_plain(raw, source)
+            except InputError as error:
+                problems += [problem.relocate(Place(source.origin), code="RG120") for problem in error.problems]
+            else:
+                scope = tuple(match[1].split("/")[:-1])
+                found.append(Setting(scope, match[2], match[3], value, path))
+    if problems:
+        raise UsageError(problems)
+    return found
+
+
+def _split(text: str) -> tuple[str, str | None]:
+    path, equals, raw = text.partition("=")
+    return path.strip(), raw if equals else None
+
+
+def _value(text: str, source: Source) -> Value:
+    if text.lstrip().startswith("#"):
+        return Value(text, source)  # a colour, most likely; YAML would see a comment
+    return _moved(parse(text, source.origin).root, source)
+
+
+def _moved(value: Value, source: Source) -> Value:
+    data = value.data
+    if isinstance(data, dict):
+        data = {key: _moved(child, source) for key, child in data.items()}
+    elif isinstance(data, list):
+        data = [_moved(child, source) for child in data]
+    return Value(data, source)
+
+
+def patch_of(tree: Value, wanted: Sequence[Setting], names_of: NamesOf) -> tuple[Value | None, list[Problem]]:
+    """Return the patch of assignments without a scope, types first, and problems with them."""
+    if not wanted:
+        return None, []
+    problems: list[Problem] = []
+    root = Value({}, wanted[0].value.source)
+    nodes = entries(tree, "nodes")
+    parameters = entries(tree, "parameters")
+    types: dict[str, Value] = {}
+    known = []
+    for setting in wanted:
+        if setting.node is None:
+            if setting.name in parameters:
+                _put(root, setting.value, "parameters", setting.name, "default")
+            else:
+                problems.append(_no_parameter(setting, parameters, nodes, names_of))
+        elif setting.node not in nodes:
+            text = f"there is no node '{setting.node}'{suggestion(setting.node, nodes)}"
+            problems.append(setting.problem("RG109", text))
+        elif setting.name == "type":
+            if isinstance(setting.value.data, str):
+                types[setting.node] = setting.value
+                _put(root, setting.value, "nodes", setting.node, "type")
+            else:
+                text = f"'{setting.text}': expected the name of a node type, got {setting.value.kind}"
+                problems.append(setting.problem("RG106", text))
+        elif setting.name == "enabled":
+            if isinstance(setting.value.data, bool | None):
+                _put(root, setting.value, "nodes", setting.node, "enabled")
+            else:
+                text = f"'{setting.text}': expected true or false, got {setting.value.kind}"
+                problems.append(setting.problem("RG106", text))
+        else:
+            known.append(setting)
+    for setting in known:
+        assert setting.node is not None
+        node = nodes[setting.node]
+        new_type = types.get(setting.node) or node.get("type")
+        names = names_of(new_type) if new_type is not None else None
+        if names is None:
+            continue  # a type that does not exist is said once, at the type
+        part = _part(setting, names)
+        if part is None:
+            choices = sorted(names.params | names.inputs)
+            word = new_type.data if new_type is not None and isinstance(new_type.data, str) else "sub-pipeline"
+            text = f"node '{setting.node}' ({word}) has no param or input '{setting.name}'"
+            problems.append(setting.problem("RG103", text + suggestion(setting.name, choices)))
+        elif part == "inputs" and not _is_link(setting.value):
+            text = f"'{setting.text}' takes a link as in 'node.port', a list of links, or null"
+            problems.append(setting.problem("RG106", text))
+        else:
+            _put(root, setting.value, "nodes", setting.node, part, setting.name)
+    return root, problems
+
+
+def _part(setting: Setting, names: TypeNames) -> str | None:
+    if setting.name in names.params:
+        return "params"
+    return "inputs" if setting.name in names.inputs else None
+
+
+def _is_link(value: Value) -> bool:
+    parts = value.data if isinstance(value.data, list) else [value]
+    return all(isinstance(part.data, str) for part in parts) or value.data is None
+
+
+def _no_parameter(
+    setting: Setting, parameters: Mapping[str, Value], nodes: Mapping[str, Value], names_of: NamesOf
+) -> Problem:
+    text = f"the pipeline has no parameter '{setting.name}'"
+    if setting.name in ("size", "scene"):
+        text += f"; --{setting.name} sets the {setting.name}"
+    elif setting.name in nodes:
+        text += f"; to set one of node '{setting.name}', write {setting.name}.PARAM=VALUE"
+    elif nearest(setting.name, parameters) is None and (meant := _of_nodes(setting.name, nodes, names_of)):
+        text += f"; did you mean {' or '.join(meant)}?"
+    else:
+        text += suggestion(setting.name, parameters)
+    return setting.problem("RG119", text)
+
+
+def _of_nodes(name: str, nodes: Mapping[str, Value], names_of: NamesOf) -> list[str]:
+    known: dict[str, list[str]] = {}
+    for node, value in nodes.items():
+        of_type = value.get("type")
+        names = names_of(of_type) if of_type is not None else None
+        for parameter in sorted(names.params) if names else ():
+            known.setdefault(parameter, []).append(f"'{node}.{parameter}'")
+    near = nearest(name, known)
+    return known[near] if near else []
+
+
+def _put(root: Value, value: Value, *path: str) -> None:
+    found = root
+    for step in path[:-1]:
+        assert isinstance(found.data, dict)
+        found = found.data.setdefault(step, Value({}, value.source))
+    assert isinstance(found.data, dict)
+    found.data[path[-1]] = value
