@@ -41,6 +41,7 @@ def apart(occlusion: Occlusion) -> Occlusion:
     return difference
 
 
+@pytest.mark.nightly(keep=2)
 @TECHNIQUES
 def test_edges_and_contacts_are_those_of_the_whole_size(apart: Occlusion, technique: str) -> None:
     """Posts two texels wide, silhouettes before others and before nothing, corners: no halo, nothing leaks."""

@@ -66,6 +66,7 @@ def test_strips_with_few_samples_are_nearer_than_many_discs(
     assert rmse < errors(occlusion, shared, "disc", case, radius, samples=64, form="disc")[1]
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("case", "radius"), CASES)
 def test_more_samples_are_nearer(occlusion: Occlusion, shared: Path, case: str, radius: float) -> None:
     def falling(technique: str, **params: Any) -> list[float]:
@@ -103,6 +104,7 @@ cameras: {{main: {{eye: [0, {height}, 2], target: [0.3, 0, -1], {lens}, near: 0.
 """
 
 
+@pytest.mark.nightly(keep=18)
 @ALL
 @pytest.mark.parametrize("scale", [1, 0.5, 0.125])
 @pytest.mark.parametrize("height", [0.05, 1, 20])

@@ -92,6 +92,7 @@ class WarpedMap(ShadowMapNode):
 '''
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("kind", "sets"),
     [

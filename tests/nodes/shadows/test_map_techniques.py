@@ -45,6 +45,7 @@ def visibility(session: rg.Session, kind: str, *sets: str, **options: Any) -> Fl
 # --- against ray casting ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("case", ["dir_basic", "dir_camera_in_shadow", "spot_basic", "point_room"])
 @pytest.mark.parametrize("kind", ["shadow_pcf", "shadow_vsm", "shadow_msm"])
 def test_narrow_filters_are_the_ray_cast_shadow(session: rg.Session, shared: Path, kind: str, case: str) -> None:
@@ -59,6 +60,7 @@ def test_narrow_filters_are_the_ray_cast_shadow(session: rg.Session, shared: Pat
     assert np.abs(seen - (masks["cls"] == 1))[judged].mean() <= 2e-3
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("kind", "name", "widths"), [("shadow_pcf", "taps", (16, 8, 4, 2)), ("shadow_vsm", "radius", (8, 4, 2, 0))]
 )
@@ -123,6 +125,7 @@ def test_what_faces_the_light_has_no_acne(session: rg.Session, tmp_path: Path, k
 # --- both forms ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("scene", ["cornell_box", "shadow_study"])
 @pytest.mark.parametrize("kind", list(WIDE))
 def test_both_forms_give_the_same_picture(session: rg.Session, kind: str, scene: str) -> None:
@@ -159,6 +162,7 @@ cameras:
     return file
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("kind", list(WIDE))
 def test_several_lights_are_the_sum_of_each(session: rg.Session, tmp_path: Path, kind: str) -> None:
     """A directional, two spot and a point light (six layers) at once, in both forms."""
@@ -182,6 +186,7 @@ def test_several_lights_are_the_sum_of_each(session: rg.Session, tmp_path: Path,
     assert np.mean(bare - together > 0.02 * bare.max()) > 0.05
 
 
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("name", ["vsm", "esm", "msm", "convolution"])
 def test_the_type_is_the_whole_change(session: rg.Session, name: str) -> None:
     """The shipped file and PCF's with another type draw the same, their kernels being equally wide."""

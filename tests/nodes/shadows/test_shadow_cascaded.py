@@ -177,6 +177,7 @@ def wrong_share(session: rg.Session, shared: Path, *sets: str) -> float:
     return float(100 * ((lit[0, ..., 0] > 0.5) != (masks["cls"] == 1))[judged].mean())
 
 
+@pytest.mark.nightly(keep=1)
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "most"), [("shadow_pcf", 0.1), ("shadow_vsm", 0.3), ("shadow_esm", 0.3)])
 def test_a_long_field(session: rg.Session, shared: Path, kind: str, most: float) -> None:

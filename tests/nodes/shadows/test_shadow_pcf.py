@@ -49,6 +49,7 @@ def test_brute_force_is_the_reference(shared: Path, bilinear: Bilinear, taps: in
         assert brute_force(bilinear, depth, place, grid(taps)) == pytest.approx(case[name], abs=1e-6)
 
 
+@pytest.mark.nightly(keep=5)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kernel", "taps", "edges"),
