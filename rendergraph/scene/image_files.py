@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import stat
 import struct
 import threading
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 READ = "PNG, JPEG, HDR, EXR, BMP and TGA are read"
 MOST_CHANNELS = 256
 _RATIO_FROM = 64 << 20
-_HEAD_BYTES = 32
 _MAGIC = {
     b"\x89PNG\r\n\x1a\n": ".png",
     b"\xff\xd8\xff": ".jpg",
@@ -35,6 +35,8 @@ _MAGIC = {
 }
 _FORMATS = {".png": "png", ".jpg": "jpeg", ".exr": "openexr", ".hdr": "hdr", ".bmp": "bmp", ".tga": "targa"}
 """Extension to OpenImageIO's name of the format."""
+_JPEG_SEGMENT = re.compile(rb"\xff+([\x01-\xfe])(..)", re.DOTALL)
+_JPEG_FRAMES = {bytes([marker]) for marker in range(0xC0, 0xD0)} - {b"\xc4", b"\xc8", b"\xcc"}
 
 
 class ImageError(Exception):
@@ -123,6 +125,33 @@ def _color_names(names: Sequence[str]) -> tuple[str, ...]:
     return (*needed, "A") if "R" in upper and "A" in upper else needed
 
 
+def read_header(source: ImageSource, limits: SceneLimits) -> tuple[tuple[int, int], int]:
+    """Return the size of the decoded image, width and height, and the number of its channels.
+
+    Raises:
+        ImageError: it is missing, of another format, broken, or exceeds a limit.
+    """
+    head, size = _first_bytes(source)
+    if _kind_of(head, source) == ".jpg":  # OpenImageIO decodes a progressive one while it opens it
+        width, height, channels = _jpeg_frame(source)
+        _check_size(width, height, size, limits)
+        return (width, height), channels
+    with open_image(source, limits) as image:
+        return image.size, len(image.color_channels())
+
+
+def _jpeg_frame(source: ImageSource) -> tuple[int, int, int]:
+    """Width, height and channels in the frame header of a JPEG."""
+    head, _ = _first_bytes(source, 1 << 20)
+    at = 2
+    while (segment := _JPEG_SEGMENT.match(head, at)) is not None:
+        if segment[1] in _JPEG_FRAMES and len(head) >= segment.end() + 6:
+            height, width, channels = struct.unpack_from(">HHB", head, segment.end() + 1)
+            return width, height, channels
+        at = segment.end() - 2 + int.from_bytes(segment[2])
+    raise ImageError("RG352", "is broken: it has no JPEG frame header")
+
+
 @contextlib.contextmanager
 def open_image(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
     """Open an image whose header is within the limits.
@@ -136,7 +165,9 @@ def open_image(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
         import OpenImageIO as oiio  # loaded with the first picture read
     except ImportError as error:
         raise ImageError("RG350", f"cannot be read: OpenImageIO is not available ({error})") from None
-    if kind == ".bmp" and len(head) >= 26 and head[14] > 12:  # a compressed one would be decoded while it is opened
+    if kind == ".jpg":  # it and a compressed BMP may be decoded while they are opened
+        _check_size(*_jpeg_frame(source)[:2], size, limits)
+    elif kind == ".bmp" and len(head) >= 26 and head[14] > 12:
         width, height = struct.unpack_from("<ii", head, 18)
         _check_size(width, abs(height), size, limits)
     with contextlib.ExitStack() as stack:
@@ -171,16 +202,16 @@ def _readable_path(source: ImageSource, kind: str) -> Iterator[str]:
         yield str(other)
 
 
-def _first_bytes(source: ImageSource) -> tuple[bytes, int]:
+def _first_bytes(source: ImageSource, count: int = 32) -> tuple[bytes, int]:
     """The first bytes and the length of the encoded image."""
     if source.data is not None:
-        return source.data[:_HEAD_BYTES], len(source.data)
+        return source.data[:count], len(source.data)
     try:
         status = os.stat(source.path)
         if not stat.S_ISREG(status.st_mode):
             raise ImageError("RG350", "is not a regular file")
         with open(source.path, "rb") as file:
-            return file.read(_HEAD_BYTES), status.st_size
+            return file.read(count), status.st_size
     except FileNotFoundError:
         raise ImageError("RG350", "does not exist") from None
     except (OSError, ValueError) as error:

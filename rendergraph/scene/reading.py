@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from rendergraph.declare import NO_EXTENSIONS, READ_IMAGES, Extensions
 from rendergraph.document import shown
@@ -202,14 +203,13 @@ class Reading(Struct):
         return self._checked(ImageSource(self.path, data, f"{what} in {shown(self.path.name)}"), what, 0)
 
     def _checked(self, source: ImageSource, what: str, line: int) -> ImageSource:
-        from rendergraph.scene.image_files import ImageError, open_image  # for scenes with images alone
+        from rendergraph.scene.image_files import ImageError, read_header  # for scenes with images alone
 
         try:
-            with open_image(source, self.limits) as image:
-                channels = len(image.color_channels())
-                return ImageSource(source.path, source.data, source.label, None, image.size, channels)
+            size, channels = read_header(source, self.limits)
         except ImageError as error:
             raise self.error(error.code, f"{what} {error.reason}", line=line) from None
+        return replace(source, size=size, channels=channels)
 
 
 def file_kind(path: Path) -> Literal["file", "missing", "other", "unreadable"]:
