@@ -48,7 +48,7 @@ def write(
     metadata: Mapping[str, str] | None = None,
     half: bool = False,
 ) -> None:
-    """One picture, whole or not at all; the extension chooses the format.
+    """Write one picture, whole or not at all; the extension chooses the format.
 
     PNG and JPEG hold 8 bits: floats are clipped to 0…1 and rounded, after the sRGB curve where they are `linear`. EXR
     and HDR hold linear light: `display` values are decoded first. `data` is written as it is everywhere.
@@ -62,8 +62,8 @@ def write(
         half: 16-bit floats in EXR; values beyond ±65504 become that.
 
     Raises:
-        InputError: the format cannot hold these pixels.
-        RenderError: the disk or the folder does not take it.
+        InputError: the format cannot store these pixels.
+        RenderError: writing failed.
     """
     write_all([(Path(path), pixels, channels, encoding, half)], metadata or {})
 
@@ -72,7 +72,7 @@ Job: TypeAlias = "tuple[Path, Pixels, Sequence[str] | None, Encoding, bool]"
 
 
 def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
-    """Several pictures that appear together; each job is the arguments of `write`."""
+    """Write pictures that appear together; each job is the arguments of `write`."""
     with staged([job[0] for job in jobs]) as parts:
         for part, (path, pixels, channels, encoding, half) in zip(parts, jobs, strict=True):
             shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
@@ -85,7 +85,7 @@ def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
                     shaped = np.concatenate([from_srgb(shaped[..., :3]), shaped[..., 3:]], axis=-1)
                 kind = "half" if half else "float"
                 if path.suffix.lower() == ".hdr":
-                    shaped, names, kind = _three(path, shaped), None, "float"
+                    shaped, names, kind = _radiance(path, shaped), None, "float"
                 elif shaped.ndim == 4:
                     names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
                     shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
@@ -96,7 +96,7 @@ def _eight_bits(path: Path, pixels: Pixels, encoding: Encoding) -> Pixels:
     count = pixels.shape[-1]
     if pixels.ndim != 3 or count == 2:
         what = "layers" if pixels.ndim != 3 else "two channels"
-        raise _refused(path, f"{what} do not fit a {path.suffix[1:].upper()} picture; write an EXR")
+        raise _error(path, f"{what} do not fit a {path.suffix[1:].upper()} picture; write an EXR")
     if encoding == "linear" and pixels.dtype != np.uint8:
         colors = to_bytes(to_srgb(np.nan_to_num(pixels[..., :3], nan=0.0, posinf=1.0, neginf=0.0)))
         pixels = np.concatenate([colors, to_bytes(pixels[..., 3:])], axis=-1)
@@ -104,19 +104,19 @@ def _eight_bits(path: Path, pixels: Pixels, encoding: Encoding) -> Pixels:
 
 
 def _values(path: Path, pixels: Pixels) -> Pixels:
-    """Float values that are the texels' own."""
+    """The texels as floats."""
     if np.issubdtype(pixels.dtype, np.floating):
         return pixels
     if pixels.size and max(int(pixels.max()), -int(pixels.min())) > _EXACT_INTEGER:
-        raise _refused(path, f"whole numbers above {_EXACT_INTEGER} (24 bits) cannot be kept in a picture")
+        raise _error(path, f"whole numbers above {_EXACT_INTEGER} (24 bits) cannot be kept in a picture")
     # 8-bit arrays are colours 0…1 that have not been divided yet, wider integers are numbers.
     return pixels.astype(np.float32) / (255 if pixels.dtype == np.uint8 else 1)
 
 
-def _three(path: Path, pixels: Pixels) -> Pixels:
-    """What Radiance's format can hold: three channels, no layers, nothing negative."""
+def _radiance(path: Path, pixels: Pixels) -> Pixels:
+    """Three channels without negative values, as the Radiance format stores."""
     if pixels.ndim == 4:
-        raise _refused(path, "layers do not fit an HDR picture; write an EXR")
+        raise _error(path, "layers do not fit an HDR picture; write an EXR")
     if pixels.shape[-1] == 1:
         pixels = np.repeat(pixels, 3, axis=-1)
     elif pixels.shape[-1] == 2:
@@ -124,7 +124,7 @@ def _three(path: Path, pixels: Pixels) -> Pixels:
     return np.nan_to_num(np.maximum(pixels[..., :3].astype(np.float32), 0), nan=0.0, posinf=1e38)
 
 
-def _refused(path: Path, reason: str) -> InputError:
+def _error(path: Path, reason: str) -> InputError:
     return InputError(Problem("RG508", reason, Place(str(path))))
 
 

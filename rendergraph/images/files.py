@@ -25,9 +25,6 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
     A link is followed, so that it stays a link. Each temporary file is flushed to the disk before the rename and its
     folder after it; whatever ends the block early, an interrupt included, leaves nothing behind.
 
-    Args:
-        paths: where the files shall appear.
-
     Yields:
         One path for each, in the same folder, to be written by the caller.
 
@@ -62,15 +59,6 @@ def write_file(path: Path, content: str | bytes) -> None:
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with staged([path]) as (part,):
         part.write_bytes(data)
-
-
-def is_text(path: str) -> bool:
-    """Whether a path is text; the names of files may be any bytes."""
-    try:
-        path.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def flush(path: Path) -> None:

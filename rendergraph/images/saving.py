@@ -20,34 +20,32 @@ from rendergraph.textures import FORMATS
 Pixels: TypeAlias = npt.NDArray[Any]
 
 
-class Described(Protocol):
-    """What is known of an array's values; a frame's `info(name)` is one."""
+class TexelInfo(Protocol):
+    """What is known of an array's values, such as a frame's `info(name)`; `PictureInfo` describes the properties."""
 
     @property
-    def semantic(self) -> str:
-        """Name of the semantic, `any` where unknown."""
-        ...
-
+    def semantic(self) -> str: ...
     @property
-    def format(self) -> str:
-        """The texture's format, a name in `textures.FORMATS`, empty where unknown."""
-        ...
-
+    def format(self) -> str: ...
     @property
-    def encoding(self) -> str | None:
-        """`display` for sRGB-encoded colours, `linear` for linear ones, else None."""
-        ...
+    def encoding(self) -> str | None: ...
 
 
 class PictureInfo(Struct, frozen=True):
-    """What an array's values are, where no frame says it; see `Described`."""
+    """What is known of an array's values without a frame.
+
+    Attributes:
+        semantic: its name, `any` if unknown.
+        format: a name in `textures.FORMATS`, empty if unknown.
+        encoding: `display` for sRGB-encoded colours, `linear` for linear ones, else None.
+    """
 
     semantic: str = "any"
     format: str = ""
     encoding: str | None = None
 
 
-def channel_names(info: Described, count: int) -> tuple[str, ...]:
+def channel_names(info: TexelInfo, count: int) -> tuple[str, ...]:
     """The names of `count` channels in an EXR file."""
     if count > 1:
         return ("R", "G", "B", "A")[:count]
@@ -56,35 +54,30 @@ def channel_names(info: Described, count: int) -> tuple[str, ...]:
     return ("Z",) if is_depth or info.semantic == "linear_depth" else ("Y",)
 
 
-_HALF = frozenset({"r16f", "rg16f", "rgba16f", "r11f_g11f_b10f"})
-"""Formats whose every value is a half float."""
+_HALF_FORMATS = frozenset({"r16f", "rg16f", "rgba16f", "r11f_g11f_b10f"})
 
 
 class Saved(NamedTuple):
-    """One file to save.
+    """One file to save: (height, width[, channels]) or (layers, height, width, channels) pixels, top row first.
 
-    Attributes:
-        path: where to; the extension chooses the format.
-        pixels: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
-        info: what the values are.
-        raw: a tap: EXR and HDR keep the values, also of display colours.
+    A `raw` one is a tap: EXR and HDR keep its values, also of display colours.
     """
 
     path: Path
     pixels: Pixels
-    info: Described
+    info: TexelInfo
     raw: bool = False
 
 
 def save_output(
-    path: Path | str, pixels: Pixels, info: Described, metadata: Mapping[str, str], *, raw: bool = False
+    path: Path | str, pixels: Pixels, info: TexelInfo, metadata: Mapping[str, str], *, raw: bool = False
 ) -> None:
-    """One output or tap as a file: see `save_outputs`."""
+    """Save one output or tap: see `save_outputs`."""
     save_outputs([Saved(Path(path), pixels, info, raw)], metadata)
 
 
 def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
-    """Outputs and taps as files that appear together.
+    """Save outputs and taps as files that appear together.
 
     PNG and JPEG are made viewable. EXR and HDR hold linear light, so display colours are decoded; a tap's values are
     kept as they are.
@@ -102,19 +95,15 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
         pixels = _numbers(pixels, info)
         shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
         decoded = not raw and info.encoding == "display"
-        half = decoded or info.format in _HALF or pixels.dtype == np.float16
+        half = decoded or info.format in _HALF_FORMATS or pixels.dtype == np.float16
         names = channel_names(info, shaped.shape[-1])
         jobs.append((path, shaped, names, "display" if decoded else "data", half))
     write_all(jobs, metadata)
 
 
 def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
-    """What `save_outputs` would write, for whoever writes it elsewhere.
-
-    Raises:
-        UsageError, InputError, RenderError: as from `save_outputs`.
-    """
-    import tempfile  # brings random numbers along, which nobody else needs
+    """Return the bytes that `save_outputs` would write."""
+    import tempfile  # brings random numbers along, which nothing else needs
 
     with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
         path = Path(folder) / file.path.name
@@ -122,50 +111,42 @@ def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
         return path.read_bytes()
 
 
-def viewable_as(pixels: Pixels, info: Described) -> Bytes:
-    """What an eye can read of an array, by what its values are: see `viewable`."""
+def viewable_as(pixels: Pixels, info: TexelInfo) -> Bytes:
+    """Return an array as a viewable picture; `info` chooses how: see `viewable`."""
     return viewable(_numbers(pixels, info), info.semantic, info.encoding)
 
 
-def _numbers(pixels: Pixels, info: Described) -> Pixels:
-    """Whole numbers as such, where 8-bit arrays are otherwise colours."""
+def _numbers(pixels: Pixels, info: TexelInfo) -> Pixels:
+    """Whole numbers as such; other 8-bit arrays are colours."""
     known = FORMATS.get(info.format)
     return pixels.astype(np.int64) if known and known.family in ("uint", "int") else pixels
 
 
 def extension(path: Path) -> str:
-    """A file's extension in lower case.
-
-    Raises:
-        UsageError: pictures of that kind are not written.
-    """
-    found = path.suffix.lower()
-    if found in EXTENSIONS:
-        return found
-    what = f"'{path.suffix}' files are not written" if found else f"'{path}' has no extension to choose the format by"
-    hint = suggestion(found, EXTENSIONS) if found else f"; name it '{path}.png'"
+    """Return a file's extension in lower case, which must be that of a picture."""
+    suffix = path.suffix.lower()
+    if suffix in EXTENSIONS:
+        return suffix
+    what = f"'{path.suffix}' files are not written" if suffix else f"'{path}' has no extension to choose the format by"
+    hint = suggestion(suffix, EXTENSIONS) if suffix else f"; name it '{path}.png'"
     raise UsageError(Problem("RG501", f"{what}{hint}"))
 
 
 def output_for(path: Path, outputs: Collection[str]) -> str:
-    """The output a file takes that names none: by its extension `image` or `radiance`.
+    """Return the output for a file that names none: `image` or `radiance`, by its extension.
 
-    Args:
-        path: the file.
-        outputs: the pipeline's outputs.
-
-    Raises:
-        UsageError: an unknown extension.
-        InputError: the pipeline has no such output; an HDR format is content with `image`, which is decoded.
+    An HDR file of a pipeline without `radiance` gets `image`, which is decoded.
     """
-    wanted = ("image",) if EXTENSIONS[extension(path)] in ("png", "jpeg") else ("radiance", "image")
-    for name in wanted:
+    defaults = ("image",) if EXTENSIONS[extension(path)] in ("png", "jpeg") else ("radiance", "image")
+    for name in defaults:
         if name in outputs:
             return name
     known = sorted(outputs)
     if not known:
-        raise InputError(Problem("RG505", f"'{path}' needs the output '{wanted[0]}', but the pipeline has no outputs"))
-    text = f"'{path}' needs the output '{wanted[0]}', which the pipeline lacks; name one: -o {known[0]}={path}"
+        raise InputError(
+            Problem("RG505", f"'{path}' needs the output '{defaults[0]}', but the pipeline has no outputs")
+        )
+    text = f"'{path}' needs the output '{defaults[0]}', which the pipeline lacks; name one: -o {known[0]}={path}"
     text += f" (available: {', '.join(known)})" if len(known) > 1 else ""
     raise InputError(Problem("RG505", text))
 
@@ -174,17 +155,17 @@ _HASHES = re.compile(r"#{2,}")
 
 
 def is_numbered(path: Path) -> bool:
-    """Whether a file name has a place for the frame's number: two `#` or more in a row."""
+    """Whether a file name has a placeholder for the frame's number: two `#` or more in a row."""
     return bool(_HASHES.search(path.name))
 
 
 def numbered(path: Path, frame: int) -> Path:
-    """The file of one frame: `a.####.png` becomes `a.0012.png`."""
+    """Return the file of one frame: `a.####.png` becomes `a.0012.png`."""
     return path.with_name(_HASHES.sub(lambda match: f"{frame:0{len(match[0])}d}", path.name))
 
 
 def stands_for(path: Path, file: str) -> bool:
-    """Whether a file, links followed, may be that of some frame."""
+    """Whether a file, links followed, may be the file of some frame."""
     parts = [re.escape(part) for part in _HASHES.split(path.name)]
     if len(parts) == 1 or os.path.dirname(file) != os.path.realpath(path.parent):
         return False
@@ -192,11 +173,7 @@ def stands_for(path: Path, file: str) -> bool:
 
 
 def check_target(path: Path) -> None:
-    """Says before rendering that a file cannot be written.
-
-    Raises:
-        InputError: the folder is missing or cannot be written to, or something that is no file is in the way.
-    """
+    """Check before rendering that a file can be written."""
     target = Path(os.path.realpath(path))
     folder, shown = target.parent, path.parent
     if not folder.is_dir():

@@ -1,4 +1,4 @@
-"""Films: frames one after the other into an MP4, by the ffmpeg that imageio-ffmpeg brings."""
+"""Films: frames as an MP4, encoded by the ffmpeg that imageio-ffmpeg brings."""
 
 from __future__ import annotations
 
@@ -19,17 +19,13 @@ ENDING = ".mp4"
 
 
 def is_film(path: Path) -> bool:
-    """Whether a file holds many frames."""
+    """Whether a file contains many frames."""
     return path.suffix.lower() == ENDING
 
 
 @contextmanager
 def films(paths: Iterable[Path], fps: float, first: int) -> Iterator[dict[Path, Film]]:
-    """Films that are whole when the block ends well, and leave nothing behind when it does not.
-
-    Raises:
-        RenderError: the encoder failed, or the disk is full.
-    """
+    """Open films that are complete if the block succeeds, and leave nothing behind if it fails."""
     opened = {path: Film(path, fps, first) for path in paths}
     try:
         yield opened
@@ -41,19 +37,13 @@ def films(paths: Iterable[Path], fps: float, first: int) -> Iterator[dict[Path, 
 
 
 class Film:
-    """A file that frames are added to, in any order; it appears when it is whole.
+    """A file of frames, added in any order, that appears when it is complete.
 
-    H.264 with 4:2:0 colours, which every player shows: sides that are odd grow by a row of black.
+    H.264 with 4:2:0 colours, which every player shows: odd sides grow by a row of black.
     """
 
     def __init__(self, path: Path, fps: float, first: int) -> None:
-        """Nothing is written yet.
-
-        Args:
-            path: the file.
-            fps: frames a second.
-            first: number of the frame that comes first.
-        """
+        """Prepare a film of `fps` frames a second that begins with frame number `first`."""
         self.path = path
         self._fps, self._next = fps, first
         self._early: dict[int, npt.NDArray[Any]] = {}
@@ -62,11 +52,7 @@ class Film:
         self._writer: Any = None
 
     def add(self, number: int, pixels: npt.NDArray[Any]) -> None:
-        """One frame: uint8 of shape (height, width, 3 or more).
-
-        Raises:
-            RenderError: the encoder ended, or the disk is full.
-        """
+        """Add one frame, uint8 of shape (height, width, 3 or more)."""
         self._early[number] = pixels
         while self._next in self._early:
             self._write(np.ascontiguousarray(self._early.pop(self._next)[..., :3]))
@@ -94,11 +80,6 @@ class Film:
             raise self._failed(error) from error
 
     def close(self) -> None:
-        """The file is there.
-
-        Raises:
-            RenderError: the encoder failed, or the disk is full.
-        """
         try:
             if self._writer is not None:
                 self._writer.close()
@@ -109,7 +90,7 @@ class Film:
             raise self._failed(error) from error
 
     def drop(self) -> None:
-        """Leave nothing behind of a film that is not whole."""
+        """Remove a film that is not complete."""
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()

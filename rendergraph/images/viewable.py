@@ -1,4 +1,4 @@
-"""Turning any texture into something an eye can read.
+"""Any texture as a picture that an eye can read; colour maps; contact sheets.
 
 | texels mean | 8-bit picture |
 |---|---|
@@ -38,14 +38,14 @@ _BACKGROUND, _NAME_GREY, _NOTE_GREY = 32, 0.95, 0.6
 
 
 def to_srgb(linear: Pixels) -> npt.NDArray[np.float32]:
-    """Linear values 0…1 to sRGB-encoded ones (IEC 61966-2-1); what lies outside is clipped."""
+    """Encode linear values 0…1 as sRGB (IEC 61966-2-1); values outside are clipped."""
     values = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
     encoded = np.where(values <= 0.0031308, values * 12.92, 1.055 * np.power(values, 1 / 2.4) - 0.055)
     return encoded.astype(np.float32)
 
 
 def from_srgb(encoded: Pixels) -> npt.NDArray[np.float32]:
-    """sRGB-encoded values 0…1 (or 0…255 as uint8) to linear ones (IEC 61966-2-1)."""
+    """Decode sRGB values 0…1 (or 0…255 as uint8) to linear ones (IEC 61966-2-1)."""
     values: npt.NDArray[np.float32] = np.asarray(encoded, dtype=np.float32)
     values = values / np.float32(255) if encoded.dtype == np.uint8 else values
     linear = np.where(values <= 0.04045, values / 12.92, np.power((np.maximum(values, 0) + 0.055) / 1.055, 2.4))
@@ -53,7 +53,7 @@ def from_srgb(encoded: Pixels) -> npt.NDArray[np.float32]:
 
 
 def to_bytes(unit: Pixels) -> Bytes:
-    """Values 0…1 to the nearest of 0…255; NaN becomes 0."""
+    """Round values 0…1 to 0…255; NaN becomes 0."""
     if unit.dtype == np.uint8:
         return unit
     values = np.nan_to_num(np.asarray(unit, dtype=np.float32), nan=0.0, posinf=1.0, neginf=0.0)
@@ -70,7 +70,7 @@ def heat_map(values: Pixels) -> Bytes:
 
 
 def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) -> Bytes:
-    """A picture of a texture; the module's table says how each meaning is shown.
+    """Return a picture of a texture; the module's table lists how each semantic is shown.
 
     Args:
         array: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.

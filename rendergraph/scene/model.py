@@ -1,4 +1,4 @@
-"""What a scene is: immutable values that readers make and `pack` lays out for the GPU.
+"""A scene as immutable values, which readers create and `pack` lays out for the GPU.
 
 Conventions are glTF 2.0's: right-handed, +Y up, metres, column vectors, scene-linear colours, texture coordinates with
 the origin at the image's top left.
@@ -37,7 +37,7 @@ _MOST_CONVEX = 10_000_000
 
 
 def extremes(points: npt.NDArray[T]) -> tuple[npt.NDArray[T], npt.NDArray[T]]:
-    """The least and the greatest of each coordinate of points (n, 3), (3,) each."""
+    """Return the least and the greatest of each coordinate of points (n, 3), (3,) each."""
     columns = np.ascontiguousarray(points.T)  # along rows of three NumPy takes thirty times as long
     return columns.min(axis=1), columns.max(axis=1)
 
@@ -46,10 +46,9 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
     """Triangles with their vertex attributes, one material's worth of geometry.
 
     Attributes:
-        name: from the file.
         positions: float32 (n, 3), finite.
         indices: uint32 (m, 3), each below n; counter-clockwise seen from outside.
-        normals: float32 (n, 3) unit length, or None: the reader fills them in (mean of adjacent face normals).
+        normals: float32 (n, 3), unit length.
         tangents: float32 (n, 4), w the handedness, or None: the shader derives them.
         uv0, uv1: float32 (n, 2), or None.
         colors: float32 (n, 4) linear, or None for white.
@@ -160,13 +159,7 @@ class ImageSource(Struct, frozen=True):
 
 
 class MadeImage(Struct, frozen=True):
-    """An image that is made in code.
-
-    Attributes:
-        label: how messages name it.
-        size: width and height.
-        make: gives float16 (height, width, 4), top row first.
-    """
+    """A generated image: `make` returns float16 (height, width, 4), top row first; `size` is its width and height."""
 
     label: str
     size: tuple[int, int]
@@ -177,10 +170,7 @@ class Texture(Struct, frozen=True):
     """An image with its sampling and coordinates.
 
     Attributes:
-        image: where the pixels come from.
         srgb: decoded with the sRGB curve (base colour, emissive).
-        wrap_s, wrap_t: `repeat`, `mirror` or `clamp`.
-        mag_filter: `nearest` or `linear`.
         min_filter: `nearest`, `linear` (no mips), `nearest_mipmap_nearest`, … as in glTF.
         uv: which UV set, 0 or 1.
         transform: KHR_texture_transform as a 2×3 matrix on (u, v, 1), row by row; None for identity.
@@ -201,12 +191,11 @@ class Material(Struct, frozen=True):
 
     Attributes:
         base_color: linear RGBA factor.
-        metallic, roughness: factors, 0 to 1.
         emissive: linear RGB factor, `emissive_strength` already multiplied in.
         occlusion_strength, normal_scale: as in glTF.
         alpha_mode, alpha_cutoff, double_sided, unlit: as in glTF.
         ior: index of refraction; dielectric f0 is ((ior-1)/(ior+1))².
-        specular: KHR_materials_specular factor; `specular_color` its linear RGB.
+        specular, specular_color: as in KHR_materials_specular, linear RGB.
         anisotropy_strength, anisotropy_rotation: as in KHR_materials_anisotropy, radians.
         textures: by slot: `base_color`, `metallic_roughness`, `normal`, `occlusion`, `emissive`, `anisotropy`,
             `specular`, `specular_color`.
@@ -242,11 +231,8 @@ class Object(Struct, frozen=True, eq=False):
 
     Attributes:
         name: node or `o` name, unique within its file.
-        mesh: index into `Scene.meshes`.
-        material: index into `Scene.materials`.
+        mesh, material: indices into `Scene.meshes` and `Scene.materials`.
         transform: object to world, float64 (4, 4), affine.
-        casts_shadow: false for names ending in `NS` and where a file says so.
-        hidden: not drawn.
         node: the name of the node it is a part of, shared by the parts of one node (one for each material, or each
             instance); a scene file's `overrides` name it.
     """
@@ -264,7 +250,6 @@ class Light(Struct, frozen=True):
     """A punctual light (KHR_lights_punctual).
 
     Attributes:
-        type: `directional`, `point` or `spot`.
         position: world space, metres; unused for directional.
         direction: unit vector the light travels along; unused for point.
         color: linear RGB.
@@ -290,7 +275,6 @@ class Camera(Struct, frozen=True, eq=False):
     """A camera.
 
     Attributes:
-        name: from the file.
         transform: camera to world, float64 (4, 4), looking down -Z.
         type: `perspective`, `orthographic` or `frustum` (off-centre perspective).
         fov_y: vertical angle in radians (perspective).
@@ -315,8 +299,7 @@ class Environment(Struct, frozen=True):
     """An equirectangular image around the scene.
 
     Attributes:
-        image: the file, or what makes one that comes with the program.
-        size: width and height of what it decodes to; None where only decoding tells.
+        size: width and height of the decoded image; None if only decoding tells.
         intensity: factor on its radiance.
         rotate: radians about +Y.
     """
@@ -335,12 +318,7 @@ class Orbit(Struct, frozen=True):
 
 
 class Placement(Struct, frozen=True, eq=False):
-    """What a scene file's object placed: the parts of a shape or file, where they stand within it.
-
-    Attributes:
-        objects, lights: index in the scene and transform within the placed thing, (4, 4).
-        cameras: by name likewise.
-    """
+    """The parts of a scene file's object: index or name in the scene, and transform within the object, (4, 4)."""
 
     objects: tuple[tuple[int, Matrix], ...] = ()
     lights: tuple[tuple[int, Matrix], ...] = ()
@@ -348,20 +326,15 @@ class Placement(Struct, frozen=True, eq=False):
 
 
 class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
-    """Everything that can be drawn, with what lights and sees it.
+    """Everything that can be drawn, with its lights and cameras.
 
     Attributes:
-        name: the file's stem.
-        source: the file.
-        objects, meshes, materials, lights: in the file's order; objects index meshes and materials.
         cameras: by name, the first is the default.
-        environment: or None.
         keyframes: dotted path to times in seconds and values, linear between, held outside.
-        orbit: or None.
-        warnings: what a reader left out, replaced or clamped, once a kind and file.
-        recipe: section and name (`("cameras", "main")`) to the values a scene file gave: what keyframes change.
-        placements: name of a scene file's object to what it placed.
-        files: every file looked at while reading it, as it was.
+        warnings: what a reader left out, replaced or clamped, once for each kind and file.
+        recipe: section and name (`("cameras", "main")`) to the values in the scene file, which keyframes change.
+        placements: name of a scene file's object to its parts.
+        files: every file accessed while reading it, as it was.
     """
 
     name: str

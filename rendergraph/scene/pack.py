@@ -27,64 +27,35 @@ Ints: TypeAlias = npt.NDArray[np.int32]
 Doubles: TypeAlias = npt.NDArray[np.float64]
 
 SLOTS = (
-    "base_color",
-    "metallic_roughness",
-    "normal",
-    "occlusion",
-    "emissive",
-    "anisotropy",
-    "specular",
-    "specular_color",
+    *("base_color", "metallic_roughness", "normal", "occlusion"),
+    *("emissive", "anisotropy", "specular", "specular_color"),
 )
 """Texture slots in the order of a material's rows in `material_uvs`."""
 
 _VEC4 = ("<f4", (4,))
 INSTANCE = np.dtype([("rows", "<f4", (3, 4)), ("ids", "<i4", (2,))])
 """Rows of the affine object-to-world matrix (`in_object0`…`2`), material and object index (`in_ids`)."""
+_UINT, _VEC3 = "<u4", ("<f4", (3,))
 MESH = np.dtype(
-    [
-        ("first_index", "<u4"),
-        ("count", "<u4"),
-        ("base_vertex", "<i4"),
-        ("vertices", "<u4"),
-        ("low", "<f4", (3,)),
-        ("high", "<f4", (3,)),
-    ]
+    {
+        "names": ["first_index", "count", "base_vertex", "vertices", "low", "high"],
+        "formats": [_UINT, _UINT, "<i4", _UINT, _VEC3, _VEC3],
+    }
 )
 """Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
-MATERIAL = np.dtype(
-    [
-        (name, *_VEC4)
-        for name in (
-            "base_color",
-            "emissive",
-            "surface",
-            "specular",
-            "extra",
-            "phong_diffuse",
-            "phong_specular",
-            "phong_ambient",
-        )
-    ]
-)
+_MATERIAL_ROWS = "base_color emissive surface specular extra phong_diffuse phong_specular phong_ambient"
+MATERIAL = np.dtype([(name, *_VEC4) for name in _MATERIAL_ROWS.split()])
 ENVIRONMENT = np.dtype([("environment_turn", *_VEC4)])
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
+_MATRICES = "view projection view_projection inverse_view inverse_projection inverse_view_projection"
+_MATRIX = ("<f4", (4, 4))
 VIEW = np.dtype(
-    [
-        (name, "<f4", (4, 4))
-        for name in (
-            "view",
-            "projection",
-            "view_projection",
-            "inverse_view",
-            "inverse_projection",
-            "inverse_view_projection",
-        )
-    ]
+    [(name, *_MATRIX) for name in _MATRICES.split()]
     + [(name, *_VEC4) for name in ("eye", "viewport", "range", "jitter")]
 )
 _ROUNDING = 4 * 2.0**-23  # of a sum of four products in float32, relative to their sizes
 _FARTHEST_EYE = 1e9  # metres; one that is farther off is a direction, whatever rounding says
+_WIDTHS = {"positions": 3, "normals": 3, "tangents": 4, "uv0": 2, "uv1": 2, "colors": 4}
 _LIGHT_TYPES = {"directional": 0.0, "point": 1.0, "spot": 2.0}
 
 
@@ -96,21 +67,13 @@ class PackedScene(Struct, frozen=True, eq=False):
         tangents: float32 (v, 4), zero for meshes without; None where no mesh has tangents. So with `uv0`, `uv1` (v, 2)
             and `colors` (v, 4), white for meshes without.
         indices: uint32 (i,), relative to the mesh's base vertex, three a triangle.
-        meshes: `MESH` records, indexed as `Scene.meshes`.
-        instances: `INSTANCE` records, one an object in the scene's order; a draw of objects that are not neighbours
-            gathers their records into its own order.
-        materials: `MATERIAL` records.
+        instances: one an object in the scene's order; a draw of objects that are not neighbours gathers their records
+            into its own order.
         material_uvs: float32 (m, 16, 4): per material the eight `SLOTS`' two rows (a, b, c, 0) of the uv transform.
         material_moved: bool (m,), whether any slot's transform is not the identity (`HAS_UV_TRANSFORM`).
-        lights: `LIGHT` records.
-        environment: one `ENVIRONMENT` record.
-        object_mesh: int32 (n,).
         mirrored: bool (n,), the transform turns the winding round (determinant below 0).
-        casts_shadow, hidden, double_sided: bool (n,).
-        alpha_mode: `opaque`, `mask` or `blend` for each object.
         centers, extents: float64 (n, 3), middles and half sides of world-space bounding boxes.
         slack: float64 (n, 1), metres that rounding may move an object's vertices by on the GPU.
-        names: of the objects.
     """
 
     positions: Floats
@@ -141,20 +104,9 @@ class PackedScene(Struct, frozen=True, eq=False):
 
 def pack(scene: Scene) -> PackedScene:
     """Lay a scene out for the GPU; triangles in vertex-cache order, vertices in the order of first use."""
-    orders = []
-    for mesh in scene.meshes:
-        orders.append(first_use(ordered(mesh.positions, mesh.indices), len(mesh.positions)))
-    streams = {
-        name: _stream(scene.meshes, [old for old, _ in orders], name, width, fill)
-        for name, width, fill in (
-            ("positions", 3, 0.0),
-            ("normals", 3, 0.0),
-            ("tangents", 4, 0.0),
-            ("uv0", 2, 0.0),
-            ("uv1", 2, 0.0),
-            ("colors", 4, 1.0),
-        )
-    }
+    orders = [first_use(ordered(mesh.positions, mesh.indices), len(mesh.positions)) for mesh in scene.meshes]
+    vertices = [old for old, _ in orders]
+    streams = {name: _stream(scene.meshes, vertices, name, width) for name, width in _WIDTHS.items()}
     records = np.zeros(len(scene.meshes), MESH)
     first, base = 0, 0
     for record, mesh, (old, triangles) in zip(records, scene.meshes, orders, strict=True):
@@ -163,22 +115,13 @@ def pack(scene: Scene) -> PackedScene:
         record["vertices"], record["low"], record["high"] = len(old), low, high
         first, base = first + triangles.size, base + len(old)
     indices = np.concatenate([np.zeros(0, np.uint32), *(triangles.reshape(-1) for _, triangles in orders)])
-    positions, normals = streams["positions"], streams["normals"]
-    assert positions is not None  # every mesh has both
-    assert normals is not None
+    columns: dict[str, Any] = {**streams, **_materials(scene), **_placed(scene, records)}
     return PackedScene(
-        positions,
-        normals,
-        streams["tangents"],
-        streams["uv0"],
-        streams["uv1"],
-        streams["colors"],
-        indices,
-        records,
+        indices=indices,
+        meshes=records,
         lights=pack_lights(scene.lights),
         environment=pack_environment(scene.environment),
-        **_materials(scene),
-        **_placed(scene, records),
+        **columns,
     )
 
 
@@ -212,12 +155,9 @@ def blocks(packed: PackedScene) -> dict[str, Records | Floats]:
 
 
 def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:
-    """The same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame.
+    """Return the same geometry with the objects, materials and lights of a scene that shares its meshes: a later frame.
 
-    Args:
-        packed: of the scene before.
-        before: a scene at another time.
-        scene: the same now; what is the very same in both is not packed again.
+    Parts that are the very same in the scene `before` are not packed again.
     """
     changed: dict[str, Any] = {}
     if scene.lights is not before.lights:
@@ -278,13 +218,11 @@ def _placed(scene: Scene, meshes: Records) -> dict[str, Any]:
     }
 
 
-def _stream(
-    meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], name: str, width: int, fill: float
-) -> Floats | None:
-    """One attribute of all meshes behind each other; None where no mesh has it (positions and normals always are)."""
+def _stream(meshes: Sequence[Mesh], orders: Sequence[npt.NDArray[np.int64]], name: str, width: int) -> Floats | None:
+    """One attribute of all meshes one after the other; None if no mesh has it (positions and normals always are)."""
     if name not in ("positions", "normals") and all(getattr(mesh, name) is None for mesh in meshes):
         return None
-    stream = np.full((sum(map(len, orders)), width), fill, np.float32)
+    stream = np.full((sum(map(len, orders)), width), 1.0 if name == "colors" else 0.0, np.float32)
     at = 0
     for mesh, old in zip(meshes, orders, strict=True):
         values = getattr(mesh, name)

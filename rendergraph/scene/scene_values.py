@@ -12,31 +12,11 @@ from rendergraph.projection import look_at, unit
 from rendergraph.scene.geometry import euler_matrix, placement, vec3
 from rendergraph.scene.model import Camera, Light, Material, Matrix, Texture
 
-_PLAIN = (
-    "base_color",
-    "metallic",
-    "roughness",
-    "occlusion_strength",
-    "normal_scale",
-    "alpha_mode",
-    "alpha_cutoff",
-    "double_sided",
-    "unlit",
-    "ior",
-    "specular",
-    "specular_color",
-    "anisotropy_strength",
-    "anisotropy_rotation",
-    "ambient",
-    "diffuse",
-    "specular_phong",
-    "shininess",
-)
+_PLAIN = frozenset(Material.__struct_fields__) - {"name", "emissive", "textures"}
 
 
 def material(name: str, values: Mapping[str, Any], textures: Mapping[str, Texture]) -> Material:
-    """A material from its values."""
-    given = {key: values[key] for key in _PLAIN if key in values}
+    given = {key: value for key, value in values.items() if key in _PLAIN}
     r, g, b = values.get("emissive", (0.0, 0.0, 0.0) if "emissive" not in textures else (1.0, 1.0, 1.0))
     strength = values.get("emissive_strength", 1.0)
     if "metallic_roughness" in textures:  # a texture scales its factor: without one it counts whole
@@ -45,11 +25,7 @@ def material(name: str, values: Mapping[str, Any], textures: Mapping[str, Textur
 
 
 def light(name: str, values: Mapping[str, Any]) -> Light:
-    """A light from its values.
-
-    Raises:
-        ValueError: the direction has no length, or the cone is inside out.
-    """
+    """Return a light; a mistake is a ValueError."""
     direction = unit(values.get("direction", (0.0, -1.0, 0.0)))
     if not direction.any():
         raise ValueError("'direction' has no length")
@@ -71,17 +47,13 @@ def light(name: str, values: Mapping[str, Any]) -> Light:
 
 
 def camera(name: str, values: Mapping[str, Any]) -> Camera:
-    """A camera from its values.
-
-    Raises:
-        ValueError: eye and target coincide, the planes are in the wrong order, or it is of two types at once.
-    """
+    """Return a camera; a mistake is a ValueError."""
     near, far = values.get("near", 0.05), values.get("far", 100.0)
     if near >= far:
         raise ValueError(f"'near' ({near:g}) must be below 'far' ({far:g})")
     given = [key for key in ("fov_y_degrees", "height", "frustum") if key in values]
     if len(given) > 1:
-        raise ValueError(f"has both '{given[0]}' and '{given[1]}'; one says how wide it sees")
+        raise ValueError(f"has both '{given[0]}' and '{given[1]}'; choose one")
     if "height" in values and math.isinf(far):
         raise ValueError("an orthographic camera needs a finite 'far'")
     if "frustum" in values and not (
@@ -107,20 +79,20 @@ def camera(name: str, values: Mapping[str, Any]) -> Camera:
 
 
 def placed(values: Mapping[str, Any]) -> Matrix:
-    """Where an object stands: scaled, turned, moved."""
+    """Return the transform of an object: scaled, turned, moved."""
     rotation = euler_matrix(values.get("rotate_degrees", (0.0, 0.0, 0.0)))
     return placement(values.get("at", (0.0, 0.0, 0.0)), rotation, values.get("scale", (1.0, 1.0, 1.0)))
 
 
-def light_matrix(found: Light) -> Matrix:
-    """A light as a transform: where it is, its -Z the way it shines."""
-    matrix = look_at((0.0, 0.0, 0.0), found.direction)
-    matrix[:3, 3] = found.position
+def light_matrix(original: Light) -> Matrix:
+    """Return a light as a transform to its position, its -Z in its direction."""
+    matrix = look_at((0.0, 0.0, 0.0), original.direction)
+    matrix[:3, 3] = original.position
     return matrix
 
 
-def moved_light(found: Light, matrix: Matrix) -> Light:
-    """A light with the place and direction of a transform; scale does not count."""
+def moved_light(original: Light, matrix: Matrix) -> Light:
+    """Return a light with the position and direction of a transform; scale does not count."""
     direction = unit(-matrix[:3, 2])
-    moved = replace(found, position=vec3(matrix[:3, 3]))
+    moved = replace(original, position=vec3(matrix[:3, 3]))
     return replace(moved, direction=vec3(direction)) if direction.any() else moved

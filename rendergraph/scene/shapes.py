@@ -27,10 +27,9 @@ class ShapePart(Struct, frozen=True, eq=False):
     """One mesh of a shape.
 
     Attributes:
-        mesh: its geometry.
-        local: where it stands within the shape, (4, 4).
-        suffix: added to the object's name, empty for the only part.
-        changes: material values this part has instead of the given material's.
+        local: its transform within the shape, (4, 4).
+        suffix: appended to the object's name, empty for the only part.
+        changes: material values of this part that replace the material's.
     """
 
     mesh: Mesh
@@ -40,7 +39,7 @@ class ShapePart(Struct, frozen=True, eq=False):
 
 
 class Shape(Struct, frozen=True):
-    """A kind of shape: what makes it and its parameters; `vertices` estimates their number beforehand."""
+    """A kind of shape: its parameters and function; `vertices` estimates their number beforehand."""
 
     doc: str
     keys: tuple[Key, ...]
@@ -49,14 +48,10 @@ class Shape(Struct, frozen=True):
 
 
 def build(shape: str, **values: Any) -> list[ShapePart]:
-    """The parts of a shape; parameters that are not given have their defaults.
-
-    Raises:
-        KeyError: there is no such shape.
-    """
+    """Build the parts of a shape; parameters that are not given have their defaults."""
     kind = SHAPES[shape]
-    made = kind.make(**{key.name: key.default for key in kind.keys} | values)
-    return made if isinstance(made, list) else [ShapePart(made, np.eye(4))]
+    parts = kind.make(**{key.name: key.default for key in kind.keys} | values)
+    return parts if isinstance(parts, list) else [ShapePart(parts, np.eye(4))]
 
 
 def mesh(shape: str, **values: Any) -> Mesh:
@@ -72,17 +67,15 @@ def _mesh(
     uv: npt.ArrayLike,
     along: npt.ArrayLike,
 ) -> Mesh:
-    """A mesh from plain arrays; `along` is the direction of growing u, w is +1 for all shapes here."""
-    tangents = np.concatenate([unit(along), np.ones((len(np.asarray(along)), 1))], axis=1)
-    points = np.asarray(positions, np.float32) + np.float32(0)  # no -0, so that equal positions have equal bits
-    return Mesh(
-        name,
-        points,
-        np.asarray(triangles, np.uint32).reshape(-1, 3),
-        np.asarray(normals, np.float32),
-        tangents.astype(np.float32),
-        np.asarray(uv, np.float32),
-    )
+    """A mesh from arrays whose last axis is the vector; one normal or direction of growing u may serve all vertices."""
+    points = np.asarray(positions, np.float32).reshape(-1, 3) + np.float32(0)  # no -0: equal positions have equal bits
+    shape = points.shape
+    tangents = np.ones((len(points), 4), np.float32)
+    tangents[:, :3] = np.broadcast_to(unit(along), shape) if np.ndim(along) == 1 else unit(along).reshape(shape)
+    each = np.asarray(normals, np.float32)
+    each = np.ascontiguousarray(np.broadcast_to(each, shape) if each.ndim == 1 else each.reshape(shape))
+    indices = np.asarray(triangles, np.uint32).reshape(-1, 3)
+    return Mesh(name, points, indices, each, tangents, np.asarray(uv, np.float32).reshape(-1, 2))
 
 
 def _joined(name: str, meshes: Sequence[Mesh]) -> Mesh:
@@ -125,14 +118,7 @@ def _lathe(name: str, profile: Sequence[tuple[float, float, float, float]], segm
     turn[poles] += np.pi / segments
     uv = np.stack([u, np.repeat(np.linspace(0, 1, rows + 1)[:, None], segments + 1, 1)], axis=-1)
     along = np.stack([np.cos(turn), np.zeros_like(turn), -np.sin(turn)], axis=-1)
-    return _mesh(
-        name,
-        positions.reshape(-1, 3),
-        _grid(segments, rows, (bool(poles[0]), bool(poles[-1]))),
-        unit(normals).reshape(-1, 3),
-        uv.reshape(-1, 2),
-        along.reshape(-1, 3),
-    )
+    return _mesh(name, positions, _grid(segments, rows, (bool(poles[0]), bool(poles[-1]))), unit(normals), uv, along)
 
 
 def _cap(radius: float, height: float, up: bool, segments: int) -> Mesh:
@@ -146,24 +132,15 @@ def _cap(radius: float, height: float, up: bool, segments: int) -> Mesh:
     ahead = np.roll(ring, -1)
     center = np.zeros(segments, np.int64)
     triangles = np.stack([center, ring, ahead] if up else [center, ahead, ring], axis=1)
-    count = segments + 1
-    return _mesh("cap", positions, triangles, np.tile((0, sign, 0), (count, 1)), uv, np.tile((1, 0, 0), (count, 1)))
+    return _mesh("cap", positions, triangles, (0, sign, 0), uv, (1, 0, 0))
 
 
 def plane(size: Sequence[float], segments: int) -> Mesh:
     """A horizontal rectangle facing +Y, `size` along X and Z."""
     t = np.linspace(0, 1, segments + 1)
     u, v = np.meshgrid(t, t)
-    positions = np.stack([(u - 0.5) * size[0], np.zeros_like(u), (v - 0.5) * size[1]], axis=-1).reshape(-1, 3)
-    count = len(positions)
-    return _mesh(
-        "plane",
-        positions,
-        _grid(segments, segments),
-        np.tile((0, 1, 0), (count, 1)),
-        np.stack([u, v], axis=-1).reshape(-1, 2),
-        np.tile((1, 0, 0), (count, 1)),
-    )
+    positions = np.stack([(u - 0.5) * size[0], np.zeros_like(u), (v - 0.5) * size[1]], axis=-1)
+    return _mesh("plane", positions, _grid(segments, segments), (0, 1, 0), np.stack([u, v], axis=-1), (1, 0, 0))
 
 
 def box(size: Sequence[float]) -> Mesh:
@@ -180,16 +157,7 @@ def box(size: Sequence[float]) -> Mesh:
     ):
         u, v = np.array([[0, 0], [0, 1], [1, 1], [1, 0]]).T[:, :, None]
         positions = (np.asarray(out) + (2 * u - 1) * np.asarray(right) + (1 - 2 * v) * np.asarray(up)) * half
-        parts.append(
-            _mesh(
-                "side",
-                positions,
-                [[0, 1, 2], [0, 2, 3]],
-                np.tile(out, (4, 1)),
-                np.concatenate([u, v], axis=1),
-                np.tile(right, (4, 1)),
-            )
-        )
+        parts.append(_mesh("side", positions, [[0, 1, 2], [0, 2, 3]], out, np.concatenate([u, v], axis=1), right))
     return _joined("box", parts)
 
 
@@ -254,14 +222,8 @@ def torus_knot(radius: float, tube: float, p: int, q: int, segments: int, sides:
     normals = np.cos(angle)[:, None, None] * out + np.sin(angle)[:, None, None] * side
     positions = center + tube * normals
     u, v = np.meshgrid(np.arange(segments + 1) / segments * max(p, q) * 2, np.arange(sides + 1) / sides)
-    return _mesh(
-        "torus_knot",
-        positions.reshape(-1, 3),
-        _grid(segments, sides),
-        normals.reshape(-1, 3),
-        np.stack([u, v], axis=-1).reshape(-1, 2),
-        np.tile(ahead, (sides + 1, 1)),
-    )
+    uv = np.stack([u, v], axis=-1)
+    return _mesh("torus_knot", positions, _grid(segments, sides), normals, uv, np.tile(ahead, (sides + 1, 1)))
 
 
 def stairs(size: Sequence[float], steps: int) -> Mesh:
@@ -276,27 +238,15 @@ def stairs(size: Sequence[float], steps: int) -> Mesh:
     right = left * (-1, 1, 1)
     uv = np.stack([zy[:, 0], 1 - zy[:, 1]], axis=1)
     ears = clip_ears(left)
-    count = len(left)
     parts = [
-        _mesh(
-            "left", left, ears, np.tile((-1, 0, 0), (count, 1)), uv * (-1, 1) + (1, 0), np.tile((0, 0, 1), (count, 1))
-        ),
-        _mesh("right", right, ears[:, ::-1], np.tile((1, 0, 0), (count, 1)), uv, np.tile((0, 0, -1), (count, 1))),
+        _mesh("left", left, ears, (-1, 0, 0), uv * (-1, 1) + (1, 0), (0, 0, 1)),
+        _mesh("right", right, ears[:, ::-1], (1, 0, 0), uv, (0, 0, -1)),
     ]
-    for k in range(count):
-        a, b = k, (k + 1) % count
+    for a, b in zip(range(len(left)), [*range(1, len(left)), 0], strict=True):
         corners = np.stack([left[b], left[a], right[a], right[b]])
         normal = unit(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
-        parts.append(
-            _mesh(
-                "tread",
-                corners,
-                [[0, 1, 2], [0, 2, 3]],
-                np.tile(normal, (4, 1)),
-                [[0, 0], [0, 1], [1, 1], [1, 0]],
-                np.tile((1, 0, 0), (4, 1)),
-            )
-        )
+        square = [[0, 0], [0, 1], [1, 1], [1, 0]]
+        parts.append(_mesh("tread", corners, [[0, 1, 2], [0, 2, 3]], normal, square, (1, 0, 0)))
     return _joined("stairs", parts)
 
 
@@ -310,7 +260,7 @@ def sphere_grid(
     segments: int,
     rings: int,
 ) -> list[ShapePart]:
-    """Spheres in the XY plane: roughness grows from left to right, metallic from bottom to top."""
+    """Spheres in the XY plane: roughness increases from left to right, metallic from bottom to top."""
     ball = sphere(radius, segments, rings)
     parts = []
     for row, metal in enumerate(np.linspace(metallic[0], metallic[1], rows)):
@@ -326,6 +276,11 @@ def _range(name: str, doc: str, default: tuple[float, float]) -> Key:
 
 
 LENGTH = number(0, above=True)
+_RADIUS = Key("radius", LENGTH, "Radius.", 0.5, "m")
+_HEIGHT = Key("height", LENGTH, "Extent along Y.", 1.0, "m")
+_SIZE = Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m")
+_SIDES = Key("sides", whole(3, 1024), "Sides around the tube.", 24)
+_RINGS = Key("rings", whole(2, 1024), "Rows from pole to pole.", 24)
 _SEGMENTS = Key("segments", whole(3, 2048), "Sides around the axis.", 48)
 SHAPES: dict[str, Shape] = {
     "plane": Shape(
@@ -337,36 +292,22 @@ SHAPES: dict[str, Shape] = {
         plane,
         lambda v: (v["segments"] + 1) ** 2,
     ),
-    "box": Shape(
-        "A box.", (Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m"),), box
-    ),
+    "box": Shape("A box.", (_SIZE,), box),
     "sphere": Shape(
         "A sphere of latitude and longitude.",
-        (
-            Key("radius", LENGTH, "Radius.", 0.5, "m"),
-            _SEGMENTS,
-            Key("rings", whole(2, 1024), "Rows from pole to pole.", 24),
-        ),
+        (_RADIUS, _SEGMENTS, _RINGS),
         sphere,
         lambda v: (v["segments"] + 1) * (v["rings"] + 1),
     ),
     "cylinder": Shape(
         "An upright cylinder with caps.",
-        (
-            Key("radius", LENGTH, "Radius.", 0.5, "m"),
-            Key("height", LENGTH, "Extent along Y.", 1.0, "m"),
-            _SEGMENTS,
-        ),
+        (_RADIUS, _HEIGHT, _SEGMENTS),
         cylinder,
         lambda v: 4 * (v["segments"] + 1),
     ),
     "cone": Shape(
         "An upright cone with a base.",
-        (
-            Key("radius", LENGTH, "Radius of the base.", 0.5, "m"),
-            Key("height", LENGTH, "Extent along Y.", 1.0, "m"),
-            _SEGMENTS,
-        ),
+        (Key("radius", LENGTH, "Radius of the base.", 0.5, "m"), _HEIGHT, _SEGMENTS),
         cone,
         lambda v: 3 * (v["segments"] + 1),
     ),
@@ -376,7 +317,7 @@ SHAPES: dict[str, Shape] = {
             Key("radius", LENGTH, "From the centre to the middle of the tube.", 0.5, "m"),
             Key("tube", LENGTH, "Radius of the tube.", 0.2, "m"),
             _SEGMENTS,
-            Key("sides", whole(3, 1024), "Sides around the tube.", 24),
+            _SIDES,
         ),
         torus,
         lambda v: (v["segments"] + 1) * (v["sides"] + 1),
@@ -389,17 +330,14 @@ SHAPES: dict[str, Shape] = {
             Key("p", whole(1, 32), "Turns about the axis.", 2),
             Key("q", whole(1, 32), "Turns through the hole.", 3),
             Key("segments", whole(3, 8192), "Segments along the knot.", 192),
-            Key("sides", whole(3, 1024), "Sides around the tube.", 24),
+            _SIDES,
         ),
         torus_knot,
         lambda v: (v["segments"] + 1) * (v["sides"] + 1),
     ),
     "stairs": Shape(
         "A solid flight of stairs that climbs towards -Z.",
-        (
-            Key("size", vector(3, 0, above=True), "Extent along X, Y and Z.", (1.0, 1.0, 1.0), "m"),
-            Key("steps", whole(1, 200), "Number of steps.", 5),
-        ),
+        (_SIZE, Key("steps", whole(1, 200), "Number of steps.", 5)),
         stairs,
         lambda v: 12 * v["steps"],
     ),
@@ -413,7 +351,7 @@ SHAPES: dict[str, Shape] = {
             _range("roughness", "At the left and at the right.", (0.1, 1.0)),
             _range("metallic", "At the bottom and at the top.", (0.0, 1.0)),
             _SEGMENTS,
-            Key("rings", whole(2, 1024), "Rows from pole to pole.", 24),
+            _RINGS,
         ),
         sphere_grid,
         lambda v: (v["segments"] + 1) * (v["rings"] + 1),
