@@ -1,66 +1,67 @@
-"""Placing the boxes of a layered drawing from left to right: order within layers, then heights."""
+"""A layered layout from left to right: the column of every node, the order within columns, then the heights."""
 
 from __future__ import annotations
 
 from bisect import bisect_right, insort
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from rendergraph.diagrams.cards import Link
 
 SWEEPS = 8
-GAP = 26.0  # between boxes of a layer
-LANE = 12.0  # height a passing link takes within a layer
+GAP = 26.0  # between boxes of a column
+LANE = 12.0  # height that a passing link takes within a column
 
 
-@dataclass
-class Box:
-    """A card, or the place where a link passes a layer it does not end in.
+class Box(Struct, eq=False):
+    """A card, or the place where a link passes a column that it does not end in."""
 
-    Attributes:
-        key: the node's id, or anything unique for a passing link.
-        layer: column.
-        height: in pixels.
-        y: top edge.
-        ties: what it is linked to: the other box, the height of the link's end here and there, from the tops.
-    """
-
-    key: object
+    key: object  # the node's id, or anything unique for a passing link
     layer: int
     height: float
-    y: float = 0.0
-    ties: list[tuple[Box, float, float]] = field(default_factory=list)
+    y: float = 0.0  # top edge
+    ties: list[tuple[Box, float, float]] = []  # linked boxes, with the height of the link's end here and there
 
 
-def layers_of(generations: Sequence[Sequence[str]], links: Sequence[Link]) -> dict[str, int]:
-    """Column of every node: as early as it can, but nodes that read nothing stand right before their first reader."""
-    layer = {id: place for place, generation in enumerate(generations) for id in generation}
+def layers_of(nodes: Sequence[str], links: Sequence[Link]) -> dict[str, int]:
+    """Return the column of every node: as early as possible, but nodes without inputs are beside their first reader."""
+    import networkx as nx  # takes longer than checking a pipeline
+
+    links = [link for link in links if not link.previous]
+    dag: nx.DiGraph[str] = nx.DiGraph()
+    dag.add_nodes_from(nodes)
+    dag.add_edges_from((link.source, link.target) for link in links)
+    layer = {id: place for place, members in enumerate(nx.topological_generations(dag)) for id in members}
     targets: dict[str, list[int]] = {}
-    fed = set()
     for link in links:
-        if not link.previous:
-            targets.setdefault(link.source, []).append(layer[link.target])
-            fed.add(link.target)
+        targets.setdefault(link.source, []).append(layer[link.target])
+    fed = {link.target for link in links}
     return {id: min(targets[id]) - 1 if id not in fed and id in targets else place for id, place in layer.items()}
 
 
+def tie(one: Box, other: Box, here: float, there: float) -> None:
+    """Connect two boxes at the given heights from their tops."""
+    one.ties.append((other, here, there))
+    other.ties.append((one, there, here))
+
+
 def place(columns: list[list[Box]]) -> None:
-    """Order the boxes of each column so that few links cross, then set their heights near what they are linked to."""
+    """Order the boxes of each column so that few links cross, then set heights close to those of linked boxes."""
     best, fewest = [list(column) for column in columns], _crossings(columns)
     for sweep in range(SWEEPS):
-        _number(columns)
-        for column in columns if sweep % 2 == 0 else reversed(columns):
-            side = -1 if sweep % 2 == 0 else 1
+        for column in columns:
+            _number(column)
+        side = -1 if sweep % 2 == 0 else 1
+        for column in columns[::-side]:
             rank = {id(box): _middle(box, side) for box in column}
             column.sort(key=lambda box: (rank[id(box)], box.y))
-            for number, box in enumerate(column):
-                box.y = float(number)
+            _number(column)
         crossings = _crossings(columns)
         if crossings < fewest:
             best, fewest = [list(column) for column in columns], crossings
     for column, order in zip(columns, best, strict=True):
         column[:] = order
-    for column in columns:
         y = 0.0
         for box in column:
             box.y = y
@@ -74,14 +75,13 @@ def place(columns: list[list[Box]]) -> None:
             box.y -= top
 
 
-def _number(columns: Sequence[Sequence[Box]]) -> None:
-    for column in columns:
-        for number, box in enumerate(column):
-            box.y = float(number)
+def _number(column: Sequence[Box]) -> None:
+    for number, box in enumerate(column):
+        box.y = float(number)
 
 
 def _middle(box: Box, side: int) -> float:
-    """Mean place of what it is linked to on one side, ports counting for fractions; its own where there is nothing."""
+    """Mean place of the linked boxes on one side, ports counting for fractions; its own place if there are none."""
     ends = [other.y + there / (other.height + 1) for other, _, there in box.ties if other.layer == box.layer + side]
     return sum(ends) / len(ends) if ends else box.y
 
@@ -96,39 +96,31 @@ def _crossings(columns: Sequence[Sequence[Box]]) -> int:
             for other, here, there in box.ties
             if other.layer == box.layer + 1
         )
-        seen: list[tuple[int, float]] = []
+        passed: list[tuple[int, float]] = []
         for _, end in ends:
-            total += len(seen) - bisect_right(seen, end)
-            insort(seen, end)
+            total += len(passed) - bisect_right(passed, end)
+            insort(passed, end)
     return total
 
 
 def _settle(column: list[Box]) -> None:
-    """Heights nearest, in least squares, to what each box is linked to, in the given order and without overlap.
+    """Move each box as close to its linked boxes as the order allows, in least squares and without overlap.
 
     The offsets that remain after the boxes below each other are subtracted must not fall: pool adjacent violators
     (Barlow, Bartholomew, Bremner and Brunk 1972).
     """
     offset = 0.0
-    blocks: list[tuple[float, float, int]] = []  # mean, weight, boxes
+    pools: list[tuple[float, float, int]] = []  # mean, weight, boxes
     for box in column:
         wishes = [other.y + there - here for other, here, there in box.ties]
         wish = (sum(wishes) / len(wishes) if wishes else box.y) - offset
-        blocks.append((wish, max(1.0, float(len(wishes))), 1))
-        while len(blocks) > 1 and blocks[-2][0] > blocks[-1][0]:
-            (a, wa, na), (b, wb, nb) = blocks[-2:]
-            blocks[-2:] = [((a * wa + b * wb) / (wa + wb), wa + wb, na + nb)]
+        pools.append((wish, max(1.0, float(len(wishes))), 1))
+        while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
+            (a, wa, na), (b, wb, nb) = pools[-2:]
+            pools[-2:] = [((a * wa + b * wb) / (wa + wb), wa + wb, na + nb)]
         offset += box.height + GAP
     offset = 0.0
-    boxes = iter(column)
-    for mean, _, number in blocks:
-        for _ in range(number):
-            box = next(boxes)
-            box.y = mean + offset
-            offset += box.height + GAP
-
-
-def tie(one: Box, other: Box, here: float, there: float) -> None:
-    """Note that a link leads from one box to another."""
-    one.ties.append((other, here, there))
-    other.ties.append((one, there, here))
+    means = [mean for mean, _, number in pools for _ in range(number)]
+    for box, mean in zip(column, means, strict=True):
+        box.y = mean + offset
+        offset += box.height + GAP

@@ -3,32 +3,36 @@
 from __future__ import annotations
 
 from html import escape
+from itertools import groupby
 from typing import Any
 
-from rendergraph.diagrams.cards import Card, cards, info_of, link_counts, links
+from msgspec import to_builtins
+
+from rendergraph.diagrams.cards import Card, Link, cards, info_of, links
+from rendergraph.formatting import table
 from rendergraph.link import Graph
+from rendergraph.textures import TextureDesc
 
 
 def text(graph: Graph) -> str:
-    """Nodes in reading order with what they take (←) and make (→), for a terminal."""
+    """Return the nodes in reading order with their inputs (←) and outputs (→), for a terminal."""
     width, height = graph.size
-    table = {card.id: card for card in cards(graph)}
-    rows: list[tuple[str, str, str]] = [(graph.name, f"{width}×{height}", "")]
+    card_of = {card.id: card for card in cards(graph)}
+    rows: list[tuple[str, ...]] = [(graph.name, f"{width}×{height}")]
     for id in graph.reading_order():
-        card = table[id]
-        rows += [("", "", ""), (f"  {id}", card.kind, "")]
-        for name, ends in graph[id].inputs.items():
-            rows += [(f"    ← {name}", str(end), "") for end in ends]
+        card = card_of[id]
+        rows += [("",), (f"  {id}", card.kind)]
+        rows += [(f"    ← {name}", str(end)) for name, ends in graph[id].inputs.items() for end in ends]
         for socket in card.outputs:
-            rows.append((f"    → {socket.name}", socket.carries or socket.semantic, "" if socket.used else "(unused)"))
-    rows += [("", "", ""), ("  outputs", "", "")] if graph.outputs else []
-    rows += [(f"    {name}", str(end), "") for name, end in graph.outputs.items()]
-    column = max(len(first) for first, _, _ in rows) + 2
-    return "".join(f"{first:{column}}{second}  {third}".rstrip() + "\n" for first, second, third in rows)
+            facts = (socket.carries or socket.semantic) + ("" if socket.used else "  (unused)")
+            rows.append((f"    → {socket.name}", facts))
+    rows += [("",), ("  outputs",)] if graph.outputs else []
+    rows += [(f"    {name}", str(end)) for name, end in graph.outputs.items()]
+    return table(rows) + "\n"
 
 
 def dot(graph: Graph) -> str:
-    """The graph in Graphviz's language, ports as cells of a table."""
+    """Return the graph in Graphviz's language, ports as cells of a table."""
     lines = [
         f"digraph {_dot(graph.name)} {{",
         "  rankdir=LR;",
@@ -48,7 +52,7 @@ def dot(graph: Graph) -> str:
 
 
 def _dot(word: str) -> str:
-    # In a DOT string a backslash starts an escape of its own even where it is no quote's.
+    # In a DOT string a backslash starts an escape even where it precedes no quote.
     return '"' + word.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
 
 
@@ -65,81 +69,72 @@ def _dot_table(card: Card) -> str:
 
 
 def mermaid(graph: Graph) -> str:
-    """The graph as a Mermaid flowchart; links between the same nodes are one arrow with all ports on it."""
-    found = cards(graph)
-    number = {card.id: f"n{place}" for place, card in enumerate(found)}  # ids such as `end` are words of the language
+    """Return the graph as a Mermaid flowchart; links between the same nodes are one arrow with all ports on it."""
+    number = {node.id: place for place, node in enumerate(graph.nodes)}  # ids such as `end` are words of the language
     lines = ["flowchart LR"]
-    for card in found:
-        lines.append(f'  {number[card.id]}["<b>{_mermaid(card.id)}</b><br/>{_mermaid(card.kind)}"]')
+    for card in cards(graph):
+        lines.append(f'  n{number[card.id]}["<b>{_mermaid(card.id)}</b><br/>{_mermaid(card.kind)}"]')
     for place, (name, end) in enumerate(graph.outputs.items()):
         lines.append(f'  o{place}(["{_mermaid(name)}"])')
-        lines.append(f'  {number[end.node]} -->|"{_mermaid(end.port)}"| o{place}')
-    pairs = link_counts(links(graph))
-    place_of = {card.id: place for place, card in enumerate(found)}
-    for source, target, previous in sorted(pairs, key=lambda pair: (place_of[pair[0]], place_of[pair[1]], pair[2])):
-        group = pairs[source, target, previous]
+        lines.append(f'  n{number[end.node]} -->|"{_mermaid(end.port)}"| o{place}')
+
+    def ends(link: Link) -> tuple[int, int, bool]:
+        return number[link.source], number[link.target], link.previous
+
+    for (source, target, previous), group in groupby(sorted(links(graph), key=ends), ends):
         ports = dict.fromkeys(
             link.source_port if link.source_port == link.target_port else f"{link.source_port} → {link.target_port}"
             for link in group
         )
-        label = "<br/>".join(_mermaid(port) for port in ports)
-        lines.append(f'  {number[source]} {"-.->" if previous else "-->"}|"{label}"| {number[target]}')
+        label = "<br/>".join(map(_mermaid, ports))
+        lines.append(f'  n{source} {"-.->" if previous else "-->"}|"{label}"| n{target}')
     return "\n".join(lines) + "\n"
 
 
 def _mermaid(word: str) -> str:
-    # Mermaid's own entities: `#` and the code point. Everything that could mean something to it or to HTML goes.
+    # Mermaid's entities are `#` and the code point; everything that may have a meaning in Mermaid or HTML is escaped.
     return "".join(c if c.isalnum() or c in " _-.,/→×" else f"#{ord(c)};" for c in word)
 
 
+def texture_json(desc: TextureDesc) -> dict[str, Any]:
+    return {
+        "format": desc.format,
+        "size": [desc.width, desc.height],
+        "layers": desc.layers,
+        "mips": desc.mips,
+        "samples": desc.samples,
+    }
+
+
 def graph_json(graph: Graph) -> dict[str, Any]:
-    """The graph as plain JSON values: `nodes`, `links`, `outputs`."""
-    nodes = []
-    for card in cards(graph):
-        node = graph[card.id]
-        outputs: dict[str, Any] = {}
-        for socket in card.outputs:
-            info = info_of(graph, card.id, socket.name)
-            made: dict[str, Any] = {"kind": socket.kind, "semantic": socket.semantic, "used": socket.used}
-            if info is not None and info.desc is not None:
-                desc = info.desc
-                made |= {
-                    "format": desc.format,
-                    "size": [desc.width, desc.height],
-                    "layers": desc.layers,
-                    "mips": desc.mips,
-                    "samples": desc.samples,
-                    "bytes": desc.bytes,
-                    "view": info.view,
-                    "lights": list(info.lights),
-                }
-            elif info is not None and info.bytes:
-                made["bytes"] = info.bytes
-            outputs[socket.name] = made
-        nodes.append(
-            {
-                "id": card.id,
-                "type": card.type,
-                "unknown": card.unknown,
-                "family": node.type.family,
-                "inputs": {name: [str(end) for end in ends] for name, ends in node.inputs.items()},
-                "outputs": outputs,
-                "parameters": dict(node.node),
-            }
-        )
+    """Return the graph as plain JSON values: `nodes`, `links`, `outputs`."""
     return {
         "name": graph.name,
         "size": list(graph.size),
-        "nodes": nodes,
-        "links": [
-            {
-                "source": link.source,
-                "source_port": link.source_port,
-                "target": link.target,
-                "target_port": link.target_port,
-                "previous": link.previous,
-            }
-            for link in links(graph)
-        ],
+        "nodes": [_node_json(graph, card) for card in cards(graph)],
+        "links": to_builtins(links(graph)),
         "outputs": {name: str(end) for name, end in graph.outputs.items()},
+    }
+
+
+def _node_json(graph: Graph, card: Card) -> dict[str, Any]:
+    outputs: dict[str, Any] = {}
+    for socket in card.outputs:
+        info = info_of(graph, card.id, socket.name)
+        found: dict[str, Any] = {"kind": socket.kind, "semantic": socket.semantic, "used": socket.used}
+        if info is not None and info.desc is not None:
+            found |= texture_json(info.desc)
+            found |= {"bytes": info.desc.bytes, "view": info.view, "lights": list(info.lights)}
+        elif info is not None and info.bytes:
+            found["bytes"] = info.bytes
+        outputs[socket.name] = found
+    node = graph[card.id]
+    return {
+        "id": card.id,
+        "type": card.type,
+        "unknown": card.unknown,
+        "family": node.type.family,
+        "inputs": {name: [str(end) for end in ends] for name, ends in node.inputs.items()},
+        "outputs": outputs,
+        "parameters": dict(node.node),
     }

@@ -5,10 +5,9 @@ from __future__ import annotations
 from html import escape
 
 from rendergraph.allocate import ResourcePlan
-from rendergraph.diagrams.plan import desc_text, live_bytes, rows_by_memory, use_of
+from rendergraph.diagrams.plan import format_resource, ids_by_memory, live_bytes, memory_name, use_of
 from rendergraph.formatting import format_bytes
 from rendergraph.schedule import step_names
-from rendergraph.textures import TextureDesc
 
 CELL, ROW, CHARACTER, MARGIN = 22.0, 20.0, 6.65, 20.0
 GROUP_GAP = 6.0
@@ -29,17 +28,20 @@ STYLE = """
 
 
 def lifetimes_svg(plan: ResourcePlan) -> str:
-    """Lifetimes and memory as a stand-alone SVG document, for light and dark pages.
+    """Return lifetimes and memory as a stand-alone SVG document, for light and dark pages.
 
-    One row a resource, in a band with all that live in the same texture; beneath, the bytes alive at each step against
-    the least peak; then the nodes that do not run.
+    One row per resource, in a band with those in the same texture; below, the bytes alive at each step and the least
+    peak; then the nodes that do not run.
     """
     steps, names = plan.schedule.steps, step_names(plan.schedule.steps)
-    ids = rows_by_memory(plan)
+    ids = ids_by_memory(plan)
     label = CHARACTER * max((len(id) for id in ids), default=8) + 10
     left = MARGIN + max(label, CHARACTER * len("live bytes") + 10)
     right = left + CELL * len(steps)
-    facts = {id: f"{_home(plan, id)} · {desc_text(plan.resources[id])} · {format_bytes(plan.bytes(id))}" for id in ids}
+    facts = {
+        id: f"{memory_name(plan, id)} · {format_resource(plan.resources[id])} · {format_bytes(plan.bytes(id))}"
+        for id in ids
+    }
     top = MARGIN + 26 + CHARACTER * max((len(name) for name in names.values()), default=0) * 0.94 + 8
     memory = plan.memory
     proof = "" if memory.proven else f" (bound {format_bytes(memory.lower_bound_bytes)})"
@@ -83,11 +85,6 @@ def lifetimes_svg(plan: ResourcePlan) -> str:
         f'font-size="11">\n<style>{STYLE}</style>'
     )
     return "\n".join([head, *parts, "</svg>"]) + "\n"
-
-
-def _home(plan: ResourcePlan, id: str) -> str:
-    word = "texture" if isinstance(plan.resources[id].desc, TextureDesc) else "buffer"
-    return f"{word} {'+'.join(str(index) for index in plan.placement[id])}"
 
 
 def _row(plan: ResourcePlan, id: str, left: float, right: float, y: float, fact: str) -> str:

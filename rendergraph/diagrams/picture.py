@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
-from rendergraph.diagrams.cards import Card, Link, Socket, cards, generations, links
+from msgspec import Struct
+from msgspec.structs import replace
+
+from rendergraph.diagrams.cards import Card, Link, Socket, cards, links
 from rendergraph.diagrams.layout import LANE, Box, layers_of, place, tie
 from rendergraph.link import Endpoint, Graph
 
@@ -17,20 +19,12 @@ FONT = "ui-monospace,'DejaVu Sans Mono',Menlo,Consolas,monospace"
 TITLE_FONT = "system-ui,'DejaVu Sans',sans-serif"
 MARGIN = 24.0
 
-# One hue a meaning, each at least 3:1 against white and against near-black, so that links show on any page.
-HUES = {
-    "radiance": "#c2701c",
-    "display_color": "#c2701c",
-    "emissive": "#c2701c",
-    "luminance": "#c2701c",
-    "depth": "#3b7dd8",
-    "linear_depth": "#3b7dd8",
-    "shadow_map": "#3b7dd8",
-    "normal": "#8a63d2",
-    "albedo": "#8a63d2",
-    "material": "#8a63d2",
-    "visibility": "#2c9163",
-    "occlusion": "#2c9163",
+# One colour for each meaning, each at least 3:1 against white and against near-black, so that links show on any page.
+COLORS = {
+    **dict.fromkeys(("radiance", "display_color", "emissive", "luminance"), "#c2701c"),
+    **dict.fromkeys(("depth", "linear_depth", "shadow_map"), "#3b7dd8"),
+    **dict.fromkeys(("normal", "albedo", "material"), "#8a63d2"),
+    **dict.fromkeys(("visibility", "occlusion"), "#2c9163"),
     "shadow": "#c94f7c",
 }
 GREY = "#7d8590"
@@ -44,22 +38,15 @@ STYLE = """
 """
 
 
-@dataclass(frozen=True)
-class Mark:
-    """What a picture points out about a node.
+class Mark(Struct, frozen=True):
+    """The colour in which a node is highlighted, and lines beneath its ports."""
 
-    Attributes:
-        hue: colour of its frame and notes.
-        notes: lines beneath its ports.
-    """
-
-    hue: str
+    color: str
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Sheet:
-    """What is drawn: cards, the links between them, and the ports that are the pipeline's outputs, by their names."""
+class Sheet(Struct, frozen=True):
+    """The content of a picture: cards, links, and the ports that are the pipeline's outputs, by their names."""
 
     title: str
     cards: Sequence[Card]
@@ -67,65 +54,158 @@ class Sheet:
     outputs: Mapping[str, Endpoint]
 
 
+class Trunk(Struct):
+    """All links from one output: one line runs through the columns, and readers branch off."""
+
+    links: list[Link]
+    lanes: dict[int, Box]  # the places that it takes, by column
+
+
 def sheet(graph: Graph) -> Sheet:
-    """All of a graph."""
+    """Return all of a graph."""
     return Sheet(graph.name, cards(graph), links(graph), graph.outputs)
 
 
 def svg(graph: Graph) -> str:
-    """The graph as a stand-alone SVG document, left to right, for light and dark pages."""
+    """Return the graph as a stand-alone SVG document, left to right, for light and dark pages."""
     return draw(sheet(graph))
 
 
-def draw(shown: Sheet, marks: Mapping[str, Mark] = {}, pointed: Mapping[Link, str] = {}) -> str:
-    """A sheet as a stand-alone SVG document, left to right, for light and dark pages.
+def draw(content: Sheet, marks: Mapping[str, Mark] = {}, highlights: Mapping[Link, str] = {}) -> str:
+    """Return a stand-alone SVG document, left to right, for light and dark pages.
 
     Args:
-        shown: what is drawn.
-        marks: nodes to point out.
-        pointed: links to point out, in a colour; what begins with `-` is dashed.
+        content: what is drawn.
+        marks: nodes to highlight.
+        highlights: links to highlight, with a colour; `-` before it means dashed.
     """
-    table = {card.id: replace(card, notes=marks[card.id].notes) if card.id in marks else card for card in shown.cards}
-    for name, end in shown.outputs.items():
-        made = next((socket for socket in table[end.node].outputs if socket.name == end.port), None)
-        socket = Socket(name, made.kind if made else "texture2d", made.semantic if made else "any")
-        table[f"output {name}"] = Card(f"output {name}", "", (socket,), ())
-    found = list(shown.links)
-    layer_of = layers_of(generations([card.id for card in shown.cards], found), found)
-    found += [Link(end.node, end.port, f"output {name}", name) for name, end in shown.outputs.items()]
-    last = max(layer_of.values(), default=-1) + 1
-    layer_of |= {f"output {name}": last for name in shown.outputs}
+    return _Picture(content, marks, highlights).draw()
 
-    boxes = {id: Box(id, layer_of[id], _height(card)) for id, card in table.items()}
-    columns: list[list[Box]] = [[] for _ in range(last + 1)]
-    for box in boxes.values():
-        columns[box.layer].append(box)
-    trunks = _trunks(found, boxes, table, columns)
-    place(columns)
 
-    widths = [
-        max((_width(table[str(box.key)]) for box in column if box.key in table), default=0.0) for column in columns
-    ]
-    lefts = [MARGIN + sum(widths[:number]) + COLUMN_GAP * number for number in range(len(widths))]
-    bottom = max((box.y + box.height for column in columns for box in column), default=0.0)
-    returns = [link for link in found if link.previous]
-    width = (lefts[-1] + widths[-1] if widths else 0.0) + MARGIN
-    height = bottom + 2 * MARGIN + (14 * len(returns) + 10 if returns else 0)
+class _Picture:
+    """The layout of a sheet."""
 
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
-        f'height="{height:.0f}" font-family="{FONT}" font-size="11">',
-        f"<title>{escape(shown.title)}</title>",
-        f"<style>{STYLE}</style>",
-    ]
-    for trunk in trunks:
-        parts += _strokes(trunk, boxes, table, lefts, widths, pointed)
-    for number, link in enumerate(returns):
-        parts.append(_return(link, boxes, table, lefts, widths, MARGIN + bottom + 14 * (number + 1), pointed))
-    for id, card in table.items():
-        box = boxes[id]
-        parts.append(_card(card, lefts[box.layer], box.y + MARGIN, widths[box.layer], marks.get(id)))
-    return "\n".join([*parts, "</svg>"]) + "\n"
+    def __init__(self, content: Sheet, marks: Mapping[str, Mark], highlights: Mapping[Link, str]) -> None:
+        self.title, self.marks, self.highlights = content.title, marks, highlights
+        self.cards = {
+            card.id: replace(card, notes=marks[card.id].notes) if card.id in marks else card for card in content.cards
+        }
+        self.links = list(content.links)
+        layer_of = layers_of([card.id for card in content.cards], self.links)
+        last = max(layer_of.values(), default=-1) + 1
+        for name, end in content.outputs.items():
+            source = next((socket for socket in self.cards[end.node].outputs if socket.name == end.port), None)
+            socket = Socket(name, source.kind if source else "texture2d", source.semantic if source else "any")
+            key = f"output {name}"
+            self.cards[key] = Card(key, "", (socket,), ())
+            self.links.append(Link(end.node, end.port, key, name))
+            layer_of[key] = last
+        self.boxes = {id: Box(id, layer_of[id], _height(card)) for id, card in self.cards.items()}
+        columns: list[list[Box]] = [[] for _ in range(last + 1)]
+        for box in self.boxes.values():
+            columns[box.layer].append(box)
+        self.trunks = self._make_trunks(columns)
+        place(columns)
+        self.widths = [
+            max((_width(self.cards[str(box.key)]) for box in column if box.key in self.cards), default=0.0)
+            for column in columns
+        ]
+        self.lefts = [MARGIN + sum(self.widths[:number]) + COLUMN_GAP * number for number in range(len(columns))]
+        self.bottom = max((box.y + box.height for column in columns for box in column), default=0.0)
+
+    def _make_trunks(self, columns: list[list[Box]]) -> list[Trunk]:
+        """Give the links of every output their lanes, and tie boxes and lanes together."""
+        by_port: dict[tuple[str, str], list[Link]] = {}
+        for link in self.links:
+            if not link.previous:
+                by_port.setdefault((link.source, link.source_port), []).append(link)
+        trunks = []
+        for (source, port), members in by_port.items():
+            start, start_height = self.boxes[source], _out_height(self.cards[source], port)
+            trunk = Trunk(members, {})
+            before, height = start, start_height
+            for layer in range(start.layer + 1, max(self.boxes[link.target].layer for link in members)):
+                lane = trunk.lanes[layer] = Box((source, port, layer), layer, LANE)
+                columns[layer].append(lane)
+                tie(before, lane, height, LANE / 2)
+                before, height = lane, LANE / 2
+            for link in members:
+                end = self.boxes[link.target]
+                stop = trunk.lanes.get(end.layer - 1, start)
+                here = LANE / 2 if stop is not start else start_height
+                tie(stop, end, here, _in_height(self.cards[link.target], link.target_port))
+            trunks.append(trunk)
+        return trunks
+
+    def draw(self) -> str:
+        returns = [link for link in self.links if link.previous]
+        width = (self.lefts[-1] + self.widths[-1] if self.widths else 0.0) + MARGIN
+        height = self.bottom + 2 * MARGIN + (14 * len(returns) + 10 if returns else 0)
+        parts = [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
+            f'height="{height:.0f}" font-family="{FONT}" font-size="11">',
+            f"<title>{escape(self.title)}</title>",
+            f"<style>{STYLE}</style>",
+        ]
+        for trunk in self.trunks:
+            parts += self._trunk(trunk)
+        for number, link in enumerate(returns, start=1):
+            parts.append(self._return(link, MARGIN + self.bottom + 14 * number))
+        for id, card in self.cards.items():
+            layer, y = self.boxes[id].layer, self.boxes[id].y + MARGIN
+            if card.type:
+                parts += _card(card, self.lefts[layer], y, self.widths[layer], self.marks.get(id))
+            else:
+                parts.append(_pill(card, self.lefts[layer], y))
+        return "\n".join([*parts, "</svg>"]) + "\n"
+
+    def _source(self, link: Link) -> tuple[float, float]:
+        box = self.boxes[link.source]
+        right = self.lefts[box.layer] + self.widths[box.layer]
+        return right, box.y + MARGIN + _out_height(self.cards[link.source], link.source_port)
+
+    def _target(self, link: Link) -> tuple[float, float]:
+        box = self.boxes[link.target]
+        return self.lefts[box.layer], box.y + MARGIN + _in_height(self.cards[link.target], link.target_port)
+
+    def _color(self, link: Link) -> str:
+        return _color(next(s for s in self.cards[link.source].outputs if s.name == link.source_port))
+
+    def _trunk(self, trunk: Trunk) -> Iterator[str]:
+        first = trunk.links[0]
+        ends = {self.boxes[first.source].layer: self._source(first)}
+        path = ""
+        for layer, lane in trunk.lanes.items():
+            y = lane.y + MARGIN + LANE / 2
+            right = self.lefts[layer] + self.widths[layer]
+            path += _bend(ends[layer - 1], (self.lefts[layer], y), begin=not path) + f"H{right:.1f}"
+            ends[layer] = (right, y)
+        if path:
+            yield _stroke(f"{first.source}.{first.source_port}", path, self._color(first), "")
+        for link in trunk.links:
+            start = ends[self.boxes[link.target].layer - 1]
+            yield self._link(link, _bend(start, self._target(link), begin=True))
+
+    def _return(self, link: Link, lane: float) -> str:
+        """Last frame's value: out to the right, back beneath everything, in from the left."""
+        (x, y), (end_x, end_y) = self._source(link), self._target(link)
+        out, back = x + COLUMN_GAP * 0.4, end_x - COLUMN_GAP * 0.4
+        return self._link(
+            link,
+            f"M{x:.1f} {y:.1f}H{out - 8:.1f}"
+            f"Q{out:.1f} {y:.1f} {out:.1f} {y + 8:.1f}V{lane - 8:.1f}Q{out:.1f} {lane:.1f} {out - 8:.1f} {lane:.1f}"
+            f"H{back + 8:.1f}Q{back:.1f} {lane:.1f} {back:.1f} {lane - 8:.1f}V{end_y + 8:.1f}"
+            f"Q{back:.1f} {end_y:.1f} {back + 8:.1f} {end_y:.1f}H{end_x:.1f}",
+        )
+
+    def _link(self, link: Link, path: str) -> str:
+        previous = "@previous" if link.previous else ""
+        title = f"{link.source}.{link.source_port}{previous} → {link.target}.{link.target_port}"
+        if link not in self.highlights:
+            return _stroke(title, path, self._color(link), ' stroke-dasharray="5 4"' if link.previous else "")
+        color = self.highlights[link].removeprefix("-")
+        dashes = ' stroke-dasharray="3 5"' if self.highlights[link] != color else ""
+        return _stroke(title, path, color, f' class="pointed"{dashes}')
 
 
 # --- measures --------------------------------------------------------------------------------------------------------
@@ -154,176 +234,66 @@ def _in_height(card: Card, port: str) -> float:
     return HEAD + ROW * (len(card.outputs) + [socket.name for socket in card.inputs].index(port) + 0.5)
 
 
-@dataclass
-class Trunk:
-    """Everything that leads from one output: it runs once through the columns, and readers branch off.
-
-    Attributes:
-        links: what it serves.
-        lanes: the places it takes in the columns it passes, by column.
-    """
-
-    links: list[Link]
-    lanes: dict[int, Box]
+# --- shapes ----------------------------------------------------------------------------------------------------------
 
 
-def _trunks(found: list[Link], boxes: dict[str, Box], table: dict[str, Card], columns: list[list[Box]]) -> list[Trunk]:
-    """Give the links of every output their lanes, and tie boxes and lanes together."""
-    by_port: dict[tuple[str, str], list[Link]] = {}
-    for link in found:
-        if not link.previous:
-            by_port.setdefault((link.source, link.source_port), []).append(link)
-    trunks = []
-    for (source, port), served in by_port.items():
-        start = boxes[source]
-        lanes: dict[int, Box] = {}
-        before, height = start, _out_height(table[source], port)
-        for layer in range(start.layer + 1, max(boxes[link.target].layer for link in served)):
-            lanes[layer] = Box((source, port, layer), layer, LANE)
-            columns[layer].append(lanes[layer])
-            tie(before, lanes[layer], height, LANE / 2)
-            before, height = lanes[layer], LANE / 2
-        for link in served:
-            end = boxes[link.target]
-            stop = lanes.get(end.layer - 1, start)
-            here = LANE / 2 if stop is not start else _out_height(table[source], port)
-            tie(stop, end, here, _in_height(table[link.target], link.target_port))
-        trunks.append(Trunk(served, lanes))
-    return trunks
+def _color(socket: Socket) -> str:
+    return COLORS.get(socket.semantic, GREY)
 
 
-# --- strokes ---------------------------------------------------------------------------------------------------------
-
-
-def _hue(socket: Socket) -> str:
-    return HUES.get(socket.semantic, GREY)
-
-
-def _source_socket(link: Link, table: dict[str, Card]) -> Socket:
-    return next(socket for socket in table[link.source].outputs if socket.name == link.source_port)
-
-
-def _strokes(
-    trunk: Trunk,
-    boxes: dict[str, Box],
-    table: dict[str, Card],
-    lefts: list[float],
-    widths: list[float],
-    pointed: Mapping[Link, str],
-) -> list[str]:
-    first = trunk.links[0]
-    start, card = boxes[first.source], table[first.source]
-    hue = _hue(_source_socket(first, table))
-    ends = {
-        start.layer: (lefts[start.layer] + widths[start.layer], start.y + MARGIN + _out_height(card, first.source_port))
-    }
-    path = ""
-    for layer, lane in trunk.lanes.items():
-        y = lane.y + MARGIN + LANE / 2
-        path += _bend(*ends[layer - 1], lefts[layer], y, begin=not path) + f"H{lefts[layer] + widths[layer]:.1f}"
-        ends[layer] = (lefts[layer] + widths[layer], y)
-    strokes = [_stroke(f"{first.source}.{first.source_port}", path, hue, "")] if path else []
-    for link in trunk.links:
-        end = boxes[link.target]
-        y = end.y + MARGIN + _in_height(table[link.target], link.target_port)
-        own, extra = _pointed(link, hue, pointed)
-        strokes.append(_stroke(_title(link), _bend(*ends[end.layer - 1], lefts[end.layer], y, begin=True), own, extra))
-    return strokes
-
-
-def _bend(x: float, y: float, end_x: float, end_y: float, *, begin: bool) -> str:
+def _bend(start: tuple[float, float], end: tuple[float, float], *, begin: bool) -> str:
+    (x, y), (end_x, end_y) = start, end
     middle = (x + end_x) / 2
-    start = f"M{x:.1f} {y:.1f}" if begin else ""
-    return f"{start}C{middle:.1f} {y:.1f} {middle:.1f} {end_y:.1f} {end_x:.1f} {end_y:.1f}"
+    move = f"M{x:.1f} {y:.1f}" if begin else ""
+    return f"{move}C{middle:.1f} {y:.1f} {middle:.1f} {end_y:.1f} {end_x:.1f} {end_y:.1f}"
 
 
-def _pointed(link: Link, hue: str, pointed: Mapping[Link, str]) -> tuple[str, str]:
-    """Colour and style of a link."""
-    if link not in pointed:
-        return hue, ' stroke-dasharray="5 4"' if link.previous else ""
-    own = pointed[link].removeprefix("-")
-    return own, ' class="pointed"' + (' stroke-dasharray="3 5"' if pointed[link] != own else "")
+def _stroke(title: str, path: str, color: str, extra: str) -> str:
+    line = f'<path d="{path}" fill="none" stroke="{color}" stroke-width="1.6"{extra}>'
+    return f"{line}<title>{escape(title)}</title></path>"
 
 
-def _return(
-    link: Link,
-    boxes: dict[str, Box],
-    table: dict[str, Card],
-    lefts: list[float],
-    widths: list[float],
-    lane: float,
-    pointed: Mapping[Link, str],
-) -> str:
-    """Last frame's value: out to the right, back beneath everything, in from the left."""
-    source, target = boxes[link.source], boxes[link.target]
-    x = lefts[source.layer] + widths[source.layer]
-    y = source.y + MARGIN + _out_height(table[link.source], link.source_port)
-    end_x, end_y = lefts[target.layer], target.y + MARGIN + _in_height(table[link.target], link.target_port)
-    out, back = x + COLUMN_GAP * 0.4, end_x - COLUMN_GAP * 0.4
-    path = (
-        f"M{x:.1f} {y:.1f}H{out - 8:.1f}"
-        f"Q{out:.1f} {y:.1f} {out:.1f} {y + 8:.1f}V{lane - 8:.1f}Q{out:.1f} {lane:.1f} {out - 8:.1f} {lane:.1f}"
-        f"H{back + 8:.1f}Q{back:.1f} {lane:.1f} {back:.1f} {lane - 8:.1f}V{end_y + 8:.1f}"
-        f"Q{back:.1f} {end_y:.1f} {back + 8:.1f} {end_y:.1f}H{end_x:.1f}"
-    )
-    return _stroke(_title(link), path, *_pointed(link, _hue(_source_socket(link, table)), pointed))
-
-
-def _title(link: Link) -> str:
-    previous = "@previous" if link.previous else ""
-    return f"{link.source}.{link.source_port}{previous} → {link.target}.{link.target_port}"
-
-
-def _stroke(title: str, path: str, hue: str, extra: str) -> str:
+def _pill(card: Card, x: float, y: float) -> str:
+    """An output of the pipeline."""
     return (
-        f'<path d="{path}" fill="none" stroke="{hue}" stroke-width="1.6"{extra}><title>{escape(title)}</title></path>'
+        f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{_width(card):.1f}" height="26" rx="13"/>'
+        + _dot(x, y + 13, card.inputs[0])
+        + f'<text class="port" x="{x + 2 * PAD:.1f}" y="{y + 17:.1f}">{escape(card.inputs[0].name)}</text>'
     )
 
 
-def _card(card: Card, x: float, y: float, column: float, mark: Mark | None = None) -> str:
-    if not card.type:
-        width = _width(card)
-        return (
-            f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="26" rx="13"/>'
-            + _dot(x, y + 13, card.inputs[0])
-            + f'<text class="port" x="{x + 2 * PAD:.1f}" y="{y + 17:.1f}">{escape(card.inputs[0].name)}</text>'
-        )
-    width, height = column, _height(card)
+def _card(card: Card, x: float, y: float, width: float, mark: Mark | None) -> Iterator[str]:
+    frame = f'x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{_height(card):.1f}" rx="6"'
     dashes = ' stroke-dasharray="6 4"' if card.unknown else ""
-    parts = [
-        f'<rect class="card" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="6"{dashes}/>',
+    yield f'<rect class="card" {frame}{dashes}/>'
+    yield (
         f'<path class="head" d="M{x + 0.5:.1f} {y + HEAD - 4:.1f}v-{HEAD - 10.5:.1f}q0-6 6-6h{width - 13:.1f}q6 0 6 6'
-        f'v{HEAD - 10.5:.1f}z"/>',
-        f'<text class="name" x="{x + PAD:.1f}" y="{y + 16:.1f}" font-family="{TITLE_FONT}">{escape(card.id)}</text>',
-        f'<text class="type" x="{x + PAD:.1f}" y="{y + 30:.1f}">{escape(card.kind)}</text>',
-    ]
+        f'v{HEAD - 10.5:.1f}z"/>'
+    )
+    yield f'<text class="name" x="{x + PAD:.1f}" y="{y + 16:.1f}" font-family="{TITLE_FONT}">{escape(card.id)}</text>'
+    yield f'<text class="type" x="{x + PAD:.1f}" y="{y + 30:.1f}">{escape(card.kind)}</text>'
     for socket in card.outputs:
         middle = y + _out_height(card, socket.name)
-        faint = "" if socket.used else " unused"
-        parts.append(_dot(x + width, middle, socket))
-        parts.append(
-            f'<text class="port{faint}" x="{x + width - PAD:.1f}" y="{middle + 4:.1f}" text-anchor="end">'
-            f'<tspan class="fact">{escape(socket.carries)}</tspan>  {escape(socket.name)}</text>'
+        yield _dot(x + width, middle, socket)
+        yield (
+            f'<text class="port{"" if socket.used else " unused"}" x="{x + width - PAD:.1f}" y="{middle + 4:.1f}" '
+            f'text-anchor="end"><tspan class="fact">{escape(socket.carries)}</tspan>  {escape(socket.name)}</text>'
         )
     for socket in card.inputs:
         middle = y + _in_height(card, socket.name)
-        parts.append(_dot(x, middle, socket))
-        parts.append(f'<text class="port" x="{x + PAD:.1f}" y="{middle + 4:.1f}">{escape(socket.name)}</text>')
+        yield _dot(x, middle, socket)
+        yield f'<text class="port" x="{x + PAD:.1f}" y="{middle + 4:.1f}">{escape(socket.name)}</text>'
     if mark is not None:
-        parts.append(
-            f'<rect class="mark" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="6" '
-            f'fill="{mark.hue}" stroke="{mark.hue}"/>'
-        )
+        yield f'<rect class="mark" {frame} fill="{mark.color}" stroke="{mark.color}"/>'
         top = y + HEAD + ROW * (len(card.outputs) + len(card.inputs))
         for number, note in enumerate(card.notes):
             row = top + ROW * (number + 0.5) + 4
-            parts.append(f'<text class="note" x="{x + PAD:.1f}" y="{row:.1f}" fill="{mark.hue}">{escape(note)}</text>')
-    return "\n".join(parts)
+            yield f'<text class="note" x="{x + PAD:.1f}" y="{row:.1f}" fill="{mark.color}">{escape(note)}</text>'
 
 
 def _dot(x: float, y: float, socket: Socket) -> str:
-    fill = _hue(socket) if socket.used else "none"
+    color = _color(socket)
     return (
-        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS}" fill="{fill}" stroke="{_hue(socket)}" stroke-width="1.5">'
-        f"<title>{escape(socket.kind)} · {escape(socket.semantic)}</title></circle>"
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{RADIUS}" fill="{color if socket.used else "none"}" stroke="{color}" '
+        f'stroke-width="1.5"><title>{escape(socket.kind)} · {escape(socket.semantic)}</title></circle>'
     )

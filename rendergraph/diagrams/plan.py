@@ -3,70 +3,75 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Any
 
 from rendergraph.allocate import ResourcePlan
-from rendergraph.diagrams.cards import describe
-from rendergraph.formatting import format_bytes
+from rendergraph.diagrams.cards import format_texture
+from rendergraph.diagrams.markup import texture_json
+from rendergraph.formatting import format_bytes, table
 from rendergraph.schedule import step_names
 from rendergraph.steps import Resource, Step
 from rendergraph.textures import TextureDesc
 
-# A matrix wider than this is no longer read; lifetimes are then given as numbers.
+# A matrix wider than this is unreadable; lifetimes are then given as numbers.
 MOST_COLUMNS = 160
 MOST_NAMES = 3
 
 
-def desc_text(resource: Resource) -> str:
-    """Format and size, or bytes of a buffer."""
-    return describe(resource.desc) if isinstance(resource.desc, TextureDesc) else f"buffer {resource.desc.bytes} B"
+def format_resource(resource: Resource) -> str:
+    """Return format and size, or the bytes of a buffer."""
+    desc = resource.desc
+    return format_texture(desc) if isinstance(desc, TextureDesc) else f"buffer {desc.bytes} B"
 
 
 def live_bytes(plan: ResourcePlan) -> list[int]:
-    """Bytes alive at each step: history at all of them, outputs from their first write on."""
+    """Return the bytes alive at each step: history at all of them, outputs from their first write on."""
     change = [0] * (len(plan.schedule.steps) + 1)
     for id, life in plan.lifetimes.items():
         if plan.schedule.steps:
             change[life.first] += plan.bytes(id)
             change[life.last + 1] -= plan.bytes(id)
-    live = []
-    total = 0
-    for difference in change[:-1]:
-        total += difference
-        live.append(total)
-    return live
+    return list(accumulate(change[:-1]))
 
 
 def use_of(step: Step, id: str) -> str:
-    """How a step touches a resource: `R` reads, `W` writes, `B` both, `P` reads last frame's value, or nothing."""
-    wrote = any(write.resource == id for write in step.writes)
+    """Return how a step uses a resource: `R` reads, `W` writes, `B` both, `P` reads last frame's value, or nothing."""
     reads = [read for read in step.all_reads if read.resource == id]
-    if wrote and reads:
-        return "B"
-    if wrote:
-        return "W"
-    if reads:
-        return "P" if all(read.previous for read in reads) else "R"
-    return ""
+    if any(write.resource == id for write in step.writes):
+        return "B" if reads else "W"
+    if not reads:
+        return ""
+    return "P" if all(read.previous for read in reads) else "R"
 
 
-def rows_by_memory(plan: ResourcePlan) -> list[str]:
-    """Resource ids so that what shares memory stands together, in the order of time."""
+def ids_by_memory(plan: ResourcePlan) -> list[str]:
+    """Return resource ids so that those that share memory are together, in the order of time."""
     return sorted(plan.resources, key=lambda id: (plan.placement[id], plan.lifetimes[id].first, id))
 
 
+def memory_name(plan: ResourcePlan, id: str) -> str:
+    """Return `texture 3`, or `texture 3+4` for history."""
+    kind = "texture" if isinstance(plan.resources[id].desc, TextureDesc) else "buffer"
+    return f"{kind} {'+'.join(map(str, plan.placement[id]))}"
+
+
 def plan_text(plan: ResourcePlan) -> str:
-    """Order with reads, writes and reasons; lifetimes; who shares; what is culled; bytes."""
-    parts = [_order_text(plan), _lifetimes_text(plan), _sharing_text(plan)]
-    if plan.schedule.culled:
-        rows = [(f"  {node}", reason) for node, reason in sorted(plan.schedule.culled.items())]
-        parts.append("not run\n" + _table(rows))
-    parts.append("memory\n" + _table(_memory_rows(plan)))
-    return "\n".join(part for part in parts if part)
+    """Return order with reads, writes and reasons; lifetimes; sharing; culled nodes; bytes."""
+    resources = ids_by_memory(plan)
+    culled = [(f"  {node}", reason) for node, reason in sorted(plan.schedule.culled.items())]
+    parts = [
+        "order\n" + table(_order_rows(plan), right=(4,)),
+        _lifetimes_text(plan, resources) if resources else "",
+        "sharing\n" + table([(f"  {id}", plan.reasons[id]) for id in resources]) if resources else "",
+        "not run\n" + table(culled) if culled else "",
+        "memory\n" + table(_memory_rows(plan)),
+    ]
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def plan_json(plan: ResourcePlan) -> dict[str, Any]:
-    """The plan as plain JSON values: `order`, `resources`, `physicals`, `memory`, `culled`.
+    """Return the plan as plain JSON values: `order`, `resources`, `physicals`, `memory`, `culled`.
 
     Positions (`first`, `last`) count from 0 in `order`.
     """
@@ -92,7 +97,7 @@ def plan_json(plan: ResourcePlan) -> dict[str, Any]:
             }
             for position, step in enumerate(schedule.steps)
         ],
-        "resources": [_resource_json(plan, id) for id in rows_by_memory(plan)],
+        "resources": [_resource_json(plan, id) for id in ids_by_memory(plan)],
         "physicals": [
             {"index": physical.index, "bytes": physical.bytes, "members": list(physical.members)}
             for physical in plan.physicals
@@ -104,117 +109,67 @@ def plan_json(plan: ResourcePlan) -> dict[str, Any]:
 
 def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     resource, life = plan.resources[id], plan.lifetimes[id]
-    found: dict[str, Any] = {"id": id, "role": resource.role, "bytes": plan.bytes(id)}
+    found: dict[str, Any] = {"id": id, "role": resource.role, "bytes": plan.bytes(id), "kind": "buffer"}
     if isinstance(resource.desc, TextureDesc):
-        desc = resource.desc
-        found |= {
-            "kind": desc.kind,
-            "format": desc.format,
-            "size": [desc.width, desc.height],
-            "layers": desc.layers,
-            "mips": desc.mips,
-            "samples": desc.samples,
-        }
-    else:
-        found["kind"] = "buffer"
-    return found | {
-        "first": life.first,
-        "last": life.last,
-        "physical": list(plan.placement[id]),
-        "reason": plan.reasons[id],
-    }
+        found |= {"kind": resource.desc.kind, **texture_json(resource.desc)}
+    found |= {"first": life.first, "last": life.last}
+    return found | {"physical": list(plan.placement[id]), "reason": plan.reasons[id]}
 
 
-def _order_text(plan: ResourcePlan) -> str:
+def _order_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:
     names = step_names(plan.schedule.steps)
-    live = live_bytes(plan)
-    rows = [("  #", "step", "reads", "writes", "live", "why here")]
-    for position, step in enumerate(plan.schedule.steps):
-        continued = {read.resource for read in step.reads if read.use == "attach"}  # kept, and not looked at
+    rows: list[tuple[str, ...]] = [("  #", "step", "reads", "writes", "live", "why here")]
+    for position, (step, live) in enumerate(zip(plan.schedule.steps, live_bytes(plan), strict=True), start=1):
+        continued = {read.resource for read in step.reads if read.use == "attach"}  # kept, but not sampled
         reads = [
             read.resource + ("@previous" if read.previous else "") for read in step.all_reads if read.use != "attach"
         ]
         writes = [w.resource + (" (continued)" if w.resource in continued else "") for w in step.writes]
-        rows.append(
-            (
-                f"{position + 1:3}",
-                names[step.key],
-                _ids(reads),
-                _ids(writes),
-                format_bytes(live[position]),
-                plan.schedule.reasons.get(step.key, ""),
-            )
-        )
-    return "order\n" + _table(rows, right=(4,))
+        reason = plan.schedule.reasons.get(step.key, "")
+        rows.append((f"{position:3}", names[step.key], _first(reads), _first(writes), format_bytes(live), reason))
+    return rows
 
 
-def _ids(ids: Sequence[str]) -> str:
-    """The first few, each once; the matrix beneath has all of them."""
-    found = list(dict.fromkeys(ids))
-    return (
-        ", ".join(found[:MOST_NAMES]) + (f", {len(found) - MOST_NAMES} more" if len(found) > MOST_NAMES else "") or "-"
-    )
+def _first(ids: Sequence[str]) -> str:
+    """The first few, each once; the matrix below has all of them."""
+    unique = list(dict.fromkeys(ids))
+    more = [f"{len(unique) - MOST_NAMES} more"] if len(unique) > MOST_NAMES else []
+    return ", ".join(unique[:MOST_NAMES] + more) or "-"
 
 
-def _lifetimes_text(plan: ResourcePlan) -> str:
+def _lifetimes_text(plan: ResourcePlan, resources: Sequence[str]) -> str:
     steps = plan.schedule.steps
-    if not plan.resources:
-        return ""
-    numbers = [str(position + 1) for position in range(len(steps))]
-    deep = max((len(number) for number in numbers), default=0)
-    wide = len(steps) <= MOST_COLUMNS
+    is_matrix = len(steps) <= MOST_COLUMNS
     rows: list[tuple[str, ...]] = []
-    if wide:
-        rows += [("", "".join(number.rjust(deep)[digit] for number in numbers), "") for digit in range(deep)]
-    for id in rows_by_memory(plan):
+    if is_matrix:
+        numbers = [str(position + 1) for position in range(len(steps))]
+        digits = max(map(len, numbers), default=0)
+        rows += [("", "".join(number.rjust(digits)[digit] for number in numbers)) for digit in range(digits)]
+    for id in resources:
         life = plan.lifetimes[id]
-        if wide:
-            cells = (use_of(step, id) or ("─" if life.first <= p <= life.last else "·") for p, step in enumerate(steps))
-            span = "".join(cells)
-        else:
-            span = f"{life.first + 1}–{life.last + 1}"
-        rows.append((f"  {id}", span, _home(plan, id), format_bytes(plan.bytes(id)), desc_text(plan.resources[id])))
-    legend = "W writes, R reads, B both, P reads last frame's, ─ kept" if wide else "first and last step"
-    return f"lifetimes ({legend})\n" + _table(rows, right=(3,))
-
-
-def _home(plan: ResourcePlan, id: str) -> str:
-    word = "texture" if isinstance(plan.resources[id].desc, TextureDesc) else "buffer"
-    word = "block" if plan.physicals[plan.placement[id][0]].block else word
-    return f"{word} {'+'.join(str(index) for index in plan.placement[id])}"
-
-
-def _sharing_text(plan: ResourcePlan) -> str:
-    return (
-        "sharing\n" + _table([(f"  {id}", plan.reasons[id]) for id in rows_by_memory(plan)]) if plan.resources else ""
-    )
+        span = f"{life.first + 1}–{life.last + 1}"
+        if is_matrix:
+            uses = (use_of(step, id) or ("─" if life.first <= p <= life.last else "·") for p, step in enumerate(steps))
+            span = "".join(uses)
+        memory = memory_name(plan, id)
+        if plan.physicals[plan.placement[id][0]].block:
+            memory = f"block {memory.partition(' ')[2]}"
+        rows.append((f"  {id}", span, memory, format_bytes(plan.bytes(id)), format_resource(plan.resources[id])))
+    legend = "W writes, R reads, B both, P reads last frame's, ─ kept" if is_matrix else "first and last step"
+    return f"lifetimes ({legend})\n" + table(rows, right=(3,))
 
 
 def _memory_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:
     memory = plan.memory
     gap = memory.least_peak_bytes - memory.lower_bound_bytes
-    proof = "no order needs less" if memory.proven else f"the least found is {format_bytes(gap)} above it"
-    rows: list[tuple[str, ...]] = [
-        ("  no reuse", format_bytes(memory.no_reuse_bytes), "every resource its own"),
-        ("  allocated", format_bytes(memory.allocated_bytes), f"shared by {memory.tier}"),
-        ("  lower bound", format_bytes(memory.lower_bound_bytes), f"of the peak of live bytes: {proof}"),
+    proof = "no order needs less" if memory.proven else f"the best order found needs {format_bytes(gap)} more"
+    rows: list[tuple[str, int | None, str]] = [
+        ("  no reuse", memory.no_reuse_bytes, "every resource its own"),
+        ("  allocated", memory.allocated_bytes, f"shared by {memory.tier}"),
+        ("  peak", plan.schedule.peak_bytes, f"of live bytes in this order, at {memory.peak_node}"),
+        ("  lower bound", memory.lower_bound_bytes, f"of the peak of live bytes: {proof}"),
+        ("  next tier", memory.next_tier_bytes, f"shared by {memory.next_tier}"),
     ]
-    if memory.peak_node is not None:
-        rows.insert(
-            2, ("  peak", format_bytes(plan.schedule.peak_bytes), f"of live bytes in this order, at {memory.peak_node}")
-        )
-    if memory.next_tier is not None and memory.next_tier_bytes is not None:
-        rows.append(("  next tier", format_bytes(memory.next_tier_bytes), f"shared by {memory.next_tier}"))
-    return rows
-
-
-def _table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    widths: dict[int, int] = {}
-    for row in rows:
-        for column, cell in enumerate(row):
-            widths[column] = max(widths.get(column, 0), len(cell))
-    lines = []
-    for row in rows:
-        cells = [cell.rjust(widths[i]) if i in right else cell.ljust(widths[i]) for i, cell in enumerate(row)]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines) + "\n"
+    if memory.peak_node is None:
+        del rows[2]
+    return [(name, format_bytes(count), text) for name, count, text in rows if count is not None]

@@ -1,4 +1,4 @@
-"""What differs between two graphs: as a value, as text, as JSON and as a picture. Needs no GL."""
+"""The differences between two graphs: as a value, as text, as JSON and as a picture. Needs no GL."""
 
 from rendergraph.diff.show import diff_json, diff_svg, diff_text
 from rendergraph.diff.structure import (
@@ -10,7 +10,6 @@ from rendergraph.diff.structure import (
     Retyped,
     diff,
     figures,
-    value_text,
 )
 
 __all__ = [
@@ -25,5 +24,4 @@ __all__ = [
     "diff_svg",
     "diff_text",
     "figures",
-    "value_text",
 ]

@@ -1,19 +1,23 @@
-"""A difference for a terminal, for a program, and as a picture."""
+"""A difference as text, as JSON and as a picture."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, replace
 from html import escape
-from typing import Any, Literal
+from typing import Any
+
+from msgspec import to_builtins
+from msgspec.structs import asdict, replace
 
 from rendergraph.diagrams import Card, Link, Mark, Sheet, draw, sheet
-from rendergraph.diff.structure import GraphDiff, PlanFigures, value_text
-from rendergraph.formatting import format_bytes
+from rendergraph.diff.structure import GraphDiff, PlanFigures
+from rendergraph.formatting import format_bytes, format_value, table
 from rendergraph.link import Graph
 
-# Each at least 3:1 against white and against near-black; the signs carry it for those who cannot tell them apart.
+Plans = tuple[PlanFigures, PlanFigures]
+
+# Each at least 3:1 against white and against near-black; the signs carry it for people who cannot tell them apart.
 ADDED, REMOVED, CHANGED, RENAMED = "#2c9163", "#d0453e", "#b7791f", "#3b7dd8"
 _LEGEND = 34.0
 _STYLE = """
@@ -22,166 +26,134 @@ _STYLE = """
 """
 
 
-def diff_text(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | None = None) -> str:
-    """The difference in lines that begin with `+`, `-` or `~`, then what it does to the plan."""
+def diff_text(difference: GraphDiff, plans: Plans | None = None) -> str:
+    """Return the difference in lines that begin with `+`, `-` or `~`, then the effect on the plan."""
     old, new = difference.names
+    disabled = {id: f" (disabled in {new if id in difference.removed else old})" for id in difference.disabled}
     lines = [f"{old} → {new}"]
-    lines += [f"  - {node}{_disabled(node, difference)}" for node in difference.removed]
-    lines += [f"  + {node}{_disabled(node, difference)}" for node in difference.added]
+    lines += [f"  - {node}{disabled.get(node, '')}" for node in difference.removed]
+    lines += [f"  + {node}{disabled.get(node, '')}" for node in difference.added]
     lines += [f"  ~ {was} is called {now}" for was, now in difference.renamed.items()]
     lines += [f"  ~ {change.node}: {change}" for change in difference.retyped]
-    lines += [
-        f"  ~ {change.node}.{change.name}: {value_text(change.old)} → {value_text(change.new)}"
-        for change in difference.parameters
+    changes: list[tuple[str, str, str]] = [
+        *((f"{one.node}.{one.name}", format_value(one.old), format_value(one.new)) for one in difference.parameters),
+        *((f"{one.node}.{one.port}", _ends(one.old), _ends(one.new)) for one in difference.links),
+        *((f"output {one.name}", one.old or "none", one.new or "none") for one in difference.outputs),
     ]
-    lines += [
-        f"  ~ {change.node}.{change.port}: {_ends(change.old)} → {_ends(change.new)}" for change in difference.links
-    ]
-    lines += [
-        f"  ~ output {change.name}: {change.old or 'none'} → {change.new or 'none'}" for change in difference.outputs
-    ]
+    lines += [f"  ~ {name}: {was} → {now}" for name, was, now in changes]
     if difference.sizes is not None:
-        a, b = difference.sizes
-        lines.append(f"  ~ size {a[0]}×{a[1]} → {b[0]}×{b[1]}")
+        lines.append("  ~ size " + " → ".join(f"{width}×{height}" for width, height in difference.sizes))
     if not difference:
         lines.append("  no difference")
     if plans is not None:
-        lines += ["", "plan", *_plan_lines(plans)]
+        lines += ["", "plan", _plan_text(*plans)]
     return "\n".join(lines) + "\n"
-
-
-def _disabled(node: str, difference: GraphDiff) -> str:
-    return f" (disabled in {difference.names[node in difference.removed]})" if node in difference.disabled else ""
 
 
 def _ends(ends: Sequence[str]) -> str:
     return ", ".join(ends) or "nothing"
 
 
-def _plan_lines(plans: tuple[PlanFigures, PlanFigures]) -> list[str]:
-    a, b = plans
-    rows = [
-        ("passes", str(a.passes), str(b.passes), _count(b.passes - a.passes)),
-        ("steps", str(a.steps), str(b.steps), _count(b.steps - a.steps)),
-        _bytes_row("allocated", a.allocated_bytes, b.allocated_bytes),
-        _bytes_row("no reuse", a.no_reuse_bytes, b.no_reuse_bytes),
-        _bytes_row("peak", a.peak_bytes, b.peak_bytes),
-        ("peak at", a.peak_node or "–", b.peak_node or "–", ""),
-    ]
-    widths = [max(len(row[column]) for row in rows) for column in range(3)]
-    return [
-        f"  {name:{widths[0]}}  {was:>{widths[1]}} → {now:>{widths[2]}}  {change}".rstrip()
-        for name, was, now, change in rows
-    ]
+def _plan_text(a: PlanFigures, b: PlanFigures) -> str:
+    rows = []
+    for name in ("passes", "steps", "allocated_bytes", "no_reuse_bytes", "peak_bytes"):
+        was, now = getattr(a, name), getattr(b, name)
+        change = now - was
+        if name.endswith("_bytes"):
+            texts = format_bytes(was), format_bytes(now), f"{'+' if change > 0 else '−'}{format_bytes(abs(change))}"
+        else:
+            texts = str(was), str(now), f"{change:+d}"
+        rows.append((name.removesuffix("_bytes").replace("_", " "), *texts[:2], texts[2] if change else "="))
+    rows.append(("peak at", a.peak_node or "–", b.peak_node or "–", ""))
+    left, right = (max(len(row[column]) for row in rows) for column in (1, 2))
+    return table([(f"  {name}", f"{was:>{left}} → {now:>{right}}", change) for name, was, now, change in rows])
 
 
-def _count(change: int) -> str:
-    return f"{change:+d}" if change else "="
-
-
-def _bytes_row(name: str, was: int, now: int) -> tuple[str, str, str, str]:
-    change = now - was
-    sign = "+" if change > 0 else "−"
-    return name, format_bytes(was), format_bytes(now), f"{sign}{format_bytes(abs(change))}" if change else "="
-
-
-def diff_json(difference: GraphDiff, plans: tuple[PlanFigures, PlanFigures] | None = None) -> dict[str, Any]:
-    """The difference as plain JSON values."""
-    found: dict[str, Any] = {
-        "a": difference.names[0],
-        "b": difference.names[1],
-        "equal": not difference,
-        "added": list(difference.added),
-        "removed": list(difference.removed),
-        "disabled": list(difference.disabled),
-        "renamed": dict(difference.renamed),
-        "retyped": [asdict(change) for change in difference.retyped],
-        "parameters": [asdict(change) for change in difference.parameters],
-        "links": [{"node": c.node, "port": c.port, "old": list(c.old), "new": list(c.new)} for c in difference.links],
-        "outputs": [asdict(change) for change in difference.outputs],
-        "sizes": None if difference.sizes is None else [list(size) for size in difference.sizes],
-    }
+def diff_json(difference: GraphDiff, plans: Plans | None = None) -> dict[str, Any]:
+    """Return the difference as plain JSON values."""
+    fields = asdict(difference)
+    a, b = fields.pop("names")
+    del fields["nodes"]
+    found = {"a": a, "b": b, "equal": not difference, **fields}
     if plans is not None:
-        found["plan"] = {"a": asdict(plans[0]), "b": asdict(plans[1])}
-    return found
+        found["plan"] = {"a": plans[0], "b": plans[1]}
+    result: dict[str, Any] = to_builtins(found)
+    return result
 
 
 # --- the picture -----------------------------------------------------------------------------------------------------
 
 
 def diff_svg(a: Graph, b: Graph, difference: GraphDiff) -> str:
-    """The second graph with what only the first one has, differences in colour, as a stand-alone SVG document."""
-    shown, marks, pointed = _both(a, b, difference)
-    picture = draw(shown, marks, pointed)
-    wide, tall = _size(picture)
-    width, height = max(wide, 620.0), tall + _LEGEND
+    """Return the second graph with the removed parts of the first, differences in colour, as an SVG document."""
+    picture = draw(*_both(a, b, difference))
+    size = re.search(r'viewBox="0 0 (\d+) (\d+)"', picture)
+    assert size
+    tall = float(size[2])
+    width, height = max(float(size[1]), 620.0), tall + _LEGEND
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
         f'height="{height:.0f}" font-family="system-ui,\'DejaVu Sans\',sans-serif" font-size="12">',
         f"<title>{escape(a.name)} and {escape(b.name)}</title>",
         f"<style>{_STYLE}</style>",
         picture.rstrip(),
-        _legend(tall),
+        *_legend(tall),
     ]
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
 def _both(a: Graph, b: Graph, difference: GraphDiff) -> tuple[Sheet, dict[str, Mark], dict[Link, str]]:
-    """Both graphs as one, nodes and links that only one of them has marked."""
+    """Both graphs as one, with marks on nodes and links that only one of them has."""
     old, new = sheet(a), sheet(b)
     names = {node.id: difference.nodes.get(node.id, node.id) for node in a.nodes}
     for node in difference.removed:
         while names[node] in b:
             names[node] += "′"
-    table = {card.id: card for card in new.cards}
-    table |= {names[card.id]: replace(card, id=names[card.id]) for card in old.cards if card.id in difference.removed}
-    was = [replace(link, source=names[link.source], target=names[link.target]) for link in old.links]
-    sockets = {names[card.id]: card for card in old.cards}
-    removed = [_backwards(link, new.links) for link in was if link not in new.links]
+    cards = {card.id: card for card in new.cards}
+    cards |= {names[card.id]: replace(card, id=names[card.id]) for card in old.cards if card.id in difference.removed}
+    old_links = [replace(link, source=names[link.source], target=names[link.target]) for link in old.links]
+    old_cards = {names[card.id]: card for card in old.cards}
+    removed = [_backwards(link, new.links) for link in old_links if link not in new.links]
     for link in removed:  # a node of another type may lack the port that was linked
-        table[link.source] = _with(table[link.source], "outputs", link.source_port, sockets[link.source])
-        table[link.target] = _with(table[link.target], "inputs", link.target_port, sockets[link.target])
-    pointed = {link: ADDED for link in new.links if link not in was} | dict.fromkeys(removed, f"-{REMOVED}")
+        cards[link.source] = _with_output(cards[link.source], link.source_port, old_cards[link.source])
+        cards[link.target] = _with_input(cards[link.target], link.target_port, old_cards[link.target])
+    highlights = {link: ADDED for link in new.links if link not in old_links} | dict.fromkeys(removed, f"-{REMOVED}")
     marks = {new: Mark(RENAMED, (f"was {old}",)) for old, new in difference.renamed.items()}
-    marks |= {change.node: Mark(CHANGED) for change in difference.links if change.node in table}
+    marks |= {change.node: Mark(CHANGED) for change in difference.links if change.node in cards}
     marks |= {node: Mark(CHANGED, tuple(notes)) for node, notes in difference.changed(links=False).items()}
     marks |= {node: Mark(ADDED, ("+ added",)) for node in difference.added}
     for node in difference.removed:
         marks[names[node]] = Mark(REMOVED, ("− disabled" if node in difference.disabled else "− removed",))
-    return Sheet(new.title, list(table.values()), [*new.links, *removed], new.outputs), marks, pointed
+    return Sheet(new.title, list(cards.values()), [*new.links, *removed], new.outputs), marks, highlights
 
 
-def _backwards(link: Link, kept: Sequence[Link]) -> Link:
-    """A link of the first graph, drawn as one that leads back where the second has its ends the other way round."""
+def _backwards(link: Link, present: Sequence[Link]) -> Link:
+    """A link of the first graph, drawn as leading back where the second graph has its ends the other way round."""
     reached, waiting = {link.target}, [link.target]
     while waiting:
         at = waiting.pop()
-        following = {other.target for other in kept if other.source == at and not other.previous} - reached
+        following = {other.target for other in present if other.source == at and not other.previous} - reached
         reached |= following
         waiting += following
     return replace(link, previous=link.previous or link.source in reached)
 
 
-def _with(card: Card, side: Literal["inputs", "outputs"], port: str, old: Card) -> Card:
-    """A card that has the socket too."""
-    if any(socket.name == port for socket in getattr(card, side)):
-        return card
-    more = tuple(socket for socket in getattr(old, side) if socket.name == port)
-    if side == "inputs":
-        return replace(card, inputs=(*card.inputs, *more))
-    return replace(card, outputs=(*card.outputs, *more))
+def _with_input(card: Card, port: str, old: Card) -> Card:
+    """The card with the port of the old card, where it lacks it."""
+    present = {socket.name for socket in card.inputs}
+    return replace(card, inputs=(*card.inputs, *(s for s in old.inputs if s.name == port and port not in present)))
 
 
-def _size(picture: str) -> tuple[float, float]:
-    found = re.search(r'viewBox="0 0 (\d+) (\d+)"', picture)
-    assert found
-    return float(found[1]), float(found[2])
+def _with_output(card: Card, port: str, old: Card) -> Card:
+    present = {socket.name for socket in card.outputs}
+    return replace(card, outputs=(*card.outputs, *(s for s in old.outputs if s.name == port and port not in present)))
 
 
-def _legend(y: float) -> str:
-    parts, x = [], 24.0
-    for hue, word in ((ADDED, "+ added"), (REMOVED, "− removed"), (CHANGED, "~ changed"), (RENAMED, "→ renamed")):
-        parts.append(f'<rect x="{x:.0f}" y="{y + 6:.0f}" width="14" height="14" rx="3" fill="{hue}"/>')
-        parts.append(f'<text class="word" x="{x + 20:.0f}" y="{y + 17:.0f}">{word}</text>')
-        x += 120
-    return "\n".join(parts)
+def _legend(y: float) -> list[str]:
+    entries = ((ADDED, "+ added"), (REMOVED, "− removed"), (CHANGED, "~ changed"), (RENAMED, "→ renamed"))
+    parts = []
+    for number, (color, word) in enumerate(entries):
+        x = 24 + 120 * number
+        parts.append(f'<rect x="{x}" y="{y + 6:.0f}" width="14" height="14" rx="3" fill="{color}"/>')
+        parts.append(f'<text class="word" x="{x + 20}" y="{y + 17:.0f}">{word}</text>')
+    return parts
