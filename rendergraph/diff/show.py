@@ -12,7 +12,7 @@ from msgspec.structs import asdict, replace
 
 from rendergraph.diagrams import Card, Link, Mark, Sheet, draw, sheet
 from rendergraph.diff.structure import GraphDiff, PlanFigures
-from rendergraph.formatting import format_bytes, format_value, table
+from rendergraph.formatting import format_bytes, format_value, jsonable, table
 from rendergraph.link import Graph
 
 Plans = tuple[PlanFigures, PlanFigures]
@@ -77,7 +77,7 @@ def diff_json(difference: GraphDiff, plans: Plans | None = None) -> dict[str, An
     found = {"a": a, "b": b, "equal": not difference, **fields}
     if plans is not None:
         found["plan"] = {"a": plans[0], "b": plans[1]}
-    result: dict[str, Any] = to_builtins(found)
+    result: dict[str, Any] = jsonable(to_builtins(found))  # with lists for tuples
     return result
 
 

@@ -75,7 +75,7 @@ def test_parameters_are_old_and_new(make: Maker) -> None:
         ("ao", "radius", 0.5, 0.75),
         ("ao", "offset", (0.0, 0.0), (1.0, 0.0)),
     ]
-    assert "  ~ ao.radius: 0.5 → 0.75\n  ~ ao.offset: [0.0, 0.0] → [1.0, 0.0]\n" in diff_text(found)
+    assert "  ~ ao.radius: 0.5 → 0.75\n  ~ ao.offset: [0, 0] → [1, 0]\n" in diff_text(found)
 
 
 def test_a_written_default_is_no_difference(make: Maker) -> None:
