@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 import rendergraph as rg
 from rendergraph.compare import compare
-from rendergraph.compare.values import Comparison
+from rendergraph.compare.results import Comparison
 from rendergraph.images import heat_map, write
 
 ROOT = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ import msgspec
 
 from rendergraph import document
 from rendergraph.catalog import entries, find
-from rendergraph.compare.axes import MOST_RUNS
+from rendergraph.compare.space import MOST_RUNS
 from rendergraph.glsl import MAX_BYTES, expansion, source
 from rendergraph.reference import file_keys
 from rendergraph.resolve import flatten

@@ -1,4 +1,4 @@
-"""`rendergraph bench`: how long each pass takes."""
+"""`rendergraph bench`: time each pass."""
 
 from __future__ import annotations
 
@@ -65,10 +65,12 @@ def command(
 
 
 def measured(frame: Frame) -> dict[str, Any]:
-    """The frame's report with the spread of every figure over all frames."""
+    """Return the frame's report with the spread of every figure over all frames."""
+    from msgspec import to_builtins
+
     from rendergraph.compare.timing import times_of
 
-    times = times_of(frame.times, {str(entry["node"]): str(entry["type"]) for entry in frame.passes}).as_json()
+    times = to_builtins(times_of(frame.times, {str(entry["node"]): str(entry["type"]) for entry in frame.passes}))
     return frame.as_json() | {name: times[name] for name in ("frames", "frame_ms", "passes")}
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def _numbers(text: str) -> tuple[int, ...]:
-    from rendergraph.compare.openjd import parse_numbers
+    from rendergraph.compare.export.openjd import parse_numbers
 
     return parse_numbers(text)
 
@@ -111,18 +111,18 @@ def _export(
 ) -> None:
     import yaml  # only what writes it takes it
 
-    from rendergraph.compare.listing import listed
-    from rendergraph.compare.openjd import template
+    from rendergraph.compare.export.openjd import template
+    from rendergraph.compare.listing import list_sweep
     from rendergraph.compare.prepare import prepare
 
     base, reference = given
-    prepared = prepare(base, file.space, Path(), reference, metric=file.metric)
+    prepared = prepare(base, file.space, Path(), reference, metric=file.options.get("metric"))
     if frames is not None and any(
         resource.role == "history" for run in prepared.runs for resource in run.planned.plan.resources.values()
     ):
         say(f"a frame remembers those before, which each chunk would draw again: {amount(len(frames), 'frame')} a task")
         chunk = len(frames)
-    job = template(listed(prepared), sweep, out.parent, frames=frames, chunk=chunk)
+    job = template(list_sweep(prepared), sweep, out.parent, frames=frames, chunk=chunk)
     options.put(yaml.dump(job, Dumper=_dumper(), sort_keys=False, allow_unicode=True, width=110), out, as_json=as_json)
 
 
@@ -147,11 +147,12 @@ def _measure(
     *,
     as_json: bool,
 ) -> None:
-    from rendergraph.compare.parts import measure
+    from rendergraph.compare import SweepOptions
+    from rendergraph.compare.export.shards import measure
 
     base, reference = given
-    numbers: dict[str, Any] = {"frames": file.frames or 5, "repeats": file.repeats or 1}
-    found = measure(base, file.space, out, reference, only, metric=file.metric, device=device, **numbers)
+    how = SweepOptions(**{**file.options, "kept": "all"}, device=device)
+    found = measure(base, file.space, out, reference, only, how)
     drawn = [] if found is None else [result.name for result in found.comparison.results]
     failed = () if found is None else found.failures
     if as_json:
@@ -173,12 +174,12 @@ def _frames(
     *,
     as_json: bool,
 ) -> None:
-    from rendergraph.compare.parts import draw_frames
+    from rendergraph.compare.export.shards import render_frames
     from rendergraph.session.gpu import Gpu
 
     paths = []
     with Gpu(device) as gpu:
-        for path in draw_frames(given[0], file.space, out, only, frames, gpu, metric=file.metric):
+        for path in render_frames(given[0], file.space, out, only, frames, gpu, metric=file.options.get("metric")):
             paths.append(str(path))
             if not as_json:
                 emit(str(path))

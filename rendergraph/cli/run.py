@@ -118,7 +118,7 @@ def command(
         with Gpu(devices[0] if devices and device is None else device) as gpu:
             report = draw(expanded, targets, gpu)
     else:
-        from rendergraph.cli.parts import draw_in_parts
+        from rendergraph.cli.frame_chunks import draw_in_parts
         from rendergraph.farm.bundle import make_bundle
         from rendergraph.farm.executors import make_executor
 

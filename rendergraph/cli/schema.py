@@ -40,7 +40,8 @@ def command(what: str, plugins: tuple[Path, ...], output: Path | None, as_json: 
       rendergraph schema my.yaml -o rendergraph.schema.json
     """
     if what in ("results", "results-csv"):
-        from rendergraph.compare.columns import csv_schema, line_schema  # slower to import than the rest
+        from rendergraph.compare.export.table import csv_schema  # slower to import than the rest
+        from rendergraph.compare.store import line_schema
 
         found = line_schema() if what == "results" else csv_schema()
     else:

@@ -1,4 +1,4 @@
-"""Pipelines against each other: pictures, times, memory; one by one or as the product of axes.
+"""Comparisons of pipelines: pictures, times and memory, of given variants or of all combinations of a sweep.
 
 from rendergraph.compare import compare, sweep
 """
@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 from rendergraph.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from rendergraph.compare.axes import Axis, Space
-    from rendergraph.compare.files import compare_pictures
-    from rendergraph.compare.optimise import check_search, search
-    from rendergraph.compare.pictures import compare
-    from rendergraph.compare.prepare import check_sweep
-    from rendergraph.compare.product import Sweep, sweep
-    from rendergraph.compare.values import Comparison, Result
+    from rendergraph.compare.engine import Sweep, compare, compare_pictures, sweep
+    from rendergraph.compare.optimiser import check_search, search
+    from rendergraph.compare.prepare import SweepOptions
+    from rendergraph.compare.results import Comparison, Result
+    from rendergraph.compare.space import Axis, Space
 
 __all__ = [
     "Axis",
@@ -24,8 +22,8 @@ __all__ = [
     "Result",
     "Space",
     "Sweep",
+    "SweepOptions",
     "check_search",
-    "check_sweep",
     "compare",
     "compare_pictures",
     "search",
@@ -40,12 +38,10 @@ def __dir__() -> list[str]:
 __getattr__ = lazy_exports(
     __name__,
     {
-        "axes": ("Axis", "Space"),
-        "files": ("compare_pictures",),
-        "optimise": ("check_search", "search"),
-        "pictures": ("compare",),
-        "prepare": ("check_sweep",),
-        "product": ("Sweep", "sweep"),
-        "values": ("Comparison", "Result"),
+        "engine": ("Sweep", "compare", "compare_pictures", "sweep"),
+        "optimiser": ("check_search", "search"),
+        "prepare": ("SweepOptions",),
+        "results": ("Comparison", "Result"),
+        "space": ("Axis", "Space"),
     },
 )

@@ -1,57 +1,77 @@
-"""Many variants of one pipeline drawn together: passes that compute the same are drawn once."""
+"""Batches: variants of one pipeline that are rendered as one graph, in which passes that compute the same run once.
+
+Two nodes compute the same if they have the same type and parameters and read the same ports of nodes that compute the
+same. A texture that another node continues (`InOut`) is the same only if the node that continues it is, too: each
+version has one writer. The classes are found by refining a partition until it is stable, as for states of automata
+(Hopcroft 1971, here in its plain form), so that `@previous` may close cycles.
+
+The merged graph goes through the ordinary stages: it is scheduled, given memory and executed once, and each output is
+rendered as in the graph it came from.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec.structs import replace
 
-from rendergraph.compare.divergence import passes
-from rendergraph.compare.merge import Merged, kinship, merge
+from rendergraph.compare.results import Pixels, passes
 from rendergraph.compare.timing import Times, times_repeated
-from rendergraph.compare.values import Pixels
+from rendergraph.declare import InOut, TextureInfo
 from rendergraph.errors import InputError
+from rendergraph.link import Endpoint, Graph, GraphNode
 from rendergraph.session import stages
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.values import Planned
 
 MOST_BYTES = 512 << 20
-"""Textures of one batch; the outputs of all its variants are alive at once."""
+"""Textures of one batch; the outputs of all its variants exist at the same time."""
 MOST_RUNS = 16
-"""Variants of one batch: what is drawn together is kept together, and lost together when it is interrupted."""
+"""Variants of one batch: what is rendered together is stored together, and lost together when it is interrupted."""
 MOST_VIEWS = 48
-"""View tables of one batch: each has a binding point of its own, and OpenGL promises 84."""
+"""View tables of one batch: each has a binding point of its own, and OpenGL guarantees 84."""
+
+Key: TypeAlias = "tuple[int, str]"
+"""Number of a graph and id of one of its nodes."""
+
+
+@dataclass(frozen=True)
+class MergedGraph:
+    """Several graphs as one.
+
+    Attributes:
+        graph: its outputs are called `number/name`.
+        names: for each graph, its nodes' ids to ids in `graph`.
+    """
+
+    graph: Graph
+    names: tuple[Mapping[str, str], ...]
+
+    def output(self, number: int, name: str) -> str:
+        """Return the name of a graph's output in the merged graph."""
+        return f"{number}/{name}"
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Variants that are drawn in the same frames.
-
-    Attributes:
-        numbers: which of the variants.
-        merged: their graphs as one.
-        planned: what is drawn of that.
-    """
+    """Variants that are rendered in the same frames, by their numbers."""
 
     numbers: tuple[int, ...]
-    merged: Merged
+    merged: MergedGraph
     planned: Planned
 
     @property
     def pass_count(self) -> int:
-        """Passes it draws."""
         return len(passes(self.planned.plan))
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
-    """One variant of a batch: its outputs by name."""
+class RenderedVariant:
+    """The outputs of one variant of a batch by name."""
 
     number: int
     arrays: Mapping[str, Pixels]
@@ -59,51 +79,50 @@ class Drawn:
 
 
 def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
-    """The variants in as few batches as fit, and those together that share most of their first passes.
+    """Return the variants in as few batches as possible, those together that share most of their first passes.
 
     Args:
-        variants: all with one scene, camera and size.
+        variants: with the same scene, camera and size.
         numbers: which of them.
-        most_bytes: of textures in a batch; a single variant may have more.
+        most_bytes: limit for the textures of a batch; a single variant may exceed it.
     """
-    return [batch for cut in cuts(variants, numbers) for batch in fitting(variants, cut, most_bytes)]
+    groups = group_similar(variants, numbers, MOST_RUNS)
+    return [batch for group in groups for batch in fitting_batches(variants, group, most_bytes)]
 
 
-def cuts(variants: Sequence[Planned], numbers: Sequence[int], most: int = MOST_RUNS) -> list[list[int]]:
-    """The variants in groups, those together that share most of their first passes.
-
-    Args:
-        variants: all with one scene, camera and size.
-        numbers: which of them.
-        most: variants of a group.
-    """
+def group_similar(variants: Sequence[Planned], numbers: Sequence[int], most: int) -> list[list[int]]:
+    """Return the variants in groups of at most `most`, those together that share most of their first passes."""
     if not numbers:
         return []
     graphs = [variants[number].linked.graph for number in numbers]
-    kin = dict(zip(numbers, kinship(graphs, passes(variants[numbers[0]].plan)), strict=True))
-    waiting = sorted(numbers, key=kin.__getitem__)
-    found: list[list[int]] = []
+    order = passes(variants[numbers[0]].plan)
+    node_classes = _equivalence_classes(graphs)
+    classes = {
+        number: tuple(node_classes.get((place, node), -1) for node in order) for place, number in enumerate(numbers)
+    }
+    waiting = sorted(numbers, key=classes.__getitem__)
+    groups: list[list[int]] = []
     while waiting:
-        cut = _cut([kin[number] for number in waiting], most)
-        found.append(waiting[:cut])
+        cut = _cut([classes[number] for number in waiting], most)
+        groups.append(waiting[:cut])
         waiting = waiting[cut:]
-    return found
+    return groups
 
 
-def _cut(kin: Sequence[tuple[int, ...]], most: int) -> int:
-    """How many of the first variants are a group: as many as may be, or some less where what follows shares less."""
-    if len(kin) <= most:
-        return len(kin)
+def _cut(classes: Sequence[tuple[int, ...]], most: int) -> int:
+    """Return the size of the first group: the maximum, or somewhat less if the next variant shares less there."""
+    if len(classes) <= most:
+        return len(classes)
 
     def shared(at: int) -> int:
-        differing = (place for place, pair in enumerate(zip(kin[at - 1], kin[at], strict=True)) if pair[0] != pair[1])
-        return next(differing, len(kin[at]))
+        pairs = enumerate(zip(classes[at - 1], classes[at], strict=True))
+        return next((place for place, (one, other) in pairs if one != other), len(classes[at]))
 
     return min(range(most, most // 2, -1), key=shared)
 
 
-def fitting(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int) -> list[Batch]:
-    """These variants in one batch, or halved until each batch fits."""
+def fitting_batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int) -> list[Batch]:
+    """Return these variants in one batch, or halved until each batch fits."""
     chosen = [variants[number] for number in numbers]
     merged = merge([variant.linked.graph for variant in chosen])
     try:
@@ -112,41 +131,35 @@ def fitting(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int
         if small or len(numbers) == 1:
             return [Batch(tuple(numbers), merged, planned)]
     except InputError:
-        # Each graph has a legal order and all of them together have none: readers of two continued textures wait for
-        # each other across graphs. So rare that the way out is the plain one.
+        # Each graph has a legal order and the merged one has none: readers of two continued textures wait for each
+        # other across graphs. This is so rare that halving is good enough.
         if len(numbers) == 1:
             raise
     half = len(numbers) // 2
-    return [*fitting(variants, numbers[:half], most_bytes), *fitting(variants, numbers[half:], most_bytes)]
+    return [part for own in (numbers[:half], numbers[half:]) for part in fitting_batches(variants, own, most_bytes)]
 
 
-def draw(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Iterator[Drawn]:
-    """Draw a batch and hand out its variants.
-
-    Args:
-        gpu: where.
-        variants: all of them.
-        batch: which ones.
-        frame: number of the frame whose pictures are wanted.
-    """
-    drawn = stages.draw_last(batch.planned.for_frames(range(1, frame + 1), warm_up=False), gpu)  # nothing is measured
+def render_batch(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Iterator[RenderedVariant]:
+    """Render a batch up to a frame, and yield its variants."""
+    rendered = stages.draw_last(batch.planned.for_frames(range(1, frame + 1), warm_up=False), gpu)  # not measured
     for place, number in enumerate(batch.numbers):
-        arrays = {name: drawn[batch.merged.output(place, name)] for name in variants[number].linked.graph.outputs}
-        yield Drawn(number, arrays, drawn.device)
+        outputs = variants[number].linked.graph.outputs
+        arrays = {name: rendered[batch.merged.output(place, name)] for name in outputs}
+        yield RenderedVariant(number, arrays, rendered.device)
 
 
-def measure(
-    gpu: Gpu, variants: Sequence[Planned], batch: Batch, frames: int, *, warm: bool, repeats: int = 1
+def measure_batch(
+    gpu: Gpu, variants: Sequence[Planned], batch: Batch, frames: int, repeats: int, *, warm: bool
 ) -> Iterator[tuple[int, Times]]:
-    """The times of a batch's variants, each the sum of the passes it needs.
+    """Yield the times of a batch's variants, each the sum of its own passes.
 
     Args:
-        gpu: where.
+        gpu: where to render.
         variants: all of them.
-        batch: which ones.
-        frames: how many frames are measured, each time.
-        warm: whether the batch has just been drawn.
-        repeats: how often, each time from the first frame on, with a frame to warm up.
+        batch: which of them.
+        frames: number of frames of each measurement.
+        repeats: number of measurements, each from the first frame on, after a frame to warm up.
+        warm: whether the batch has just been rendered.
     """
     times = []
     for number in range(repeats):
@@ -155,5 +168,101 @@ def measure(
         times.append(stages.draw_last(timed, gpu).times)
     for place, number in enumerate(batch.numbers):
         variant = variants[number]
-        own = {name: batch.merged.names[place][name] for name in passes(variant.plan)}
-        yield number, times_repeated(times, own, {node.id: node.type.name for node in variant.linked.graph.nodes})
+        names = {name: batch.merged.names[place][name] for name in passes(variant.plan)}
+        yield number, times_repeated(times, node_types(variant), names)
+
+
+def node_types(planned: Planned) -> dict[str, str]:
+    """Return each node's id to the name of its type."""
+    return {node.id: node.type.name for node in planned.linked.graph.nodes}
+
+
+# --- merging ---------------------------------------------------------------------------------------------------------
+
+
+def merge(graphs: Sequence[Graph]) -> MergedGraph:
+    """Return one graph that renders the outputs of all of them; they must have one scene and one size."""
+    classes = _equivalence_classes(graphs)
+    ids = _class_ids(graphs, classes)
+    names = tuple(
+        {node.id: ids[classes[number, node.id]] for node in graph.nodes} for number, graph in enumerate(graphs)
+    )
+    nodes: dict[str, GraphNode] = {}
+    textures: dict[Endpoint, TextureInfo] = {}
+    outputs: dict[str, Endpoint] = {}
+    for number, (graph, own) in enumerate(zip(graphs, names, strict=True)):
+        for node in graph.nodes:
+            inputs = {port: tuple(_renamed(end, own) for end in ends) for port, ends in node.inputs.items()}
+            nodes.setdefault(own[node.id], replace(node, id=own[node.id], inputs=inputs))
+        for end, info in graph.textures.items():
+            textures.setdefault(_renamed(end, own), replace(info, view=_renamed_view(info.view, own)))
+        outputs |= {f"{number}/{name}": _renamed(end, own) for name, end in graph.outputs.items()}
+    first = graphs[0]
+    merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures)
+    return MergedGraph(replace(merged, objects=first.objects, environment=first.environment), names)
+
+
+def _renamed(end: Endpoint, names: Mapping[str, str]) -> Endpoint:
+    return end._replace(node=names[end.node])
+
+
+def _renamed_view(view: str | None, names: Mapping[str, str]) -> str | None:
+    """Return a view table's id; `camera` belongs to no node."""
+    node, dot, port = (view or "").rpartition(".")
+    return f"{names[node]}.{port}" if dot else view
+
+
+def _equivalence_classes(graphs: Sequence[Graph]) -> dict[Key, int]:
+    """Return the number of each node's class; nodes of one class compute the same."""
+    nodes = {(number, node.id): node for number, graph in enumerate(graphs) for node in graph.nodes}
+    followers = _followers(graphs)
+    classes: dict[Key, int] = {}
+    signatures: Mapping[Key, object] = {
+        key: (node.type.name, node.type.file, type(node.node), repr(node.node)) for key, node in nodes.items()
+    }
+    while True:
+        numbers: dict[object, int] = {}
+        refined = {key: numbers.setdefault(signatures[key], len(numbers)) for key in nodes}
+        if classes and len(set(refined.values())) == len(set(classes.values())):
+            return refined
+        classes = refined
+        signatures = {
+            key: (
+                refined[key],
+                tuple(
+                    (port, tuple((refined[key[0], end.node], end.port, end.previous) for end in ends))
+                    for port, ends in node.inputs.items()
+                ),
+                tuple((port, refined[other], at) for port, other, at in followers.get(key, ())),
+            )
+            for key, node in nodes.items()
+        }
+
+
+def _followers(graphs: Sequence[Graph]) -> dict[Key, list[tuple[str, Key, str]]]:
+    """Return each node's ports that another node continues, with that node and its port."""
+    table: dict[Key, list[tuple[str, Key, str]]] = {}
+    for number, graph in enumerate(graphs):
+        for node in graph.nodes:
+            for port, ends in node.inputs.items():
+                if isinstance(node.node.ports()[port], InOut):
+                    for end in ends:
+                        table.setdefault((number, end.node), []).append((end.port, (number, node.id), port))
+    return {key: sorted(followers) for key, followers in table.items()}
+
+
+def _class_ids(graphs: Sequence[Graph], classes: Mapping[Key, int]) -> dict[int, str]:
+    """Return an id for each class: that of its first member, with a number behind if it is taken."""
+    ids: dict[int, str] = {}
+    taken = {node.id for graph in graphs for node in graph.nodes}
+    used: set[str] = set()
+    for (_, name), number in classes.items():
+        if number in ids:
+            continue
+        unique, count = name, 1
+        while unique in used or (count > 1 and unique in taken):
+            count += 1
+            unique = f"{name}-{count}"
+        used.add(unique)
+        ids[number] = unique
+    return ids

@@ -1,4 +1,4 @@
-"""What a sweep would draw, and what of it is shared, before it does: nothing is drawn, nothing written."""
+"""What a sweep would render, and which passes its runs share: nothing is rendered, nothing is written."""
 
 from __future__ import annotations
 
@@ -7,23 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rendergraph.compare.axes import typed
-from rendergraph.compare.batches import MOST_BYTES, Batch, batches
-from rendergraph.compare.divergence import passes
-from rendergraph.compare.ledger import Ledger
-from rendergraph.compare.prepare import Prepared
-from rendergraph.compare.runs import Run, found_again
-from rendergraph.compare.study import RESULTS, check_folder
-from rendergraph.compare.timing import Times, enough
+from rendergraph.compare.batches import Batch, batches
+from rendergraph.compare.prepare import Prepared, Run, SweepOptions
+from rendergraph.compare.results import passes, typed_settings
+from rendergraph.compare.store import RESULTS, ResultsLog, check_folder, find_record
 
 
 @dataclass(frozen=True, eq=False)
 class Listing:
-    """Attributes:
-    prepared: the sweep.
-    kept: numbers of the runs that are there already, drawn and measured.
-    groups: the others, as they are drawn together.
-    """
+    """A prepared sweep, the numbers of the runs that are complete already, and batches of the others."""
 
     prepared: Prepared
     kept: frozenset[int]
@@ -31,32 +23,32 @@ class Listing:
 
     @property
     def executed(self) -> int:
-        """Passes that would be drawn."""
+        """Number of passes that would be executed."""
         return sum(group.pass_count for group in self.groups)
 
     def shared(self) -> dict[str, tuple[int, int]]:
-        """For each pass: how often it would be drawn, and how often one by one, in order of execution."""
-        drawn: dict[str, set[tuple[int, str]]] = {}
+        """Return for each pass, in order of execution, how often it would run, and how often without sharing."""
+        shared: dict[str, set[tuple[int, str]]] = {}
         alone: dict[str, int] = {}
         for at, group in enumerate(self.groups):
             for place, number in enumerate(group.numbers):
                 for name in passes(self.prepared.runs[number].planned.plan):
-                    drawn.setdefault(name, set()).add((at, group.merged.names[place][name]))
+                    shared.setdefault(name, set()).add((at, group.merged.names[place][name]))
                     alone[name] = alone.get(name, 0) + 1
-        return {name: (len(different), alone[name]) for name, different in drawn.items()}
+        return {name: (len(different), alone[name]) for name, different in shared.items()}
 
     def group_of(self) -> dict[int, int]:
-        """The number of a run to that of its group, from 1."""
+        """Return the number of each run to that of its group, from 1."""
         return {number: at for at, group in enumerate(self.groups, 1) for number in group.numbers}
 
     def as_json(self) -> dict[str, Any]:
-        """The document of `sweep --list --json`."""
+        """Return the document of `sweep --list --json`."""
         group_of, shared = self.group_of(), self.shared()
         return {
             "runs": [
                 {
                     "name": run.name,
-                    "settings": {path: typed(value) for path, value in run.settings.items()},
+                    "settings": typed_settings(run.settings),
                     "kept": number in self.kept,
                     "group": group_of.get(number),
                 }
@@ -66,7 +58,9 @@ class Listing:
                 {
                     "runs": len(group.numbers),
                     "passes": group.pass_count,
-                    "passes_one_by_one": sum(self._alone(number) for number in group.numbers),
+                    "passes_one_by_one": sum(
+                        len(passes(self.prepared.runs[number].planned.plan)) for number in group.numbers
+                    ),
                     "allocated_bytes": group.planned.plan.memory.allocated_bytes,
                 }
                 for group in self.groups
@@ -79,55 +73,28 @@ class Listing:
             "notes": list(self.prepared.notes),
         }
 
-    def _alone(self, number: int) -> int:
-        return len(passes(self.prepared.runs[number].planned.plan))
 
-
-def listed(
-    prepared: Prepared,
-    out: Path | None = None,
-    *,
-    frames: int = 5,
-    repeats: int = 1,
-    resume: bool = False,
-    pictures: bool = True,
-    most_bytes: int = MOST_BYTES,
+def list_sweep(
+    prepared: Prepared, out: Path | None = None, options: SweepOptions = SweepOptions(), **settings: Any
 ) -> Listing:
-    """What `sweep` would draw.
-
-    Args:
-        prepared: the sweep.
-        out: its folder; without one nothing is there yet.
-        frames, repeats, resume, most_bytes: as for `sweep`.
-        pictures: runs that are there have to have theirs.
+    """Return what `sweep` would render into a folder; without one, no run is complete.
 
     Raises:
         InputError: the folder has results already, or those of another study.
     """
-    kept: set[int] = set()
+    options = options.replace(**settings)
+    numbers = range(len(prepared.runs))
+    kept: frozenset[int] = frozenset()
     if out is not None:
-        check_folder(out, prepared.study, resume=resume)
-        records, _ = Ledger(out / RESULTS).read()
-        lines = {record["key"]: record for record in records if "key" in record}
-        kept = {
-            number
-            for number, run in enumerate(prepared.runs)
-            if is_done(run, lines, frames=frames, repeats=repeats, pictures=pictures)
-        }
-    waiting = [number for number in range(len(prepared.runs)) if number not in kept]
-    groups = batches([run.planned for run in prepared.runs], waiting, most_bytes)
-    return Listing(prepared, frozenset(kept), tuple(groups))
+        check_folder(out, prepared.study, resume=options.resume)
+        lines, _ = ResultsLog(out / RESULTS).by_key()
+        kept = frozenset(number for number in numbers if is_complete(prepared.runs[number], lines, options))
+    waiting = [number for number in numbers if number not in kept]
+    groups = batches([run.planned for run in prepared.runs], waiting, options.most_bytes)
+    return Listing(prepared, kept, tuple(groups))
 
 
-def is_done(
-    run: Run, lines: Mapping[str, dict[str, Any]], *, frames: int, repeats: int = 1, pictures: bool = True
-) -> bool:
-    """Whether a run is there, drawn and measured.
-
-    Args:
-        run: which.
-        lines: of the results, by key.
-        frames, repeats, pictures: as for `listed`.
-    """
-    record = found_again(run, lines, pictures=pictures)
-    return record is not None and bool(record["frames"]) and enough(Times.from_json(record), frames, repeats)
+def is_complete(run: Run, lines: Mapping[str, dict[str, Any]], options: SweepOptions) -> bool:
+    """Whether a run is rendered and measured; `lines` are those of the results, by key."""
+    record = find_record(run, lines, pictures=options.kept == "all")
+    return record is not None and bool(record.frames) and record.times.covers(options.frames, options.repeats)

@@ -1,52 +1,190 @@
-"""A sweep before anything is drawn: its runs, planned, and what they are measured against. Needs no GL."""
+"""A comparison before anything is rendered: its runs, planned, and what they are measured against. Needs no GL."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias
 
-from rendergraph.compare.axes import Axes, Space, pipelines, run_name
-from rendergraph.compare.reference import compared_output, measured_at, on_one_stage, read_picture, unique_names
-from rendergraph.compare.runs import Run, key_of
-from rendergraph.compare.sources import file_digest
-from rendergraph.compare.study import study_of
-from rendergraph.compare.values import Pixels, Reference
-from rendergraph.metrics import Encoding
+import numpy as np
+from msgspec import Struct, structs
+
+from rendergraph.compare.batches import MOST_BYTES
+from rendergraph.compare.fingerprint import file_digest, run_key
+from rendergraph.compare.results import Pixels, Reference
+from rendergraph.compare.space import Axes, Space, pipelines, run_name
+from rendergraph.errors import InputError, Option, Place, Problem
+from rendergraph.metrics import Encoding, check_sizes
+from rendergraph.session.made import at_time, described, is_picture
+from rendergraph.session.pipeline import Pipeline, load
+from rendergraph.textures import FORMATS
 
 if TYPE_CHECKING:
-    from rendergraph.session import Pipeline
-    from rendergraph.session.values import Planned
+    from rendergraph.farm import Executor
+    from rendergraph.farm.executors import ExecutorChoice
+    from rendergraph.link import Graph
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.progress import Progress
+    from rendergraph.session.values import Linked, Planned
+
+METRIC = "metric"
+"""Name of the output that is added for a measured port."""
+_INTEGER_FORMATS = frozenset(name for name, format in FORMATS.items() if format.family in ("int", "uint"))
+
+Pictures: TypeAlias = Literal["all", "best"]
+Events: TypeAlias = Callable[[Mapping[str, Any]], None]
+
+
+class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
+    """How a sweep renders and measures; `compare` uses what applies to it.
+
+    Attributes:
+        metric: the port whose texture is measured instead of the picture: `ao.occlusion`.
+        frame: number of the frame whose pictures are compared.
+        frames: minimum number of measured frames; resumed runs with fewer are measured again.
+        repeats: number of measurements, each from the start; the spread of their medians shows how reliable times are.
+        kept: which pictures are kept: `all`, or `best`, those on the Pareto front so far and the reference's.
+        best: objectives of that front, as for `minimise`.
+        only: numbers of the runs, from 0, to render only a part; names and measurements are those of the whole sweep.
+        resume: keep the runs that the folder already has.
+        most_bytes: memory limit for textures of variants that are rendered together.
+        minimise: objectives of a search: `flip`, `rmse`, `radiance_rmse`, `ms` (time of a frame), `bytes` (of
+            textures), a plugin's metric, or a figure of the pipeline; several give a Pareto front.
+        budget: maximum number of runs of a search.
+        seed: random seed of a search.
+        session: where to render; a private session by default.
+        device: GL device number where no session is given.
+        executor: `serial`, `processes`, `processes:4`, `dask`, `dask://host:8786`, a Dask `Client`, or an `Executor`;
+            by default what suits the machine. Pictures and metrics do not depend on it, times do.
+        devices: GL device numbers to distribute over worker processes.
+        timeout: seconds without progress before a worker process is replaced.
+        progress: a function that receives how many runs are done, and of how many; True shows a bar on stderr.
+        events: a function that receives an event for each step of each worker, as a mapping of plain values.
+    """
+
+    metric: str | None = None
+    frame: int = 1
+    frames: int = 5
+    repeats: int = 1
+    kept: Pictures = "all"
+    best: tuple[str, ...] = ("flip", "ms")
+    only: Sequence[int] | None = None
+    resume: bool = False
+    most_bytes: int = MOST_BYTES
+    minimise: tuple[str, ...] = ()
+    budget: int = 50
+    seed: int = 0
+    session: Gpu | None = None
+    device: int | None = None
+    executor: ExecutorChoice = None
+    devices: Sequence[int] = ()
+    timeout: float | None = None
+    progress: Progress | bool | None = None
+    events: Events | None = None
+
+    def replace(self, **settings: Any) -> Self:
+        """Return a copy with other settings.
+
+        Raises:
+            TypeError: there is no such setting.
+        """
+        return structs.replace(self, **settings)
+
+    def open_executor(self, tasks: int, *, travels: bool) -> AbstractContextManager[Executor]:
+        """Open the executor for a number of tasks; `travels` tells whether other processes can do them.
+
+        Raises:
+            UsageError: there is no such executor, or a package that it needs is missing.
+            RenderError: the cluster cannot be reached.
+        """
+        from rendergraph.farm.executors import make_executor  # a sweep is checked without it
+
+        return make_executor(
+            self.executor,
+            self.session,
+            self.device,
+            tasks=tasks,
+            devices=self.devices,
+            timeout=self.timeout,
+            travels=travels,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One variant of a comparison, or one combination of a sweep.
+
+    Attributes:
+        name: unique, and the name of its folder.
+        planned: the pipeline with the settings.
+        output: the compared output.
+        frame: number of the compared frame.
+        settings: path to value.
+        folder: where a sweep keeps it.
+        reference_key: what decides the reference's picture.
+    """
+
+    name: str
+    planned: Planned
+    output: str
+    frame: int
+    settings: Mapping[str, str] = field(default_factory=dict)
+    folder: Path = Path()
+    reference_key: str = ""
+
+    @cached_property
+    def key(self) -> str:
+        """What decides its picture and figures, to recognise it when a sweep is resumed."""
+        return run_key(self.planned, self.frame, self.reference_key)
+
+    @property
+    def picture(self) -> Path:
+        """The picture's file; light keeps its values."""
+        return self.folder / (f"{self.output}.png" if self.output == "image" else f"{self.output}.exr")
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """The metadata of its picture."""
+        return {**described(self.planned.linked), **at_time(self.frame, 30.0)}
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A sweep of which nothing is drawn yet: everything that can be wrong without GL has been looked at.
+    """A comparison of which nothing is rendered yet; everything that can be checked without GL has been checked.
 
     Attributes:
-        space: what is swept.
-        runs: in the order of the product.
-        encoding: of the output that is compared.
-        picture: what they are measured against, where that is a file.
-        other: likewise, where it is a pipeline of its own.
-        study: what the folder is about.
-        notes: what was changed to put all on one stage.
+        runs: in order.
+        output, encoding: what is compared.
+        picture: the reference, where it is a file.
+        other: the reference, where it is a pipeline of its own.
+        notes: changes that made the pipelines comparable.
+        space: the axes of a sweep.
+        study: what identifies the folder of a sweep.
     """
 
-    space: Space
     runs: tuple[Run, ...]
+    output: str
     encoding: Encoding
     picture: Reference | None
-    other: Planned | None
-    study: Mapping[str, Any]
+    other: Run | None
     notes: tuple[str, ...]
+    space: Space = field(default_factory=lambda: Space(()))
+    study: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def base(self) -> Run:
+        """What the runs are compared with in structure: the reference pipeline, or the first run."""
+        return self.other or self.runs[0]
 
     @property
     def modules(self) -> set[str]:
         """The modules of the node classes in use."""
-        planned = [run.planned for run in self.runs] + ([self.other] if self.other else [])
-        return {type(node.node).__module__ for each in planned for node in each.linked.graph.nodes}
+        runs = [*self.runs, *([self.other] if self.other else [])]
+        return {type(node.node).__module__ for run in runs for node in run.planned.linked.graph.nodes}
 
 
 def prepare(
@@ -54,82 +192,193 @@ def prepare(
     axes: Axes,
     out: Path,
     reference: Path | Pipeline | None = None,
-    *,
-    metric: str | None = None,
-    frame: int = 1,
-    only: Sequence[int] | None = None,
+    options: SweepOptions = SweepOptions(),
+    **settings: Any,
 ) -> Prepared:
-    """The runs of a sweep, planned, with the arguments of `sweep`.
+    """Plan the runs of a sweep, with the arguments of `sweep`.
+
+    Raises:
+        InputError: as from `sweep`, except for mistakes that concern the folder.
+    """
+    options = options.replace(**settings)
+    space = Space.of(axes)
+    space.check()
+    combinations = space.runs()
+    names = unique_names([run_name(run) for run in combinations])
+    base = measured_at(base, options.metric)
+    reference_name = names[0]
+    if isinstance(reference, Pipeline):
+        reference, reference_name = measured_at(reference, options.metric), reference.resolve().spec.name
+    elif reference is not None:
+        reference_name = str(reference)
+    if options.only is not None:
+        if reference is None and 0 not in options.only:
+            (reference,) = pipelines(base, combinations[:1])
+        combinations = [combinations[number] for number in options.only]
+        names = [names[number] for number in options.only]
+    prepared = prepare_variants(pipelines(base, combinations), reference, options, names)
+    picture = prepared.picture
+    key = file_digest(Path(picture.name)) if picture else run_key(prepared.base.planned, options.frame, "")
+    runs = tuple(
+        replace(run, settings=setting, folder=out / run.name, reference_key=key)
+        for run, setting in zip(prepared.runs, combinations, strict=True)
+    )
+    return replace(prepared, runs=runs, space=space, study=_study(base, options.frame, reference_name))
+
+
+def prepare_variants(
+    variants: Sequence[Pipeline], reference: Path | Pipeline | None, options: SweepOptions, names: Sequence[str] = ()
+) -> Prepared:
+    """Plan pipelines, which already have the measured port, with the scene and size of the first one.
+
+    Raises:
+        InputError: a mistake in a pipeline, or the pictures cannot be compared.
+    """
+    others = [reference] if isinstance(reference, Pipeline) else []
+    matched, notes = match_scene_and_size([*variants, *others])
+    planned = [pipeline.check() for pipeline in matched]
+    graphs = [each.linked.graph for each in planned]
+    names = unique_names(names or [graph.name for graph in graphs[: len(variants)]])
+    picture = read_picture(reference, graphs[0].size, names[0]) if isinstance(reference, Path) else None
+    output, encoding = compared_output(graphs, picture[1] if picture else None, measured=options.metric is not None)
+    called = [*names, *(graph.name for graph in graphs[len(variants) :])]
+    runs = [Run(name, each, output, options.frame) for name, each in zip(called, planned, strict=True)]
+    return Prepared(
+        runs=tuple(runs[: len(variants)]),
+        output=output,
+        encoding=encoding,
+        picture=Reference(str(reference), "file", picture[0], encoding, output) if picture else None,
+        other=runs[-1] if others else None,
+        notes=tuple(notes),
+    )
+
+
+def _study(base: Pipeline, frame: int, reference: str) -> dict[str, Any]:
+    """Return what all runs of a sweep have in common.
+
+    More values of an axis belong to the same study, and so do edited shaders: those runs are rendered again.
+    """
+    selection, spec = base.selection, base.resolve().spec
+    width, height = spec.size
+    return {
+        "pipeline": spec.name,
+        "scene": str(spec.scene.stem) if spec.scene else None,
+        "environment": str(selection.environment) if selection.environment else None,
+        "camera": selection.camera,
+        "size": f"{width}x{height}",
+        "frame": frame,
+        "reference": reference,
+        "resolved": json.loads(json.dumps(spec.tree.plain(), default=str)),
+    }
+
+
+# --- what is compared ------------------------------------------------------------------------------------------------
+
+
+def named_reference(reference: Path | Pipeline | str | None) -> Path | Pipeline | None:
+    """Return a reference; a name becomes a picture's path or a pipeline."""
+    if not isinstance(reference, str):
+        return reference
+    return Path(reference) if is_picture(reference) else load(reference)
+
+
+def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:
+    """Read a reference picture; floats are linear light, integers are display-referred.
 
     Args:
-        base, axes, out, reference, metric, frame: as for `sweep`.
-        only: numbers of the runs, from 0, where these are but a part; they are called and measured as in the whole.
+        path: the file.
+        size: width and height that it must have, if known.
+        name: of the variant that is compared with it, for the message.
 
     Raises:
-        InputError: as from `sweep`, of what is not the folder.
+        InputError: it cannot be read, has layers, or another size.
     """
-    space = Space.of(axes)
-    space.check()
-    settings = space.runs()
-    names = unique_names([run_name(run) for run in settings])
-    base, reference = _measured(base, reference, metric)
-    told = names[0]
-    if reference is not None:
-        told = str(reference) if isinstance(reference, Path) else reference.resolve().spec.name
-    if only is not None:
-        if reference is None and 0 not in only:
-            (reference,) = pipelines(base, settings[:1])
-        settings, names = [settings[number] for number in only], [names[number] for number in only]
-    staged, notes, picture, output, encoding = _looked_at(base, settings, reference, metric)
-    planned = [pipeline.check() for pipeline in staged]
-    variants, other = planned[: len(settings)], planned[-1] if len(staged) > len(settings) else None
-    against = file_digest(Path(str(reference))) if picture else key_of(other or variants[0], frame, "")
-    runs = tuple(
-        Run(name, run, variant, output, frame, key_of(variant, frame, against), out / name)
-        for name, run, variant in zip(names, settings, variants, strict=True)
-    )
-    measured = Reference(told, "file", picture[0], encoding, output) if picture else None
-    return Prepared(space, runs, encoding, measured, other, study_of(base, frame, told), tuple(notes))
+    from rendergraph.images import read  # a sweep is checked without OpenImageIO
+
+    pixels = read(path)
+    if pixels.ndim != 3:
+        text = "the image has layers; expected a single picture with channels R, G, B or Y"
+        raise InputError(Problem("RG354", text, Place(str(path))))
+    if size is not None:
+        check_sizes(np.empty((size[1], size[0])), pixels, (name, str(path)))
+    return pixels, "linear" if np.issubdtype(pixels.dtype, np.floating) else "display"
 
 
-def check_sweep(
-    base: Pipeline, axes: Axes, reference: Path | Pipeline | None = None, metric: str | None = None
-) -> list[Pipeline]:
-    """The pipelines that `sweep` would draw; everything that can be wrong without GL is found.
+def measured_at(pipeline: Pipeline, metric: str | None) -> Pipeline:
+    """Return the pipeline with an additional output: the port that is measured instead of its picture.
 
     Raises:
-        InputError: as from `sweep`.
+        InputError: there is no such port, or it is not a picture.
     """
-    base, reference = _measured(base, reference, metric)
-    space = Space.of(axes)
-    space.check()
-    settings = space.runs()
-    staged, *_ = _looked_at(base, settings, reference, metric)
-    for pipeline in staged:
-        pipeline.check()
-    return staged[: len(settings)]
+    if metric is None:
+        return pipeline
+    measured, place = pipeline.patch({"outputs": {METRIC: metric}}), Place(Option("--metric", metric))
+    try:
+        graph = measured.link().graph
+    except InputError as error:
+        context = f"in {measured.selection.source}"
+        raise error.relocated(
+            lambda problem: (
+                problem.relocate(place, context=context) if problem.place and problem.place.option("patch") else problem
+            )
+        ) from None
+    desc = graph.textures[graph.outputs[METRIC]].desc
+    if desc is None or desc.kind != "texture2d" or desc.samples > 1 or desc.format in _INTEGER_FORMATS:
+        what = "a buffer" if desc is None else f"{desc.kind} {desc.format}"
+        needed = "expected a 2D texture with one layer and one sample, not of an integer format"
+        text = f"'{metric}' of pipeline '{graph.name}' is {what}; {needed}"
+        raise InputError(Problem("RG523", text, place))
+    return measured
 
 
-def _measured(
-    base: Pipeline, reference: Path | Pipeline | None, metric: str | None
-) -> tuple[Pipeline, Path | Pipeline | None]:
-    """Both with the port that is measured."""
-    own = reference if reference is None or isinstance(reference, Path) else measured_at(reference, metric)
-    return measured_at(base, metric), own
+def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline], list[str]]:
+    """Return the pipelines with the first one's scene and size, and the changes in words."""
+    specs = [pipeline.resolve().spec for pipeline in pipelines]
+    first, notes = specs[0], []
+    if first.scene is not None and any(spec.scene != first.scene for spec in specs):
+        others = [spec.name for spec in specs if spec.scene != first.scene]
+        notes += [f"'{name}' is rendered with the scene of '{first.name}': {first.scene.stem}" for name in others]
+        # All of them, the first one too: one scene under one name is read once and stays on the GPU.
+        pipelines = [pipeline.with_scene(first.scene) for pipeline in pipelines]
+    width, height = first.size
+    others = [spec.name for spec in specs if spec.size != first.size]
+    notes += [f"'{name}' is rendered at the size of '{first.name}': {width}×{height}" for name in others]
+    return [
+        pipeline.with_size(first.size) if spec.size != first.size else pipeline
+        for pipeline, spec in zip(pipelines, specs, strict=True)
+    ], notes
 
 
-def _looked_at(
-    base: Pipeline, settings: Sequence[Mapping[str, str]], reference: Path | Pipeline | None, metric: str | None
-) -> tuple[list[Pipeline], list[str], tuple[Pixels, Encoding] | None, str, Encoding]:
-    """Runs on one stage and what was changed for that, a reference picture, and the compared output's name and kind."""
-    variants = pipelines(base, settings)
-    own = [] if reference is None or isinstance(reference, Path) else [reference]
-    staged, notes = on_one_stage([*variants, *own])
-    name = run_name(settings[0])
-    picture = read_picture(reference, staged[0].link().graph.size, name) if isinstance(reference, Path) else None
-    return (
-        staged,
-        notes,
-        picture,
-        *compared_output(staged, picture[1] if picture else None, measured=metric is not None),
-    )
+def compared_output(graphs: Sequence[Graph], encoding: Encoding | None, *, measured: bool) -> tuple[str, Encoding]:
+    """Return the output that all pipelines have and that fits the reference picture's encoding, and its own encoding.
+
+    Raises:
+        InputError: a pipeline lacks it.
+    """
+    if measured:
+        return METRIC, graphs[0].textures[graphs[0].outputs[METRIC]].semantic.encoding or "values"
+    names = {"display": ["image"], "linear": ["radiance"]}.get(encoding or "", ["image", "radiance"])
+    for name in names:
+        if all(name in graph.outputs for graph in graphs):
+            return name, "display" if name == "image" else "linear"
+    lacking = next(graph for graph in graphs if names[0] not in graph.outputs)
+    text = f"pipeline '{lacking.name}' has no output '{names[0]}' to compare; available: {', '.join(lacking.outputs)}"
+    raise InputError(Problem("RG522", text))
+
+
+def scene_name(linked: Linked) -> str:
+    """Return the name of the scene's file, or else of the scene."""
+    return linked.spec.scene.stem if linked.spec.scene else linked.scene.name
+
+
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Return the names with a number behind duplicates: `forward`, `forward-2`."""
+    unique: dict[str, None] = {}
+    given = frozenset(names)
+    for name in names:
+        number, candidate = 1, name
+        while candidate in unique or (number > 1 and candidate in given):
+            number += 1
+            candidate = f"{name}-{number}"
+        unique[candidate] = None
+    return list(unique)

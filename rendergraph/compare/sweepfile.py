@@ -1,17 +1,16 @@
-"""A sweep as a file: pipeline, axes, and what else the options of `sweep` say."""
+"""A sweep as a file: pipeline, axes, and the options of `sweep`."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, get_args
 
-from rendergraph.compare.axes import MOST_RUNS, Axis, Space, axis_of, repeated
-from rendergraph.compare.ranges import RANGE
-from rendergraph.compare.sampling import Sampling
+from msgspec import Struct
+
+from rendergraph.compare.space import MOST_RUNS, RANGE, Axis, Sampling, Space, axis_of, repeated
 from rendergraph.document import Value, load
 from rendergraph.errors import InputError, Problem
 from rendergraph.keys import Codes, Key, MapOf, Table, Validator, plain
@@ -20,7 +19,7 @@ from rendergraph.read import SIZE, entries
 from rendergraph.resources import shipped_pipelines, shipped_scenes
 
 MOST_MEASURED = 10_000
-"""Frames of a run."""
+"""Maximum number of measured frames."""
 MOST_REPEATS = 1000
 _CODES = Codes(unknown="RG030", wrong="RG030", name="RG030", file="RG030")
 _VALUES: Any = Annotated[
@@ -41,74 +40,65 @@ SWEEP = Table(
         Key(
             "axes",
             MapOf(_VALUES, what="path", null=False, least=1),
-            "Paths, as `-s` takes them, each with a list of values or a range, both ends included.",
+            "Paths, as `-s` takes them, each with a list of values or a range that includes both ends.",
             required=True,
             example="axes: {NODE.PARAM: [VALUE, VALUE], NODE.OTHER: 8:64:8}",
         ),
         Key(
             "zip",
             listed(listed(TEXT, "paths", least=2), "lists of paths"),
-            "Groups of axes that go through their values together, the first with the first.",
+            "Groups of axes that step through their values together, first with first.",
             example="zip: [[NODE.PARAM, NODE.OTHER]]",
         ),
-        Key("samples", whole(1, MOST_RUNS), "How many samples of the axes are drawn, in place of all combinations."),
+        Key("samples", whole(1, MOST_RUNS), "Number of samples of the axes, instead of all combinations."),
         Key(
             "sampling", choice(*get_args(Sampling)), "`latin`: a sample in each equal part of every axis; or `random`."
         ),
-        Key("seed", whole(0), "Of the samples: the same one gives the same.", default=0),
+        Key("seed", whole(0), "Random seed of the samples.", default=0),
         Key(
             "minimise",
             Annotated[TEXT | listed(TEXT, "names", least=1), "a name such as flip or ms, or a list of names"],
-            "Look for what makes this least, or these, in place of all combinations.",
+            "Minimise these objectives with an optimiser, instead of rendering all combinations.",
             example="minimise: [flip, ms]",
         ),
-        Key("budget", whole(1, MOST_RUNS), "How many runs the search may ask for.", default=50),
+        Key("budget", whole(1, MOST_RUNS), "Maximum number of runs of the search.", default=50),
         Key("reference", shipped(shipped_pipelines), "A picture or a pipeline that all runs are compared with."),
-        Key("metric", TEXT, "A port, `NODE.PORT`, whose texture is measured in place of the picture."),
-        Key("scene", shipped(shipped_scenes), "What is drawn, in place of the pipeline's own."),
+        Key("metric", TEXT, "A port, `NODE.PORT`, whose texture is measured instead of the picture."),
+        Key("scene", shipped(shipped_scenes), "The scene, instead of the pipeline's own."),
         SIZE,
-        Key("set", MapOf(Any, what="path"), "Paths to values that hold for all runs."),
-        Key("frames", whole(1, MOST_MEASURED), "How many frames are measured."),
-        Key("repeats", whole(1, MOST_REPEATS), "How often they are measured, each time anew."),
-        Key("keep", choice("all", "best"), "Which pictures stay; `best` are those of the Pareto front."),
+        Key("set", MapOf(Any, what="path"), "Paths to values that apply to all runs."),
+        Key("frames", whole(1, MOST_MEASURED), "Number of measured frames."),
+        Key("repeats", whole(1, MOST_REPEATS), "Number of measurements, each from the start."),
+        Key("keep", choice("all", "best"), "Which pictures are kept; `best` keeps those on the Pareto front."),
     ),
 )
-"""What a sweep's file holds."""
+"""The keys of a sweep's file."""
 
 
-@dataclass(frozen=True)
-class SweepFile:
-    """A sweep as a file has it; None where the file does not say.
+class SweepFile(Struct, frozen=True, eq=False):
+    """A sweep as its file has it.
 
     Attributes:
         pipeline: a shipped name or a path, joined to the file's folder.
-        space: its axes, and which runs are made of them.
-        reference, scene: likewise.
-        metric: the port that is measured.
+        space: its axes, and how runs are made of them.
+        options: the attributes of `SweepOptions` that the file has.
+        reference, scene: shipped names or paths, as `pipeline`.
         size: width and height.
         sets: `PATH=VALUE` texts.
-        frames, repeats: how many are measured, and how often.
-        kept: which pictures stay.
-        minimise, budget: what a search looks for, and how many runs it may ask for.
-        places: what stands under each path, of axes and of `set`, and the groups of `zip`.
+        places: path to value of axes and of `set`, and the groups of `zip`.
     """
 
     pipeline: str
     space: Space
-    reference: str | None = None
-    scene: str | None = None
-    metric: str | None = None
-    size: tuple[int, int] | None = None
-    sets: tuple[str, ...] = ()
-    frames: int | None = None
-    repeats: int | None = None
-    kept: Literal["all", "best"] | None = None
-    minimise: tuple[str, ...] = ()
-    budget: int | None = None
-    places: Mapping[str, Value] = field(default_factory=dict)
+    options: Mapping[str, Any]
+    reference: str | None
+    scene: str | None
+    size: tuple[int, int] | None
+    sets: tuple[str, ...]
+    places: Mapping[str, Value]
 
     def placed(self, error: InputError) -> InputError:
-        """Mistakes in what the file says of paths, at its own lines; others as they are."""
+        """Relocate mistakes in what the file says about paths to its own lines."""
         return error.relocated(self._placed)
 
     def _placed(self, problem: Problem) -> Problem:
@@ -118,7 +108,7 @@ class SweepFile:
 
 
 def is_sweep(path: Path) -> bool:
-    """Whether a file says that it is a sweep; one that cannot be read is none."""
+    """Whether a file claims to be a sweep; one that cannot be read is not."""
     if path.suffix.lower() not in (".yaml", ".yml") or not path.is_file():
         return False
     try:
@@ -129,45 +119,41 @@ def is_sweep(path: Path) -> bool:
 
 
 def read_sweep(path: Path) -> SweepFile:
-    """A sweep's file.
+    """Read a sweep's file.
 
     Raises:
-        InputError: it is missing, no YAML, or says something a sweep cannot have; with all mistakes.
+        InputError: it is missing, not YAML, or has keys or values that a sweep cannot have; with all mistakes.
     """
     validator = Validator(_CODES)
     root = validator.file(load(path).root, SWEEP, "`sweep: 1`, `pipeline` and `axes`")
-    axes = [_axis(str(name), listed, validator) for name, listed in entries(root, "axes").items()] if root else []
+    axes = [_axis(str(name), value, validator) for name, value in entries(root, "axes").items()] if root else []
     if validator.problems or root is None:
         raise InputError(validator.problems)
-    said = plain(root, SWEEP)
-    groups = {",".join(group.plain()): group for group in _parts(root.get("zip"))}
-    said |= {key: _beside(path, said[key]) for key in ("pipeline", "reference", "scene") if key in said}
-    given, minimise = root.get("set"), said.get("minimise", ())
+    values = plain(root, SWEEP)
+    groups = {",".join(group.plain()): group for group in _items(root.get("zip"))}
+    values |= {key: _beside(path, values[key]) for key in ("pipeline", "reference", "scene") if key in values}
+    given, minimise = root.get("set"), values.get("minimise", ())
+    options = {name: values[key] for key, name in _OPTIONS.items() if key in values}
+    options["minimise"] = (minimise,) if isinstance(minimise, str) else tuple(minimise)
+    sampled = {key: values[key] for key in ("samples", "sampling", "seed") if key in values}
     return SweepFile(
-        said["pipeline"],
-        Space(
-            tuple(axes),
-            tuple(tuple(group) for group in said.get("zip", ())),
-            said.get("samples"),
-            said.get("sampling", "latin"),
-            said.get("seed", 0),
-        ),
-        said.get("reference"),
-        said.get("scene"),
-        said.get("metric"),
-        said.get("size"),
-        tuple(f"{name}={value_text(value)}" for name, value in (given.items() if given else ())),
-        said.get("frames"),
-        said.get("repeats"),
-        said.get("keep"),
-        tuple([minimise] if isinstance(minimise, str) else minimise),
-        said.get("budget"),
-        entries(root, "set") | groups | entries(root, "axes"),
+        pipeline=values["pipeline"],
+        space=Space(tuple(axes), tuple(map(tuple, values.get("zip", ()))), **sampled),
+        options=options,
+        reference=values.get("reference"),
+        scene=values.get("scene"),
+        size=values.get("size"),
+        sets=tuple(f"{name}={value_text(value)}" for name, value in (given.items() if given else ())),
+        places=entries(root, "set") | groups | entries(root, "axes"),
     )
 
 
+_OPTIONS = {"metric": "metric", "frames": "frames", "repeats": "repeats", "keep": "kept", "budget": "budget"}
+"""Key to attribute of `SweepOptions`."""
+
+
 def value_text(value: Value) -> str:
-    """A value as the text that `-s` would take for it."""
+    """Return the text that `-s` takes for a value."""
     plain = value.plain()
     return plain if isinstance(plain, str) else json.dumps(plain)
 
@@ -178,18 +164,16 @@ def _axis(path: str, given: Value, validator: Validator) -> Axis:
             return axis_of(path, given.data)
         except ValueError as error:
             validator.report(given, _CODES.wrong, str(error))
-    values = [value_text(value) for value in _parts(given)]
+    values = [value_text(value) for value in _items(given)]
     for value in repeated(values):
         validator.report(given, _CODES.wrong, f"axis '{path}' has the value {value} twice")
     return Axis(path, tuple(values))
 
 
-def _parts(value: Value | None) -> Sequence[Value]:
+def _items(value: Value | None) -> Sequence[Value]:
     return value.data if value is not None and isinstance(value.data, list) else ()
 
 
 def _beside(file: Path, name: str) -> str:
-    """A name as the command line takes it: shipped ones as they are, paths joined to the file's folder."""
-    if re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        return name
-    return str(file.parent / name)
+    """Return a name as the command line takes it: shipped ones as they are, paths joined to the file's folder."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else str(file.parent / name)

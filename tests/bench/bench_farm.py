@@ -19,8 +19,8 @@ from time import perf_counter, process_time
 
 import rendergraph as rg
 from rendergraph.compare.batches import MOST_RUNS
-from rendergraph.compare.groups import Group
-from rendergraph.compare.product import Sweep, sweep
+from rendergraph.compare.engine import Sweep, sweep
+from rendergraph.compare.tasks import VariantTask
 from rendergraph.farm import Event, Serial, Task, TaskFinished, TaskOutput, Worker
 
 AXES: dict[str, list[float | str]] = {
@@ -53,7 +53,7 @@ class Metered(Serial):
         """With what each task costs, without what is done with it between its items."""
         while self._waiting:
             task, spent = self._waiting.popleft(), 0.0
-            assert isinstance(task, Group)
+            assert isinstance(task, VariantTask)
             own = Worker("elsewhere", self._worker.gpu)
             own._values = self._worker._values
             values = task.run(own)
@@ -64,7 +64,7 @@ class Metered(Serial):
                 if value is None:
                     break
                 yield TaskOutput(task, value, "elsewhere")
-            self.costs.setdefault(len(task.variants), []).append(spent)
+            self.costs.setdefault(len(task.runs), []).append(spent)
             yield TaskFinished(task, "elsewhere", spent)
 
 

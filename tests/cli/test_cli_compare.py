@@ -103,7 +103,7 @@ def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (("compare", "forward"), 2, "there is one pipeline and nothing to compare it with"),
+        (("compare", "forward"), 2, "there is only one pipeline and nothing to compare it with"),
         (("compare", "forward", "forwrad"), 3, "RG015"),
         (
             ("compare", "forward", "forward", "--fail-above", "flpi=1"),
@@ -119,12 +119,12 @@ def test_pictures_with_nan_are_told_and_never_win(cli: Any, tmp_path: Path) -> N
             ("compare", "forward", "deferred", "-s", "gbuffer.oct_bits=8"),
             3,
             "--set gbuffer.oct_bits=8: RG109 in forward: there is no node 'gbuffer'; available: display, environment, light, shadows, sun; "
-            "-s holds for all pipelines; for one alone: rendergraph compare deferred --reference forward -s …",
+            "-s applies to all pipelines; for one alone: rendergraph compare deferred --reference forward -s …",
         ),
         (("sweep", "forward", "-o", "out"), 3, "RG524 the sweep has no axis"),
         (("sweep", "forward", "-x", "shadows.taps=1"), 2, "RG500 a sweep needs a folder for its runs: -o DIR"),
         (("sweep", "forward", "-x", "shadows.taps=1:4:0", "-o", "out"), 2, "steps of 0 do not lead from 1 to 4"),
-        (("sweep", "forward", "-x", "shadows.taps=1:4", "--list"), 3, "1:4:STEP, or take --samples of it"),
+        (("sweep", "forward", "-x", "shadows.taps=1:4", "--list"), 3, "add a step (1:4:STEP) or use --samples"),
         (("sweep", "forward", "-x", "a.b=1,2", "--zip", "a.b", "--list"), 2, "is not PATH,PATH"),
         (("sweep", "forward", "-x", "shadows.taps=", "-o", "out"), 2, "axis 'shadows.taps' has no values"),
         (("sweep", "forward", "-x", "shadows.tap=1", "-o", "out"), 3, "did you mean 'taps'?"),
@@ -155,7 +155,7 @@ def test_sweep_draws_keeps_and_resumes(cli: Any, tmp_path: Path) -> None:
     )
     first = cli(*words)
     assert first.code == 0
-    assert "4 runs against shadows.taps=1,display.curve=aces: 7 passes drawn, 12 one by one" in first.out
+    assert "4 runs against shadows.taps=1,display.curve=aces: 7 passes executed, 12 one by one" in first.out
     assert first.out.splitlines()[-1] == "out/report.html"
     assert "Pareto front" in (tmp_path / "out" / "report.html").read_text()
     assert cli(*words).code == 3
@@ -179,7 +179,7 @@ def test_a_sweep_file(cli: Any, tmp_path: Path) -> None:
 def test_a_sweep_is_listed_before_it_is_drawn(cli: Any, tmp_path: Path) -> None:
     words = ("-x", "shadows.taps=1:3:1", "-x", "display.curve=aces,none", "--size", "48x27", "--list")
     told = cli("sweep", "forward", "--scene", "cornell_box", *words).out.splitlines()
-    assert told[0] == "6 runs against shadows.taps=1,display.curve=aces: 10 passes to draw, 18 one by one"
+    assert told[0] == "6 runs against shadows.taps=1,display.curve=aces: 10 passes to execute, 18 one by one"
     assert [line.split() for line in told[2:6]] == [
         ["sun", "1", "6"],
         ["light", "3", "6"],
@@ -224,8 +224,8 @@ def test_a_search_is_a_sweep_s_file_too(cli: Any, tmp_path: Path) -> None:
     assert asked == {run["name"]: run["rmse"] for run in told["runs"]}
     assert told["search"]["front"] == [min(asked, key=lambda name: asked[name])]
     again = cli("sweep", "study.yaml", "-o", "out", "--resume").out
-    assert "3 runs kept from before" in again
-    assert f"least{' ' * (len(told['search']['front'][0]) - 5)}  rmse" in again
+    assert "3 runs reused" in again
+    assert f"minimum{' ' * (len(told['search']['front'][0]) - 7)}  rmse" in again
 
 
 def test_what_is_odd_of_every_value_is_said_of_the_first(cli: Any, tmp_path: Path) -> None:
@@ -238,10 +238,10 @@ def test_what_is_odd_of_every_value_is_said_of_the_first(cli: Any, tmp_path: Pat
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (("--minimise", "flip", "--list"), 2, "RG500 --minimise and --list: an optimiser asks for runs when it knows"),
-        (("--minimise", "flip", "--samples", "3", "-o", "o"), 2, "RG500 --minimise and --samples: take one of them"),
-        (("--minimise", "flip", "-o", "o"), 3, "RG524 a search needs what its runs are measured against"),
-        (("--minimise", "x", "--reference", "forward", "-o", "o"), 3, "RG524 there is nothing called 'x' to minimise"),
+        (("--minimise", "flip", "--list"), 2, "RG500 --minimise and --list: an optimiser chooses runs by the results"),
+        (("--minimise", "flip", "--samples", "3", "-o", "o"), 2, "RG500 --minimise and --samples exclude each other"),
+        (("--minimise", "flip", "-o", "o"), 3, "RG524 a search needs a reference to measure its runs against"),
+        (("--minimise", "x", "--reference", "forward", "-o", "o"), 3, "RG524 unknown objective 'x'"),
     ],
 )
 def test_searches_that_cannot_be_are_told(cli: Any, words: tuple[str, ...], code: int, message: str) -> None:
@@ -296,7 +296,7 @@ def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> 
 def test_a_sweep_writes_its_chart_as_a_picture(cli: Any, tmp_path: Path) -> None:
     words = ("sweep", "forward", "--scene", "cornell_box", *SMALL, "-x", "shadows.taps=1", "-n", "1", "-o", "out")
     found = cli(*words)
-    assert found.out.startswith("1 run against shadows.taps=1: 3 passes drawn")
+    assert found.out.startswith("1 run against shadows.taps=1: 3 passes executed")
     assert found.out.splitlines()[-2:] == ["out/quality.svg", "out/report.html"]
     assert (tmp_path / "out" / "quality.svg").read_text().startswith("<svg xmlns")
 
@@ -318,7 +318,9 @@ def test_an_interrupted_sweep_keeps_what_is_drawn_and_says_how_to_go_on(cli: Any
     kept = len(list(tmp_path.glob("out/*/run.json")))
     assert process.returncode == 130
     assert 2 <= kept < 18
-    assert told[-2].startswith(f"{kept} runs kept in out; go on with: rendergraph sweep forward -x display.exposure=0,")
+    assert told[-2].startswith(
+        f"{kept} runs kept in out; continue with: rendergraph sweep forward -x display.exposure=0,"
+    )
     assert told[-2].endswith("-n 400 -o out --resume")
     whole = [file.with_name("image.png") for file in tmp_path.glob("out/*/run.json")]  # one may have been begun
     before = {file: file.stat().st_mtime_ns for file in whole}

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.compare.pictures import compare
-from rendergraph.compare.reference import unique_names
-from rendergraph.compare.timing import Spread, times_of, times_within
+from rendergraph.compare.engine import compare
+from rendergraph.compare.prepare import unique_names
+from rendergraph.compare.timing import Spread, times_of
 from rendergraph.errors import InputError, UsageError
 from rendergraph.execute import FrameTimes, StepTime
 from rendergraph.images import write
@@ -84,8 +84,8 @@ def test_all_stand_on_the_stage_of_the_first(gl: rg.Session) -> None:
     other = rg.load("forward-prepass", size=(20, 10), scene="spheres")
     found = compare([rg.load("forward", size=SIZE), other], frames=1, session=gl)
     assert found.notes == (
-        "'forward-prepass' is drawn with the scene of 'forward': shapes",
-        "'forward-prepass' is drawn at the size of 'forward': 48×27",
+        "'forward-prepass' is rendered with the scene of 'forward': shapes",
+        "'forward-prepass' is rendered at the size of 'forward': 48×27",
     )
     assert np.asarray(found.results[1].pixels).shape[:2] == (27, 48)
     assert found.results[1].metrics.flip < 0.01
@@ -153,7 +153,7 @@ def test_times_are_sums_of_steps_and_medians_of_frames() -> None:
     assert found.frame_ms.median == 11
     assert found.gpu_ms == Spread(4.0, 3.0, 5.0, 3.2, 4.8)
     assert [(p.node, p.type, p.cpu_ms.median) for p in found.passes] == [("a", "x", 3.0), ("b", "y", 1.0)]
-    part = times_within(frames, {"first": "a", "second": "a", "gone": "c"}, {"first": "x", "second": "x"})
+    part = times_of(frames, {"first": "x", "second": "x"}, {"first": "a", "second": "a", "gone": "c"})
     assert part.frame_ms is None
     assert part.cpu_ms.median == 6
     assert [p.node for p in part.passes] == ["first", "second"]

@@ -17,10 +17,8 @@ from typing import Any
 import pytest
 
 import rendergraph as rg
-from rendergraph.compare.ledger import Ledger
-from rendergraph.compare.pictures import compare
-from rendergraph.compare.product import Sweep, sweep
-from rendergraph.compare.study import RESULTS
+from rendergraph.compare.engine import Sweep, compare, sweep
+from rendergraph.compare.store import RESULTS, ResultsLog
 from rendergraph.errors import InputError, RenderError, UsageError
 from rendergraph.farm import dask_cluster
 from rendergraph.farm.processes import Processes
@@ -84,7 +82,7 @@ def base(tmp_path: Path) -> rg.Pipeline:
 def rows(folder: Path) -> dict[str, dict[str, Any]]:
     """Each run's row, without what is measured in seconds and where."""
     measured = ("frame_ms", "gpu_ms", "cpu_ms", "passes", "repeats", "machine", "device", "sha256")
-    records, torn = Ledger(folder / RESULTS).read()
+    records, torn = ResultsLog(folder / RESULTS).read()
     assert torn == 0
     found = {record["name"]: {key: value for key, value in record.items() if key not in measured} for record in records}
     assert len(found) == len(records)
@@ -216,14 +214,14 @@ def test_a_full_disk_keeps_what_is_there(base: rg.Pipeline, gl: rg.Session, tmp_
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (9000, resource.RLIM_INFINITY)),
     )
     assert ended.returncode == 1, ended.stderr
-    assert "RG507 the results cannot be kept" in ended.stderr
-    records, _ = Ledger(tmp_path / "out" / RESULTS).read()
+    assert "RG507 the results cannot be written" in ended.stderr
+    records, _ = ResultsLog(tmp_path / "out" / RESULTS).read()
     assert 1 <= len(records) < 12
     again = sweep(
         rg.load(tmp_path / "p.yaml"), ["make.wave=1:12:1"], tmp_path / "out", frames=1, resume=True, session=gl
     )
     assert (again.resumed >= len(records), len(again.comparison.results)) == (True, 12)
-    assert len({record["key"] for record in Ledger(tmp_path / "out" / RESULTS).read()[0]}) == 12
+    assert len({record["key"] for record in ResultsLog(tmp_path / "out" / RESULTS).read()[0]}) == 12
 
 
 def test_pipelines_are_compared_elsewhere_as_here(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
@@ -255,7 +253,7 @@ def test_node_classes_at_hand_are_drawn_here_alone(make: Any, tmp_path: Path) ->
 
 def test_two_sweeps_do_not_share_a_folder_whoever_draws(base: rg.Pipeline, tmp_path: Path) -> None:
     def second(event: Mapping[str, Any]) -> None:
-        with pytest.raises(InputError, match=r"RG504 .*another sweep is at work in it"):
+        with pytest.raises(InputError, match=r"RG504 .*another sweep is running in it"):
             sweep(base, FEW, tmp_path / "out", frames=1, executor="processes:2", resume=True)
         seen.append(json.dumps(event))
 

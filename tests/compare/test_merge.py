@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.compare.batches import batches, draw
-from rendergraph.compare.divergence import passes
-from rendergraph.compare.merge import merge
+from rendergraph.compare.batches import batches, merge, render_batch
+from rendergraph.compare.results import passes
 from rendergraph.link import Graph
 from rendergraph.resources import shipped_pipelines
 
@@ -48,7 +47,7 @@ def pictures(
     drawn: dict[int, Any] = {}
     planned = [variant.check() for variant in variants]
     for batch in batches(planned, range(len(variants)), most_bytes):
-        for each in draw(session, planned, batch, frame):
+        for each in render_batch(session, planned, batch, frame):
             drawn[each.number] = each.arrays["radiance"]
     return [drawn[number] for number in range(len(variants))]
 
@@ -176,7 +175,7 @@ def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> 
     variants = [base, *(base.set("display.exposure", 0.5) for _ in range("display" in ends))]
     planned = [variant.check() for variant in variants]
     (batch,) = batches(planned, range(len(variants)))
-    drawn = [each.arrays for each in draw(gl, planned, batch, 2)]
+    drawn = [each.arrays for each in render_batch(gl, planned, batch, 2)]
     assert batch.pass_count <= len(passes(base.plan())) + 1
     for arrays, variant in zip(drawn, variants, strict=True):
         for output, pixels in gl.render(variant, frames=range(1, 3)).items():

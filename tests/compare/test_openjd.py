@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 
 import rendergraph as rg
 from rendergraph.cli.app import main
-from rendergraph.compare.ledger import Ledger
-from rendergraph.compare.listing import listed
-from rendergraph.compare.openjd import numbers_text, parse_numbers, template
-from rendergraph.compare.parts import draw_frames, measure
+from rendergraph.compare.engine import sweep
+from rendergraph.compare.export.openjd import numbers_text, parse_numbers, template
+from rendergraph.compare.export.shards import measure, render_frames
+from rendergraph.compare.listing import list_sweep
 from rendergraph.compare.prepare import prepare
-from rendergraph.compare.product import sweep
+from rendergraph.compare.store import ResultsLog
 from rendergraph.errors import InputError
 from rendergraph.images import read
 
@@ -78,7 +78,7 @@ def test_parts_are_the_whole(gl: rg.Session, tmp_path: Path, against: str | None
         assert (one.name, one.metrics, one.radiance_rmse) == (other.name, other.metrics, other.radiance_rmse)
         np.testing.assert_array_equal(read(tmp_path / "whole" / one.name / "radiance.exr"), other.pixels)
     keys = [
-        {r["name"]: r["key"] for r in Ledger(tmp_path / folder / "results.jsonl").read()[0]}
+        {r["name"]: r["key"] for r in ResultsLog(tmp_path / folder / "results.jsonl").read()[0]}
         for folder in ("whole", "out")
     ]
     assert keys[0] == keys[1]
@@ -88,7 +88,7 @@ def test_parts_are_the_whole(gl: rg.Session, tmp_path: Path, against: str | None
 def test_frames_are_the_same_in_every_chunk(gl: rg.Session, tmp_path: Path) -> None:
     drawn = base(tmp_path)
     for frames in (range(1, 3), range(3, 5)):
-        list(draw_frames(drawn, AXES, tmp_path / "out", [1], frames, gl))
+        list(render_frames(drawn, AXES, tmp_path / "out", [1], frames, gl))
     expected = gl.frames(drawn.set("a.gain", 0.3), frames=range(1, 5))
     for number, frame in enumerate(expected, 1):
         found = read(tmp_path / "out" / "a.gain=0.3" / "frames" / f"radiance.{number:04d}.exr")
@@ -98,7 +98,7 @@ def test_frames_are_the_same_in_every_chunk(gl: rg.Session, tmp_path: Path) -> N
 def test_a_template_has_groups_chunks_and_how_many_gpus(tmp_path: Path) -> None:
     model = pytest.importorskip("openjd.model")
     drawn = base(tmp_path)
-    found = listed(prepare(drawn, {"a.gain": "0.01:0.4:0.01"}, tmp_path))
+    found = list_sweep(prepare(drawn, {"a.gain": "0.01:0.4:0.01"}, tmp_path))
     job = template(found, tmp_path / "study.yaml", tmp_path, frames=range(1, 49), chunk=24)
     groups = job["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0]["range"]
     assert sorted(n for group in groups for n in parse_numbers(group)) == list(range(1, 41))
@@ -120,20 +120,17 @@ def test_a_template_has_groups_chunks_and_how_many_gpus(tmp_path: Path) -> None:
 
 
 def test_a_sweep_elsewhere_is_named_when_the_job_is_run(tmp_path: Path) -> None:
-    found = listed(prepare(base(tmp_path), AXES, tmp_path))
+    found = list_sweep(prepare(base(tmp_path), AXES, tmp_path))
     job = template(found, tmp_path / "study.yaml", tmp_path / "jobs", frames=None, chunk=24)
     told = {parameter["name"]: parameter.get("default") for parameter in job["parameterDefinitions"]}
     assert told == {"Sweep": None, "Files": None, "Output": "study-results", "GPUs": 1, "Rendergraph": "rendergraph"}
     assert [step["name"] for step in job["steps"]] == ["Measure", "Report"]
 
 
-def test_too_many_groups_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rendergraph.compare import openjd
-
-    found = listed(prepare(base(tmp_path), {"a.gain": "0.01:0.4:0.01"}, tmp_path))
-    monkeypatch.setattr(openjd, "MOST_TASKS", 2)
-    with pytest.raises(InputError, match="RG524 the sweep has 3 groups of runs, and a template 2 at most"):
-        template(found, tmp_path / "study.yaml", tmp_path, frames=None, chunk=1)
+def test_too_many_groups_are_an_error(tmp_path: Path) -> None:
+    found = list_sweep(prepare(base(tmp_path), {"a.gain": "0.01:0.4:0.01"}, tmp_path))
+    with pytest.raises(InputError, match="RG524 the sweep has 3 groups of runs, more than the 2 of a template"):
+        template(found, tmp_path / "study.yaml", tmp_path, frames=None, chunk=1, most_tasks=2)
 
 
 @pytest.mark.slow

@@ -12,10 +12,10 @@ import msgspec
 import pytest
 
 import rendergraph as rg
-from rendergraph.compare.pictures import compare
+from rendergraph.compare.engine import compare
 from rendergraph.compare.report import comparison_page
 from rendergraph.compare.report.scatter import Point, scatter_svg
-from rendergraph.compare.values import Comparison
+from rendergraph.compare.results import Comparison
 
 VOID = {"meta", "link", "img", "input", "path", "rect", "circle", "br"}
 

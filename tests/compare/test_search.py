@@ -12,12 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rendergraph as rg
-from rendergraph.compare import optimise, product
-from rendergraph.compare.axes import Space
-from rendergraph.compare.goals import front_of
-from rendergraph.compare.ledger import Ledger
-from rendergraph.compare.optimise import AT_ONCE, check_search, search
+from rendergraph.compare.optimiser import BATCH_SIZE, check_search, search
 from rendergraph.compare.report import sweep_page
+from rendergraph.compare.results import pareto_front
+from rendergraph.compare.space import Space
+from rendergraph.compare.store import ResultsLog
 from rendergraph.errors import InputError, UsageError
 
 pytest.importorskip("optuna")
@@ -73,31 +72,26 @@ def test_a_search_comes_nearer_than_chance(
         far = abs(x - 3) / 10 + abs(math.log(y / 50)) / 10 + abs(n - 7) / 10
         assert result.metrics.rmse == pytest.approx(0.25 * far, rel=1e-4, abs=1e-6)
     page = sweep_page(found, "rendergraph sweep")
-    assert "What the search has found" in page
-    assert len(Ledger(out / "results.jsonl").read()[0]) == len(found.comparison.results)
+    assert "Best runs of the search" in page
+    assert len(ResultsLog(out / "results.jsonl").read()[0]) == len(found.comparison.results)
     assert found.as_json()["search"]["front"] == list(found.search.front)
 
 
 def test_a_search_that_was_interrupted_ends_where_it_would_have(
-    base: rg.Pipeline, least: rg.Pipeline, gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    base: rg.Pipeline, least: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:
     options: dict[str, Any] = {"minimise": ["rmse"], "frames": 1, "session": gl, "seed": 5}
     whole = search(base, AXES, tmp_path / "whole", least, budget=20, **options)
-    calls = []
 
-    def interrupted(*args: Any, **given: Any) -> Any:
-        calls.append(1)
-        if len(calls) == 2:
+    def interrupt(done: int, budget: int) -> None:
+        if done == BATCH_SIZE:
             raise KeyboardInterrupt
-        return product.sweep(*args, **given)
 
-    with monkeypatch.context() as patched:
-        patched.setattr(optimise, "sweep", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            search(base, AXES, tmp_path / "out", least, budget=20, **options)
+    with pytest.raises(KeyboardInterrupt):
+        search(base, AXES, tmp_path / "out", least, budget=20, progress=interrupt, **options)
     less = search(base, AXES, tmp_path / "out", least, budget=11, resume=True, **options)
     again = search(base, AXES, tmp_path / "out", least, budget=20, resume=True, **options)
-    assert less.resumed == AT_ONCE
+    assert less.resumed == BATCH_SIZE
     assert again.resumed == 11
     assert whole.search
     assert less.search
@@ -137,7 +131,7 @@ def test_no_run_is_asked_for_twice_and_all_there_are_is_enough(
 @settings(deadline=None, max_examples=60)
 @given(st.dictionaries(st.text(max_size=3), st.tuples(*[st.integers(0, 5)] * 3), max_size=12))
 def test_the_front_is_what_none_beats(values: dict[str, tuple[int, ...]]) -> None:
-    front = front_of(values)
+    front = pareto_front(values)
     for name, own in values.items():
         beaten = any(all(a <= b for a, b in zip(o, own, strict=True)) and o != own for o in values.values())
         assert (name in front) == (not beaten)
@@ -146,7 +140,7 @@ def test_the_front_is_what_none_beats(values: dict[str, tuple[int, ...]]) -> Non
 @pytest.mark.parametrize(
     ("axes", "minimise", "message"),
     [
-        ({"bowl.x": "0.0:1"}, ["flpi"], "RG524 there is nothing called 'flpi' to minimise; did you mean 'flip'?"),
+        ({"bowl.x": "0.0:1"}, ["flpi"], "RG524 unknown objective 'flpi'; did you mean 'flip'?"),
         ({"bowl.z": "0.0:1"}, ["flip"], "-x bowl.z=0.0: RG103 node 'bowl' .* has no param or input 'z'"),
         ({"bowl.x": "0.0:20"}, ["flip"], "-x bowl.x=20.0: RG104 'bowl.x' is 20.0, it must be at most 10"),
         ({"bowl.x": [1, 2, 99]}, ["flip"], "-x bowl.x=99: RG104"),
@@ -161,7 +155,7 @@ def test_mistakes_are_told_before_anything_is_drawn(
 
 
 def test_a_search_wants_a_reference(base: rg.Pipeline) -> None:
-    with pytest.raises(InputError, match="RG524 a search needs what its runs are measured against: --reference"):
+    with pytest.raises(InputError, match="RG524 a search needs a reference to measure its runs against: --reference"):
         check_search(base, Space.of(AXES), None, ["ms"], None)
 
 

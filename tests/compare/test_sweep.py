@@ -14,18 +14,15 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.cli.compare import summary
-from rendergraph.compare import groups
-from rendergraph.compare.axes import Axis, Space, parse_axis, pipelines, typed
 from rendergraph.compare.batches import batches
-from rendergraph.compare.columns import line_schema
-from rendergraph.compare.front import pareto
-from rendergraph.compare.ledger import Ledger, checksum
-from rendergraph.compare.listing import listed
+from rendergraph.compare.engine import sweep
+from rendergraph.compare.export.table import csv_text
+from rendergraph.compare.listing import list_sweep
 from rendergraph.compare.prepare import prepare
-from rendergraph.compare.product import sweep
 from rendergraph.compare.report import sweep_page
-from rendergraph.compare.study import RESULTS, kept_runs
-from rendergraph.compare.table import csv_text
+from rendergraph.compare.results import pareto
+from rendergraph.compare.space import Axis, Space, parse_axis, pipelines, typed
+from rendergraph.compare.store import RESULTS, ResultsLog, checksum, kept_runs, line_schema
 from rendergraph.errors import InputError
 from rendergraph.images import read, write
 
@@ -41,7 +38,7 @@ def base() -> rg.Pipeline:
 def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
     base: rg.Pipeline, gl: rg.Session, tmp_path: Path
 ) -> None:
-    told = listed(prepare(base, AXES, tmp_path / "out"), tmp_path / "out")
+    told = list_sweep(prepare(base, AXES, tmp_path / "out"), tmp_path / "out")
     found = sweep(base, AXES, tmp_path / "out", frames=1, session=gl)
     assert (found.executed, found.alone) == (1 + 2 * 2 + 2 * 2 * 3, 3 * 12)
     assert (told.executed, told.shared()) == (17, {"sun": (1, 12), "light": (4, 12), "display": (12, 12)})
@@ -59,7 +56,7 @@ def test_a_sweep_draws_distinct_passes_and_the_pictures_of_single_runs(
         assert told["flip"] == result.metrics.flip
         assert "nodes:" in told["resolved"]
     assert found.comparison.results[0].metrics.flip == 0
-    records, torn = Ledger(tmp_path / "out" / "results.jsonl").read()
+    records, torn = ResultsLog(tmp_path / "out" / "results.jsonl").read()
     assert ([record["name"] for record in records], torn) == ([r.name for r in found.comparison.results], 0)
     front = pareto(found.comparison.results)
     assert found.comparison.results[0].name in {result.name for result in front}
@@ -121,9 +118,7 @@ def test_another_study_does_not_write_over_the_pictures_of_this_one(
         (base, {"frame": 2}, "frame 1, not 2"),
     ]
     for other, options, message in others:
-        with pytest.raises(
-            InputError, match=rf"RG504 .* of another study: .*{message}.*; name another folder: -o .*-2"
-        ):
+        with pytest.raises(InputError, match=rf"RG504 .* of another study: .*{message}.*; use another folder: -o .*-2"):
             sweep(other, axes, out, frames=1, resume=True, session=gl, **options)
     assert {file: file.read_bytes() for file in out.rglob("*") if file.is_file()} == before
 
@@ -148,17 +143,14 @@ def test_more_frames_are_measured_and_no_picture_is_drawn_again(
 
 
 @pytest.mark.slow
-def test_runs_are_kept_before_they_are_measured(
-    base: rg.Pipeline, gl: rg.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*args: Any, **options: Any) -> None:
-        raise KeyboardInterrupt
+def test_runs_are_kept_before_they_are_measured(base: rg.Pipeline, gl: rg.Session, tmp_path: Path) -> None:
+    def interrupt(done: int, total: int) -> None:
+        if kept_runs(tmp_path) == 2:
+            raise KeyboardInterrupt
 
     axes = AXES[:1]
-    with monkeypatch.context() as patched:
-        patched.setattr(groups, "measure", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            sweep(base, axes, tmp_path, frames=1, session=gl)
+    with pytest.raises(KeyboardInterrupt):
+        sweep(base, axes, tmp_path, frames=1, session=gl, progress=interrupt)
     assert kept_runs(tmp_path) == 2
     pictures = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.png")}
     with pytest.raises(InputError, match="--resume adds what is missing"):
@@ -204,7 +196,7 @@ def test_what_would_be_drawn_is_listed_and_nothing_is(gl: rg.Session, tmp_path: 
     out, base = tmp_path / "out", bad(tmp_path)
 
     def told(values: str, **options: Any) -> tuple[list[Any], int, set[str]]:
-        found = listed(prepare(base, [f"a.mode={values}"], out), out, frames=1, **options).as_json()
+        found = list_sweep(prepare(base, [f"a.mode={values}"], out), out, frames=1, **options).as_json()
         return [run["group"] for run in found["runs"]], found["kept"], {run["name"] for run in found["runs"]}
 
     assert told("1,2") == ([1, 1], 0, {"a.mode=1", "a.mode=2"})
@@ -267,7 +259,7 @@ def test_the_best_pictures_are_kept_and_no_others(gl: rg.Session, tmp_path: Path
 
 
 def lines(folder: Path) -> list[dict[str, Any]]:
-    return Ledger(folder / RESULTS).read()[0]
+    return ResultsLog(folder / RESULTS).read()[0]
 
 
 def test_a_value_that_fails_is_a_row_and_the_others_go_on(gl: rg.Session, tmp_path: Path) -> None:
@@ -327,7 +319,7 @@ def test_a_folder_has_one_sweep_at_a_time(gl: rg.Session, tmp_path: Path) -> Non
     out, base = tmp_path / "out", bad(tmp_path)
 
     def second(done: int, total: int) -> None:
-        with pytest.raises(InputError, match="RG504 cannot be written: another sweep is at work in it"):
+        with pytest.raises(InputError, match="RG504 cannot be written: another sweep is running in it"):
             sweep(base, (Axis("a.mode", ("1",)),), out, frames=1, resume=True)
         seen.append(done)
 
@@ -417,7 +409,7 @@ def test_a_reference_picture_counts_by_its_content(base: rg.Pipeline, gl: rg.Ses
 
 
 def test_a_torn_line_is_left_out_and_the_file_goes_on(tmp_path: Path) -> None:
-    ledger = Ledger(tmp_path / "results.jsonl")
+    ledger = ResultsLog(tmp_path / "results.jsonl")
     ledger.append({"key": "a", "ssim": 0.5})
     ledger.append({"key": "b", "name": "ä"})
     whole = ledger.path.read_bytes()

@@ -1,4 +1,4 @@
-"""The page itself."""
+"""The report of a comparison or a sweep."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from html import escape
 
-from rendergraph.compare.front import pareto
-from rendergraph.compare.goals import Search
-from rendergraph.compare.product import Sweep
-from rendergraph.compare.report.parts import (
+from rendergraph.compare.engine import Sweep
+from rendergraph.compare.report.html import (
     Section,
     card,
     drawing,
@@ -19,10 +17,10 @@ from rendergraph.compare.report.parts import (
     software_note,
     table,
 )
-from rendergraph.compare.report.pictures import first, sheet, viewer
+from rendergraph.compare.report.pictures import first_differences, sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
+from rendergraph.compare.results import Comparison, Result, Search, machine, pareto
 from rendergraph.compare.timing import Times
-from rendergraph.compare.values import Comparison, Result, machine
 from rendergraph.diagrams import lifetimes_svg
 from rendergraph.diff import diff, diff_svg, diff_text
 from rendergraph.formatting import format_bytes
@@ -30,104 +28,82 @@ from rendergraph.metrics import description
 from rendergraph.resources import folder
 
 MOST_COLUMNS = 8
-"""Variants whose passes stand side by side; more are not read, and the quickest good ones stand for them."""
+"""Maximum number of variants whose passes are compared side by side; of more, those on the front."""
 _QUALITY = "Error against time"
 
 
 def comparison_page(comparison: Comparison, command: str, *, title: str = "", note: str = "") -> str:
-    """The report of `compare`.
+    """Return the report of `compare`.
 
     Args:
-        comparison: what it shows.
-        command: how to get it again.
-        title: what stands above it; the variants' names by default.
-        note: what its author says about it, as text; empty lines part paragraphs.
+        comparison: its results.
+        command: the command line that repeats it.
+        title: the names of the variants by default.
+        note: the author's text beneath the title; empty lines separate paragraphs.
     """
     names = [result.name for result in comparison.results]
     title = title or (f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0])
-    shown_results = comparison.results[:MOST_COLUMNS]
-    if not all(result.memory for result in comparison.results):
+    summary = _summary(comparison, front=())
+    pictures = section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS))
+    if all(result.memory for result in comparison.results):
         sections = [
-            section("summary", "Summary", _summary(comparison, front=())),
-            section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
-            section("structure", "What they were made with", _structure(comparison)),
-        ]
-        return _page(title, note, comparison, sections, command)
-    return _page(
-        title,
-        note,
-        comparison,
-        [
-            section("summary", "Summary", _summary(comparison, front=()), software_note(comparison.software)),
-            section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
-            section("first", "Where they part", first(comparison)),
-            section("times", "Times", *_times(comparison, shown_results, ())),
+            section("summary", "Summary", summary, software_note(comparison.software)),
+            pictures,
+            section("first", "First difference", first_differences(comparison)),
+            section("times", "Times", *_times(comparison, comparison.results[:MOST_COLUMNS], ())),
             section("structure", "Structure", _structure(comparison)),
             section("memory", "Memory", _memory(comparison.results)),
-        ],
-        command,
-    )
+        ]
+    else:
+        structure = section("structure", "Pipelines in the pictures' metadata", _structure(comparison))
+        sections = [section("summary", "Summary", summary), pictures, structure]
+    return _page(title, note, comparison, sections, command)
 
 
-def sweep_page(found: Sweep, command: str, *, title: str = "", note: str = "") -> str:
-    """The report of `sweep`.
-
-    Args:
-        found: what it shows.
-        command: how to get it again.
-        title: what stands above it; the pipeline's name by default.
-        note: what its author says about it, as text; empty lines part paragraphs.
-    """
-    comparison = found.comparison
+def sweep_page(sweep: Sweep, command: str, *, title: str = "", note: str = "") -> str:
+    """Return the report of `sweep`; the arguments are those of `comparison_page`."""
+    comparison = sweep.comparison
     front = pareto(comparison.results)
     best = front[:MOST_COLUMNS]
-    axes = card((axis.path, axis.text.replace(",", ", ")) for axis in found.space.axes)
-    failed = card((f"{failure.name} failed", failure.text) for failure in found.failures)
+    axes = card((axis.path, axis.text.replace(",", ", ")) for axis in sweep.space.axes)
+    failed = card((f"{failure.name} failed", failure.text) for failure in sweep.failures)
     saved = (
-        f"<p>{found.executed} passes were drawn for {len(comparison.results) - found.resumed} runs that one by one "
-        f"would have taken {found.alone}: what is the same in several runs is drawn once. "
+        f"<p>{sweep.executed} passes were executed for {len(comparison.results) - sweep.resumed} runs, which need "
+        f"{sweep.alone} one by one: passes that several runs share are executed once. "
         f"A run's time is the sum of its passes'.</p>"
     )
-    return _page(
-        title or f"Sweep of {comparison.results[0].source}",
-        note,
-        comparison,
-        [
-            section("axes", "Axes", axes, saved),
-            section("search", "Search", _search(found.search) if found.search else ""),
-            section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
-            section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
-            section("times", "Times", *_times(comparison, best, front), _front_words(front)),
-            section("memory", "Memory", _memory(best)),
-        ],
-        command,
-    )
+    sections = [
+        section("axes", "Axes", axes, saved),
+        section("search", "Search", _search(sweep.search) if sweep.search else ""),
+        section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
+        section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
+        section("times", "Times", *_times(comparison, best, front), _front_words(front)),
+        section("memory", "Memory", _memory(best)),
+    ]
+    return _page(title or f"Sweep of {comparison.results[0].source}", note, comparison, sections, command)
 
 
-def _search(found: Search) -> str:
-    """The best of a search, and how it came there."""
+def _search(search: Search) -> str:
     rows = [
         f'<tr><th scope="row">{escape(name.replace(",", ", "))}</th>'
-        + "".join(_cell(_value(value)) for value in found.values[name])
+        + "".join(_cell(_value(value)) for value in search.values[name])
         + "</tr>"
-        for name in found.front
+        for name in search.front
     ]
-    what = " and ".join(f"<code>{escape(name)}</code>" for name in found.minimise)
-    one = len(found.minimise) == 1
-    words = f"{'The least' if one else 'The front of the least'} {what} of {len(found.order)} runs that were asked for."
-    steps = ", ".join(f"{_value(value)} after {place}" for place, value in found.best_after())
-    words += f" The best <code>{escape(found.minimise[0])}</code> was {steps}." if steps else ""
-    heads = ["", *(f"#{escape(name)}" for name in found.minimise)]
-    return table(heads, rows, "What the search has found") + f"<p class=quiet>{words}</p>"
+    what = " and ".join(f"<code>{escape(name)}</code>" for name in search.minimise)
+    one = len(search.minimise) == 1
+    words = f"{'The least' if one else 'The front of the least'} {what} of {len(search.order)} runs."
+    steps = ", ".join(f"{_value(value)} after {place}" for place, value in search.improvements())
+    words += f" The best <code>{escape(search.minimise[0])}</code> was {steps}." if steps else ""
+    heads = ["", *(f"#{escape(name)}" for name in search.minimise)]
+    return table(heads, rows, "Best runs of the search") + f"<p class=quiet>{words}</p>"
 
 
 def _value(value: float) -> str:
-    """Bytes are whole, and large."""
     return f"{value:,.0f}" if value >= 1e4 else number(value)
 
 
 def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Result]) -> tuple[str, str]:
-    """Quality against time beside the time of each pass."""
     chart = drawing(quality_svg(comparison, front), _QUALITY)
     return f'<div class="beside"><div>{_passes(results)}</div>{chart}</div>', software_note(comparison.software)
 
@@ -142,7 +118,7 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Sect
     closing = [
         section(
             "again",
-            "The same again",
+            "Command",
             f"<pre><code>{escape(command)}</code></pre>",
             _notes(comparison),
             _folded("The machine", _machine(comparison)),
@@ -171,9 +147,8 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Sect
 
 
 def _repeats(times: Times) -> str:
-    """The least and the greatest median, and of how many."""
-    found = times.repeated
-    return _cell(f"{number(found.min, 2)}–{number(found.max, 2)} ({len(times.repeats)})" if found else "–")
+    medians = times.repeated
+    return _cell(f"{number(medians.min, 2)}–{number(medians.max, 2)} ({len(times.repeats)})" if medians else "–")
 
 
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
@@ -214,7 +189,7 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
             cells += [_repeats(times)] if again else []
             cells += [milliseconds(times.cpu_ms)]
             cells += [milliseconds(times.frame_ms)] if whole else []
-            cells += [_cell(str(result.pass_count)), _cell(format_bytes(int(str(result.memory["allocated_bytes"]))))]
+            cells += [_cell(str(result.pass_count)), _cell(format_bytes(result.allocated_bytes))]
         rows.append(f'<tr class="{" ".join(kinds)}">{"".join(cells)}<td>{last}</td></tr>')
     reference = comparison.reference
     of = {"display": "display-referred ", "linear": "scene-linear "}.get(reference.encoding, "")
@@ -227,9 +202,9 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
     words = f"Errors of {what} against <code>{escape(reference.name)}</code>."
     if measured:
         frames = comparison.results[0].times.frames
-        many = f"medians of {frames} frames, with the tenth to ninetieth percentile beneath"
+        many = f"medians of {frames} frames, with the 10th to 90th percentile beneath"
         words += f" Times are {many if frames > 1 else 'of one frame'}."
-        words += " Repeats are the least and the greatest median of several measurements." if again else ""
+        words += " Repeats are the least and greatest median of several measurements." if again else ""
     return table(heads, rows, "Errors, times and memory") + f"<p class=quiet>{words}</p>"
 
 
@@ -265,7 +240,7 @@ def _passes(results: Sequence[Result]) -> str:
 
 
 def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
-    """Error against time, a point a result, as an SVG document; the front is found where none is given."""
+    """Return error against time as an SVG document, with a point for each result; the front is computed if missing."""
     results = comparison.results
     best = {result.name for result in (front or pareto(results))}
     points = []
@@ -289,7 +264,7 @@ def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
 
 def _front_words(front: Sequence[Result]) -> str:
     names = ", ".join(f"<code>{escape(result.name)}</code>" for result in front)
-    return f"<p>No run is both quicker and nearer to the reference than these: {names}.</p>"
+    return f"<p>No run is both faster and nearer to the reference than these: {names}.</p>"
 
 
 def _structure(comparison: Comparison) -> str:
@@ -305,9 +280,9 @@ def _structure(comparison: Comparison) -> str:
         if not difference:
             parts.append(f"<p>{escape(title)}: no difference.</p>")
         else:
-            said = "\n".join(line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:])
+            lines = "\n".join(line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:])
             picture = drawing(diff_svg(graph, result.graph, difference), title)
-            parts.append(_folded(f"{title}: {_amount(said)}", f"<pre>{escape(said)}</pre>{picture}"))
+            parts.append(_folded(f"{title}: {_amount(lines)}", f"<pre>{escape(lines)}</pre>{picture}"))
     return "\n".join(parts)
 
 
@@ -316,7 +291,7 @@ def _memory(results: Sequence[Result]) -> str:
     for result in results:
         if result.plan is None:
             continue
-        allocated = format_bytes(int(str(result.memory["allocated_bytes"])))
+        allocated = format_bytes(result.allocated_bytes)
         svg = drawing(lifetimes_svg(result.plan), f"Lifetimes of the textures of {result.name}")
         parts.append(_folded(f"{result.name}, {allocated}", svg))
     return "\n".join(parts)
@@ -326,9 +301,9 @@ def _machine(comparison: Comparison) -> str:
     device = comparison.device
     entries: list[tuple[str, object]] = [(key, value) for key, value in device.items() if not isinstance(value, dict)]
     entries += list(machine().items())
-    told = description()
-    entries.append(("FLIP", f"{told['flip']['library']}, {told['flip']['pixels_per_degree']} pixels per degree"))
-    entries.append(("SSIM", f"{told['ssim']['window']}×{told['ssim']['window']} Gaussian, σ {told['ssim']['sigma']}"))
+    flip, ssim = description()["flip"], description()["ssim"]
+    entries.append(("FLIP", f"{flip['library']}, {flip['pixels_per_degree']} pixels per degree"))
+    entries.append(("SSIM", f"{ssim['window']}×{ssim['window']} Gaussian, σ {ssim['sigma']}"))
     entries.append(("made", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")))
     return card(entries)
 
@@ -337,12 +312,10 @@ def _notes(comparison: Comparison) -> str:
     return "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes)
 
 
-def _amount(said: str) -> str:
-    """How much a difference is, by its lines."""
-    count = len(said.splitlines())
+def _amount(lines: str) -> str:
+    count = len(lines.splitlines())
     return f"{count} change{'s' if count > 1 else ''}"
 
 
 def _folded(title: str, body: str) -> str:
-    """What is looked at when it is asked for; on paper it is open."""
     return f"<details><summary>{escape(title)}</summary>{body}</details>"

@@ -1,22 +1,22 @@
-"""The page's pictures: two under a slider, all on a sheet, and where variants part."""
+"""The page's pictures: two under a slider, all on a sheet, and the first passes that differ."""
 
 from __future__ import annotations
 
 from html import escape
 
-from rendergraph.compare.report.parts import eight_bit, img, number, png
-from rendergraph.compare.values import Comparison
+from rendergraph.compare.report.html import eight_bit, img, number, png
+from rendergraph.compare.results import Comparison
 from rendergraph.images import heat_map, viewable
 
 
 def _pictures(comparison: Comparison) -> list[tuple[str, str]]:
-    """Identity and label of every picture in the sheet, the reference's first where it is no variant."""
+    """Return identity and label of every picture, starting with the reference if it is not a variant."""
     own = [(f"pic-{n}", result.name) for n, result in enumerate(comparison.results) if result.pixels is not None]
     return own if comparison.reference.kind == "variant" else [("pic-ref", comparison.reference.name), *own]
 
 
 def viewer(comparison: Comparison) -> str:
-    """Two of the page's pictures under a slider."""
+    """Return two of the page's pictures under a slider."""
     pictures = _pictures(comparison)
 
     def options(chosen: int) -> str:
@@ -58,7 +58,7 @@ def viewer(comparison: Comparison) -> str:
 
 
 def sheet(comparison: Comparison, most: int) -> str:
-    """Every picture, and beneath it the map of where an eye sees that it differs; maps of `most` variants."""
+    """Return every picture with its FLIP map beneath; without maps for more than `most` variants."""
     figures = []
     reference = comparison.reference
     if reference.kind != "variant":
@@ -73,40 +73,36 @@ def sheet(comparison: Comparison, most: int) -> str:
             maps += 1
             figure += _figure("", png(heat_map(result.flip_map)), f"FLIP {number(result.metrics.flip)}")
         figures.append(f"<div>{figure}</div>")
-    # Pictures that were read back from a sweep's folder have none.
-    told = f"Beneath each is FLIP against {escape(reference.name)}, dark where equal." if maps else ""
-    return f'<div class="sheet">{"".join(figures)}</div><p class="quiet">{told}</p>'
+    # Pictures that were read from a sweep's folder have no map.
+    note = f"Beneath each is FLIP against {escape(reference.name)}, dark where equal." if maps else ""
+    return f'<div class="sheet">{"".join(figures)}</div><p class="quiet">{note}</p>'
 
 
 def _figure(identity: str, source: str, caption: str) -> str:
     return f"<figure>{img(identity, source, caption)}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def first(comparison: Comparison) -> str:
-    """Of each variant the first pass that draws something else, both textures beside each other."""
+def first_differences(comparison: Comparison) -> str:
+    """Return the first pass of each variant whose output differs, with both textures."""
     parts = []
     base = comparison.base[0] if comparison.base else ""
     for result in comparison.results:
         if result.difference is None or result.name == base:
             continue
-        part = result.first
-        if part is None:
-            same = f"every pass draws what it draws in <code>{escape(base)}</code>, bit by bit"
+        first = result.first
+        if first is None:
+            same = f"every pass renders the same as in <code>{escape(base)}</code>, bit by bit"
             parts.append(f"<p>{escape(result.name)}: {same}.</p>")
             continue
-        name = f"<code>{escape(part.node)}.{escape(part.port)}</code>"
-        was = f" (there <code>{escape(part.base_node)}</code>)" if part.base_node != part.node else ""
-        was += escape(part.after)
-        amount = (
-            "in size" if part.most is None else f"in {100 * part.share:.3g} % of its texels, by up to {part.most:.4g}"
-        )
-        causes = ", ".join(f"<code>{escape(cause)}</code>" for cause in part.causes)
-        why = f" What differs in structure up to there: {causes}." if causes else ""
+        name = f"<code>{escape(first.node)}.{escape(first.port)}</code>"
+        was = f" (there <code>{escape(first.base_node)}</code>)" if first.base_node != first.node else ""
+        causes = ", ".join(f"<code>{escape(cause)}</code>" for cause in first.causes)
+        why = f" Structural differences up to there: {causes}." if causes else ""
         pair = "".join(
-            _figure("", png(viewable(pixels, part.semantic)), f"{part.node}.{part.port} of {whose}")
-            for pixels, whose in zip(part.pixels, (base, result.name), strict=True)
+            _figure("", png(viewable(pixels, first.semantic)), f"{first.node}.{first.port} of {whose}")
+            for pixels, whose in zip(first.pixels, (base, result.name), strict=True)
         )
-        head = f"{escape(result.name)}: {name}{was}, {amount}"
+        head = f"{escape(result.name)}: {name}{was}{escape(first.after)}, {first.amount}"
         parts.append(
             f"<details><summary>{head}</summary><p>Differs first from <code>{escape(base)}</code>.{why}</p>"
             f'<div class="pair">{pair}</div></details>'

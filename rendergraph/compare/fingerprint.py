@@ -1,9 +1,10 @@
-"""What a picture is made from beside its pipeline file: the text of its shaders, its nodes' code, its scene's files."""
+"""Fingerprints of everything that a picture depends on besides its pipeline file: shaders, node code, scene files."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
+import json
 import sys
 from collections.abc import Iterator
 from functools import lru_cache, partial
@@ -14,32 +15,51 @@ from typing import TYPE_CHECKING, Any
 from rendergraph.errors import InputError
 from rendergraph.program import stage_texts, text_key
 from rendergraph.stamps import FileCache
+from rendergraph.version import __version__
 
 if TYPE_CHECKING:
     from types import ModuleType
 
     from rendergraph.link import Graph
-    from rendergraph.session.values import Expanded
+    from rendergraph.session.values import Expanded, Planned
 
 _BUILTIN = "rendergraph.nodes"
 _TEXTS: FileCache[str] = FileCache()
 
 
-def sources_digest(expanded: Expanded) -> str:
-    """SHA-256 of everything that a pipeline is drawn from and its resolved file does not hold.
+def run_key(planned: Planned, frame: int, reference: str) -> str:
+    """Return the SHA-256 of everything that decides a run's picture and figures, `reference` being its reference's."""
+    linked, selection = planned.linked, planned.linked.selection
+    files = [str(linked.spec.scene), str(selection.environment), sources_digest(planned)]
+    spec = linked.spec.to_yaml(origins=False)
+    parts = [__version__, spec, files, selection.camera, linked.graph.size, frame, reference, *_metrics(planned)]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
-    Shaders count as they reach the driver, without comments; of Python the nodes' modules and what they import of their
-    own package; of the scene every file that was read. The framework's own code is told by its version.
+
+def worker_digest(planned: Planned) -> str:
+    """Return what must be the same on a worker, besides the resolved file."""
+    return f"{sources_digest(planned)} {' '.join(_metrics(planned))}"
+
+
+def _metrics(planned: Planned) -> list[str]:
+    return sorted(metric.name for metric in planned.linked.catalog.extensions.metrics())
+
+
+def sources_digest(expanded: Expanded) -> str:
+    """Return the SHA-256 of everything that a pipeline depends on and its resolved file does not contain.
+
+    Shaders count as they reach the driver, without comments; of Python code, the nodes' modules and what they import
+    from their own package; of the scene, every file that was read. The version stands for the framework's own code.
     """
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     files = (file_digest(path) for path in sorted(map(Path, expanded.linked.scene.files)))
     for text in (*_shader_texts(expanded), *_code(expanded.linked.graph), *files):
-        found.update(hashlib.sha256(text.encode()).digest())
-    return found.hexdigest()
+        digest.update(hashlib.sha256(text.encode()).digest())
+    return digest.hexdigest()
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file's content, empty where it cannot be read."""
+    """Return the SHA-256 of a file's content, empty if it cannot be read."""
     try:
         status = path.stat()
         return _read_digest(path, status.st_mtime_ns, status.st_size)
@@ -60,15 +80,15 @@ def _shader_texts(expanded: Expanded) -> Iterator[str]:
         sources = types, expansion.resources, expansion.views
         try:
             yield _TEXTS.get(text_key(step, *sources), partial(_text_digest, step, *sources))
-        except InputError as error:  # said when it is drawn, at its place
+        except InputError as error:  # reported at its place when the run is rendered
             yield str(error)
 
 
 def _text_digest(*step_and_sources: Any) -> str:
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for text in stage_texts(*step_and_sources).values():
-        found.update(hashlib.sha256(text.text.encode()).digest())
-    return found.hexdigest()
+        digest.update(hashlib.sha256(text.text.encode()).digest())
+    return digest.hexdigest()
 
 
 def _code(graph: Graph) -> Iterator[str]:
@@ -81,7 +101,7 @@ def _code(graph: Graph) -> Iterator[str]:
 
 
 def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
-    """The digests of a module and of all it imports of its own package."""
+    """Yield the digests of a module and of all that it imports from its own package."""
     package = _BUILTIN if name.startswith(f"{_BUILTIN}.") else name.partition(".")[0]
     waiting = [name]
     while waiting:
@@ -95,28 +115,28 @@ def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
 
 
 def _imports(module: ModuleType) -> tuple[str, ...]:
-    """Names that a module's imports may mean, absolute."""
     file = Path(str(module.__file__))
     try:
         status = file.stat()
     except OSError:
         return ()
-    return _imported(file, module.__package__ or "", status.st_mtime_ns, status.st_size)
+    return _imported_names(file, module.__package__ or "", status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=4096)
-def _imported(file: Path, package: str, modified_ns: int, size: int) -> tuple[str, ...]:
+def _imported_names(file: Path, package: str, modified_ns: int, size: int) -> tuple[str, ...]:
+    """Return the absolute names that a module's imports may mean."""
     try:
         tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
         return ()
-    found: list[str] = []
+    names: list[str] = []
     for statement in ast.walk(tree):
         if isinstance(statement, ast.Import):
-            found += [alias.name for alias in statement.names]
+            names += [alias.name for alias in statement.names]
         elif isinstance(statement, ast.ImportFrom):
             base = statement.module or ""
             if statement.level:
                 base = resolve_name("." * statement.level + base, package)
-            found += [base, *(f"{base}.{alias.name}" for alias in statement.names)]
-    return tuple(found)
+            names += [base, *(f"{base}.{alias.name}" for alias in statement.names)]
+    return tuple(names)

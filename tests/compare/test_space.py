@@ -14,8 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rendergraph as rg
-from rendergraph.compare.axes import Axis, Space, parse_axis, pipelines, run_name
-from rendergraph.compare.ranges import Span, parse_range
+from rendergraph.compare.space import Axis, Space, Span, parse_axis, parse_range, pipelines, run_name
 from rendergraph.compare.sweepfile import is_sweep, read_sweep
 from rendergraph.errors import InputError
 
@@ -70,7 +69,7 @@ def test_many_values_are_read_in_no_time() -> None:
 def test_axes_as_a_whole_are_checked() -> None:
     with pytest.raises(InputError, match="RG524 the sweep has no axis"):
         Space(()).check()
-    with pytest.raises(InputError, match=r"two axes are called 'a.b'"):
+    with pytest.raises(InputError, match=r"two axes have the path 'a.b'"):
         Space((Axis("a.b", ("1",)), Axis("a.b", ("2",)))).check()
     with pytest.raises(InputError, match="make 12000 runs, more than 10000"):
         Space.of({"a": range(120), "b": "1:100:1"}).check()
@@ -102,7 +101,8 @@ def test_a_sweep_is_a_file_too(tmp_path: Path) -> None:
     )
     found = read_sweep(path)
     assert is_sweep(path)
-    assert (found.pipeline, found.scene, found.size, found.frames) == ("forward", "spheres", (48, 27), 2)
+    assert (found.pipeline, found.scene, found.size) == ("forward", "spheres", (48, 27))
+    assert found.options == {"frames": 2, "minimise": ()}
     assert found.reference == str(tmp_path / "truth.png")
     assert found.sets == ("light.ambient=0.1",)
     assert found.space == Space((Axis("shadows.taps", ("1", "3")), Axis("light.shading", ("pbr", "phong"))))
@@ -223,18 +223,18 @@ def test_what_is_no_range_is_a_value(text: str) -> None:
     [
         ("8:64:0", "'8:64:0': steps of 0 do not lead from 8 to 64"),
         ("8:64:-8", "'8:64:-8': steps of -8 do not lead from 8 to 64"),
-        ("8:64:8:8", "'8:64:8:8' is no range: write FIRST:LAST:STEP, log:FIRST:LAST:COUNT, or"),
-        ("8:x", "text with a colon stands in quotes"),
-        ("log:0.1", "is no range"),
-        ("log:0:10:5", "lies above 0"),
-        ("log:1:10:1", "how many values there are, 2 or more"),
-        ("log:1:10:2.5", "how many values there are, 2 or more"),
-        ("log:1:4:9", "there are no 9 whole numbers so; for others write 1.0"),
+        ("8:64:8:8", "'8:64:8:8' is an invalid range; use FIRST:LAST:STEP, log:FIRST:LAST:COUNT, or"),
+        ("8:x", "Quote values that contain a colon"),
+        ("log:0.1", "is an invalid range"),
+        ("log:0:10:5", "must lie above 0"),
+        ("log:1:10:1", "the number of values, at least 2"),
+        ("log:1:10:2.5", "the number of values, at least 2"),
+        ("log:1:4:9", "has fewer than 9 whole numbers; for fractions write 1.0"),
         ("0:1000000:1", "makes 1000001 values, more than 10000"),
         ("0:1:1e-300", "more than 10000"),
-        ("2:1", "the first number is the lower one"),
-        ("1:1e300", "numbers end at 1e12"),
-        ("1,2:4", "'2:4' has no values that could stand beside others"),
+        ("2:1", "the first number must be the lower one"),
+        ("1:1e300", "numbers must not exceed 1e12"),
+        ("1,2:4", "'2:4' is a continuous range, not one of several values"),
         ("1,1:3:1", "has the value 1 twice"),
     ],
 )
@@ -278,10 +278,10 @@ def test_zipped_axes_go_through_their_values_together() -> None:
 @pytest.mark.parametrize(
     ("zipped", "message"),
     [
-        ([("a", "b")], "--zip a,b: RG524 axes that go together have as many values each: 'a' has 2, 'b' has 3"),
-        ([("a", "sun.resolutoin")], "there is no axis 'sun.resolutoin' to go together; did you mean 'sun.resolution'?"),
-        ([("a", "sun.resolution"), ("sun.resolution", "a")], "axis 'a' goes together with others once"),
-        ([("a", "span")], "'a' has 2, 'span' has all numbers"),
+        ([("a", "b")], "--zip a,b: RG524 zipped axes need the same number of values: 'a' has 2, 'b' has 3"),
+        ([("a", "sun.resolutoin")], "unknown axis 'sun.resolutoin'; did you mean 'sun.resolution'?"),
+        ([("a", "sun.resolution"), ("sun.resolution", "a")], "axis 'a' is zipped more than once"),
+        ([("a", "span")], "'a' has 2, 'span' has a continuous range"),
     ],
 )
 def test_axes_that_cannot_go_together_are_told(zipped: list[tuple[str, ...]], message: str) -> None:
@@ -293,7 +293,7 @@ def test_axes_that_cannot_go_together_are_told(zipped: list[tuple[str, ...]], me
 
 def test_a_span_wants_samples() -> None:
     axes = {"ao.radius": "log:0.1:1", "ao.samples": [8]}
-    message = r"-x ao.radius=log:0.1:1: RG524 axis 'ao.radius' is all .* write log:0.1:1:COUNT, or take --samples of it"
+    message = r"-x ao.radius=log:0.1:1: RG524 axis 'ao.radius' is a continuous range; add a step .log:0.1:1:COUNT. or use --samples"
     with pytest.raises(InputError, match=message):
         Space.of(axes).check()
     Space.of(axes, samples=3).check()

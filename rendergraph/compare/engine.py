@@ -1,0 +1,289 @@
+"""The comparisons themselves: of pipelines, of picture files, and of all combinations of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rendergraph.catalog import Catalog
+from rendergraph.compare.batches import MOST_RUNS
+from rendergraph.compare.prepare import (
+    SweepOptions,
+    measured_at,
+    named_reference,
+    prepare,
+    prepare_variants,
+    read_picture,
+    unique_names,
+)
+from rendergraph.compare.results import Comparison, Reference, Result, Search, measure_against, pareto
+from rendergraph.compare.runner import Runner, SweepRunner
+from rendergraph.compare.space import Axes, Space, typed
+from rendergraph.compare.store import RUN, Failure, SweepFolder, locked
+from rendergraph.diff import diff
+from rendergraph.errors import InputError, Problem, UsageError
+from rendergraph.farm.bundle import make_bundle
+from rendergraph.metrics import check_sizes
+from rendergraph.session.pipeline import Pipeline, load, loaded
+from rendergraph.session.progress import Progress, shown
+from rendergraph.stamps import track_reads
+
+if TYPE_CHECKING:
+    from rendergraph.farm.executors import ExecutorChoice
+    from rendergraph.link import Graph
+    from rendergraph.session.gpu import Gpu
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The results of a sweep.
+
+    Attributes:
+        comparison: every run as a variant, in the order of the product.
+        space: the axes.
+        executed: passes that were executed this time.
+        alone: passes that those runs would have executed one by one.
+        resumed: runs that were complete already.
+        timed: runs that were rendered already, and were measured.
+        redrawn: runs that were stored, and rendered again because files have changed since.
+        torn: incomplete lines of the results.
+        failures: runs that could not be rendered or compared; they are not variants.
+        search: the result of an optimiser, where one chose the runs.
+    """
+
+    comparison: Comparison
+    space: Space
+    executed: int
+    alone: int
+    resumed: int
+    timed: int
+    redrawn: int
+    torn: int
+    failures: tuple[Failure, ...]
+    search: Search | None = None
+
+    def __repr__(self) -> str:
+        return f"<Sweep of {', '.join(axis.path for axis in self.space.axes)}: {len(self.comparison.results)} runs>"
+
+    def _repr_html_(self) -> str:
+        return self.comparison._repr_html_()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the document of `sweep --json`."""
+        document = self.comparison.as_json()
+        runs = document.pop("variants")
+        front = {result.name for result in pareto(self.comparison.results)}
+        axes = {axis.path: axis.text if axis.span else list(map(typed, axis.values)) for axis in self.space.axes}
+        document |= {
+            "axes": axes,
+            "executed_passes": self.executed,
+            "passes_one_by_one": self.alone,
+            "resumed": self.resumed,
+            "timed_again": self.timed,
+            "redrawn": self.redrawn,
+            "runs": [run | {"pareto": run["name"] in front} for run in runs],
+            "failed": [failure.as_json() for failure in self.failures],
+        }
+        return document | ({"search": self.search.as_json()} if self.search else {})
+
+
+def compare(
+    pipelines: Sequence[Pipeline | str | Path] | Pipeline | str | Path,
+    reference: Path | Pipeline | str | None = None,
+    *,
+    metric: str | None = None,
+    names: Sequence[str] = (),
+    frames: int = 10,
+    frame: int = 1,
+    session: Gpu | None = None,
+    device: int | None = None,
+    progress: Progress | bool | None = None,
+    executor: ExecutorChoice = "serial",
+    devices: Sequence[int] = (),
+    timeout: float | None = None,
+) -> Comparison:
+    """Render pipelines with one scene, one camera and at one size, and compare the pictures.
+
+    Args:
+        pipelines: the pipelines, also by their names or files; all use the scene and size of the first one.
+        reference: a picture file or another pipeline, also by its name; the first of `pipelines` by default.
+        names: of the pipelines; those of their files by default.
+        frames: number of measured frames of each; in this process the pipelines take turns.
+        metric, frame, session, device, progress, executor, devices, timeout: see `SweepOptions`.
+
+    Raises:
+        UsageError: there is nothing to compare.
+        InputError: a mistake in a file, or the pictures cannot be compared.
+        RenderError: rendering failed.
+        DeviceError: there is no usable GL device.
+    """
+    if isinstance(pipelines, (Pipeline, str, Path)):
+        pipelines = [pipelines]
+    if not pipelines:
+        raise UsageError(Problem("RG500", "there is no pipeline to compare"))
+    options = SweepOptions(
+        metric=metric,
+        frames=frames,
+        frame=frame,
+        session=session,
+        device=device,
+        progress=progress,
+        executor=executor or "serial",
+        devices=devices,
+        timeout=timeout,
+    )
+    given, reference = [loaded(each) for each in pipelines], named_reference(reference)
+    catalogs = [each.catalog for each in (*given, reference) if isinstance(each, Pipeline)]
+    with track_reads() as files:
+        if isinstance(reference, Pipeline):
+            reference = measured_at(reference, metric)
+        prepared = prepare_variants([measured_at(each, metric) for each in given], reference, options, names)
+    runner = Runner(prepared, options)
+    travels = all(catalog is None for catalog in catalogs)
+    with (
+        options.open_executor(len(given), travels=travels) as farm,
+        shown(progress, "steps") as report,
+    ):
+        farm.upload_inputs(lambda: make_bundle(files, given[0].selection.plugins, prepared.modules))
+        runner.execute(farm, report)
+    runs = [*prepared.runs, *([prepared.other] if prepared.other else [])]
+    return runner.comparison(
+        warnings=[problem for run in runs for problem in run.planned.linked.catalog.extensions.warnings]
+    )
+
+
+def sweep(
+    base: Pipeline | str | Path,
+    axes: Axes,
+    out: Path | str,
+    reference: Path | Pipeline | str | None = None,
+    options: SweepOptions = SweepOptions(),
+    **settings: Any,
+) -> Sweep:
+    """Render every combination of the axes' values into a folder each, and measure it.
+
+    A run's picture and figures are stored as soon as it is rendered, its times when it has been measured, so that an
+    interruption loses little. A run that cannot be rendered gets a line with the reason, and the others continue.
+
+    Args:
+        base: the pipeline that the axes change, also by its name or file.
+        axes: paths with values or ranges: `{"ao.samples": [8, 16], "ao.radius": "log:0.1:1:5"}`; or a `Space`, for
+            samples and zipped axes.
+        out: the folder; `results.jsonl` in it gets a line for each measured run.
+        reference: a picture or a pipeline that runs are measured against, also by its name; the first run by default.
+        options: how to render and measure.
+        settings: attributes of `SweepOptions` by name: `frames=20, resume=True`.
+
+    Raises:
+        InputError: an axis names nothing, a value does not fit, the folder has results already, or those of another
+            study, or another sweep is running in it; or what runs are measured against cannot be rendered.
+        RenderError: writing failed, or rendering what runs are measured against.
+        DeviceError: there is no usable GL device.
+    """
+    options = options.replace(**settings)
+    base, out, reference = loaded(base), Path(out), named_reference(reference)
+    with track_reads() as files:
+        prepared = prepare(base, axes, out, reference, options)
+    runs = prepared.runs
+    with locked(out):
+        folder = SweepFolder.open(out, prepared.study, resume=options.resume)
+        runner = SweepRunner(prepared, options, folder)
+        missing = runner.missing
+        resumed, timed = len(runs) - len(missing), sum(number in runner.results for number in missing)
+        redrawn = sum((runs[n].folder / RUN).exists() for n in missing if n not in runner.results)
+        if missing or prepared.other:
+            with (
+                options.open_executor(-(-len(missing) // MOST_RUNS), travels=base.catalog is None) as farm,
+                shown(options.progress, "runs") as report,
+            ):
+                farm.upload_inputs(lambda: make_bundle(files, base.selection.plugins, prepared.modules))
+                folder.begin(prepared.study)
+                runner.execute(farm, report)
+    if runner.reference is None:  # all runs are complete, and the first one is what they are measured against
+        pixels = runner.results[0].pixels
+        assert pixels is not None  # the first run's picture is always kept
+        runner.reference = Reference(runs[0].name, "variant", pixels, prepared.encoding, prepared.output)
+    comparison = runner.comparison(warnings=[p for run in runs for p in run.planned.linked.warnings])
+    failures = tuple(runner.failures[number] for number in sorted(runner.failures))
+    return Sweep(
+        comparison=comparison,
+        space=prepared.space,
+        executed=runner.executed,
+        alone=runner.alone,
+        resumed=resumed,
+        timed=timed,
+        redrawn=redrawn,
+        torn=folder.incomplete,
+        failures=failures,
+    )
+
+
+def compare_pictures(
+    pictures: Sequence[str | Path], reference: str | Path | None = None, *, plugins: Sequence[Path] = ()
+) -> Comparison:
+    """Compare picture files pixel by pixel, and the graphs that they were made with, where their metadata has them.
+
+    Args:
+        pictures: the files.
+        reference: what they are measured against; the first of them by default.
+        plugins: files or folders that may add metrics, and types of the nodes that made the pictures.
+
+    Raises:
+        InputError: a picture cannot be read, has another size than others, or holds light where they hold none.
+    """
+    paths = [Path(picture) for picture in pictures]
+    names = unique_names([path.stem for path in paths])
+    against = Path(reference) if reference else paths[0]
+    extensions = Catalog.discover(tuple(plugins)).extensions
+    target, encoding = read_picture(against)
+    output = "image" if encoding == "display" else "radiance"
+    told = Reference(str(against), "file" if reference else "variant", target, encoding, output)
+    graphs = [_graph_of(load(path, plugins=plugins)) for path in paths]
+    results = []
+    for name, path, graph in zip(names, paths, graphs, strict=True):
+        pixels = target if path is against else _read_like(path, told)
+        figures, flip_map = measure_against(pixels, told, str(path), extensions.metrics())
+        results.append(
+            Result(
+                name=name,
+                source=str(path),
+                pixels=pixels,
+                encoding=encoding,
+                metrics=figures,
+                flip_map=flip_map,
+                graph=graph,
+                difference=diff(graphs[0], graph) if graphs[0] and graph else None,
+            )
+        )
+    return Comparison(
+        results=tuple(results),
+        reference=told if reference else Reference(names[0], "variant", target, encoding, output),
+        base=(names[0], graphs[0]) if graphs[0] else None,
+        scene="",
+        camera=None,
+        size=(target.shape[1], target.shape[0]),
+        frame=1,
+        device={},
+        warnings=tuple(extensions.warnings),
+    )
+
+
+def _read_like(path: Path, reference: Reference) -> Any:
+    """Read a picture that can be compared with the reference."""
+    pixels, encoding = read_picture(path)
+    check_sizes(pixels, reference.pixels, (str(path), reference.name))
+    if encoding != reference.encoding:
+        words = {"display": "display values", "linear": "light"}
+        holds = f"'{path}' holds {words[encoding]}, but '{reference.name}' {words[reference.encoding]}"
+        raise InputError(Problem("RG521", f"{holds}; write both as PNG, or both as EXR"))
+    return pixels
+
+
+def _graph_of(picture: Pipeline) -> Graph | None:
+    """Return the graph a picture was made with, None without metadata or where its nodes no longer exist."""
+    try:
+        return picture.link().graph
+    except InputError:
+        return None

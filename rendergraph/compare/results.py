@@ -1,0 +1,402 @@
+"""Results of comparisons: one for each variant, the reference, and the variants that no other one beats."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+import numpy.typing as npt
+from msgspec import to_builtins
+
+from rendergraph import metrics
+from rendergraph.compare.space import typed
+from rendergraph.compare.timing import NO_TIMES, Times
+from rendergraph.declare import Added
+from rendergraph.declare.extension import Metric
+from rendergraph.diff import GraphDiff, diff_json
+from rendergraph.errors import Place, Problem
+from rendergraph.installed import versions
+from rendergraph.metrics import Encoding, Metrics
+from rendergraph.session.frame import not_finite
+
+if TYPE_CHECKING:
+    from rendergraph.allocate import ResourcePlan
+    from rendergraph.link import Graph
+    from rendergraph.session.values import Planned
+
+Pixels = npt.NDArray[Any]
+K = TypeVar("K", bound=Hashable)
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The picture that variants are measured against.
+
+    Attributes:
+        name: of a variant, a pipeline or a file.
+        kind: which of the three.
+        pixels: top row first.
+        encoding: of the pixels.
+        output: the compared output.
+        light: its scene-linear light, if any.
+    """
+
+    name: str
+    kind: Literal["variant", "pipeline", "file"]
+    pixels: Pixels
+    encoding: Encoding
+    output: str
+    light: Pixels | None = None
+
+    def __repr__(self) -> str:
+        return f"<Reference {self.name} ({self.kind}): {self.output}>"
+
+    def as_json(self) -> dict[str, Any]:
+        return {"name": self.name, "kind": self.kind, "output": self.output}
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """The first pass, in order of execution, whose output differs.
+
+    Attributes:
+        node: the pass in the variant.
+        base_node: its counterpart in the base; another name if it was renamed.
+        port: the first output that differs.
+        most: greatest difference of a channel, None where sizes or formats differ.
+        share: fraction of the texels that differ, 0…1.
+        causes: nodes on the way there that differ in structure, possibly the pass itself.
+        added: the causes that the base does not have.
+        pixels: the output in the base and in the variant.
+        semantic: of the output.
+    """
+
+    node: str
+    base_node: str
+    port: str
+    most: float | None
+    share: float
+    causes: tuple[str, ...]
+    added: tuple[str, ...]
+    pixels: tuple[Pixels, Pixels]
+    semantic: str
+
+    def __repr__(self) -> str:
+        return f"<Difference at {self.node}.{self.port}: {100 * self.share:.3g} % of the texels>"
+
+    @property
+    def after(self) -> str:
+        """The added nodes on the way there, in words: `, after added node bloom`."""
+        several = "s" if len(self.added) > 1 else ""
+        return f", after added node{several} {', '.join(self.added)}" if self.added else ""
+
+    @property
+    def amount(self) -> str:
+        """How much differs, in words."""
+        if self.most is None:
+            return "in size"
+        return f"in {100 * self.share:.3g} % of its texels, by up to {self.most:.4g}"
+
+    def as_json(self) -> dict[str, Any]:
+        fields = ("node", "base_node", "port", "most", "share", "causes", "added")
+        return {name: getattr(self, name) for name in fields}
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """One variant.
+
+    Attributes:
+        name: unique among the variants.
+        source: the pipeline as it was typed.
+        settings: path to value, as a sweep set them.
+        pixels, encoding: the compared output; no pixels where the picture was not kept.
+        metrics: against the reference.
+        radiance_rmse: of linear light against the reference's; None where one of them has none.
+        flip_map: (height, width), 0…1; None where it was not kept.
+        times: of rendering.
+        graph, plan: None for pictures that were read from files.
+        memory: the plan's figures; empty for pictures that were read from files.
+        pass_count: number of passes.
+        difference: of the graph to the base's.
+        first: the first pass whose output differs from the base's.
+        not_finite: number of pixels with NaN or infinity; if any, the result is excluded from the Pareto front.
+        figures: the outputs of one texel, as in `run --json`.
+    """
+
+    name: str
+    source: str
+    pixels: Pixels | None
+    encoding: Encoding
+    metrics: Metrics
+    times: Times = NO_TIMES
+    memory: Mapping[str, object] = field(default_factory=dict)
+    pass_count: int = 0
+    settings: Mapping[str, str] = field(default_factory=dict)
+    radiance_rmse: float | None = None
+    flip_map: Pixels | None = None
+    graph: Graph | None = None
+    plan: ResourcePlan | None = None
+    difference: GraphDiff | None = None
+    first: Difference | None = None
+    not_finite: int = 0
+    figures: Mapping[str, float | list[float]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, name: str, planned: Planned, **measured: Any) -> Result:
+        """Return the result of a pipeline, whose structure and memory are known from its plan."""
+        linked, plan = planned.linked, planned.plan
+        return cls(
+            name=name,
+            source=linked.selection.source,
+            memory=plan.memory.as_json(),
+            pass_count=len(passes(plan)),
+            graph=linked.graph,
+            plan=plan,
+            **measured,
+        )
+
+    def __repr__(self) -> str:
+        return f"<Result {self.name}: FLIP {self.metrics.flip:.4f}, {self.times.headline.median:.2f} ms>"
+
+    @property
+    def allocated_bytes(self) -> int:
+        """Memory of textures."""
+        return int(str(self.memory["allocated_bytes"]))
+
+    @property
+    def columns(self) -> dict[str, float]:
+        """Further columns of tables: plugin metrics, and figures by channel."""
+        columns = dict(self.metrics.plugins)
+        for name, value in self.figures.items():
+            if isinstance(value, list):
+                columns |= {f"{name}[{channel}]": one for channel, one in enumerate(value)}
+            else:
+                columns[name] = value
+        return columns
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        if not self.not_finite:
+            return ()
+        text = f"{self.not_finite} pixels of its outputs are NaN or infinite"
+        way = "run … --tap-all FOLDER shows where they begin"
+        return (Problem("RG619", f"{text}; {way}", Place(self.name), severity="warning"),)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return everything but the pictures."""
+        document: dict[str, Any] = {"name": self.name, "pipeline" if self.memory else "picture": self.source}
+        if self.settings:
+            document["settings"] = typed_settings(self.settings)
+        document |= self.metrics.as_json()
+        document |= {"radiance_rmse": self.radiance_rmse, "not_finite": self.not_finite}
+        if self.figures:
+            document["figures"] = dict(self.figures)
+        if self.memory:
+            document |= to_builtins(self.times)
+            document |= {"pass_count": self.pass_count, "memory": dict(self.memory)}
+        if self.difference is not None:
+            document["diff"] = diff_json(self.difference)
+        if self.plan is not None and self.difference is not None:
+            document["first_difference"] = self.first.as_json() if self.first else None
+        return document
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Variants against a reference, with one scene, at one size, on one machine.
+
+    Attributes:
+        results: in the order of the variants.
+        reference: the picture that they are measured against.
+        base: name and graph of what the variants' graphs are compared with.
+        scene: the scene's name.
+        camera: the camera's name, where one was chosen.
+        size: width and height.
+        frame: number of the compared frame.
+        device: the GL device, as in `run --json`.
+        metric: the port that was measured instead of the picture.
+        notes: changes that made the variants comparable.
+        warnings: about files and results.
+    """
+
+    results: tuple[Result, ...]
+    reference: Reference
+    base: tuple[str, Graph] | None
+    scene: str
+    camera: str | None
+    size: tuple[int, int]
+    frame: int
+    device: Mapping[str, object]
+    metric: str | None = None
+    notes: tuple[str, ...] = ()
+    warnings: tuple[Problem, ...] = ()
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        errors = ", ".join(f"{result.name} {result.metrics.flip:.4f}" for result in self.results[:4])
+        more = ", …" if len(self.results) > 4 else ""
+        return f"<Comparison on {self.scene}, {width}×{height}, FLIP against {self.reference.name}: {errors}{more}>"
+
+    def _repr_html_(self) -> str:
+        from rendergraph.compare.report.html import notebook_html  # for notebooks alone
+
+        return notebook_html(self)
+
+    @property
+    def software(self) -> bool:
+        """Whether a CPU rasteriser rendered: its times say nothing about GPUs."""
+        return bool(self.device.get("software"))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the document of `compare --json`."""
+        return {
+            "reference": self.reference.as_json(),
+            "scene": self.scene,
+            "camera": self.camera,
+            "size": list(self.size),
+            "frame": self.frame,
+            **({"metric": self.metric} if self.metric else {}),
+            "device": dict(self.device),
+            "machine": machine(),
+            "metrics": metrics.description(),
+            "variants": [result.as_json() for result in self.results],
+            "notes": list(self.notes),
+        }
+
+
+def passes(plan: ResourcePlan) -> list[str]:
+    """Return the executed nodes in order of their first step."""
+    return list(dict.fromkeys(step.node for step in plan.schedule.steps))
+
+
+def typed_settings(settings: Mapping[str, str]) -> dict[str, Any]:
+    return {path: typed(value) for path, value in settings.items()}
+
+
+def measure_against(
+    pixels: Pixels, reference: Reference | None, name: str, plugins: Sequence[Added[Metric]]
+) -> tuple[Metrics, Pixels | None]:
+    """Return a picture's metrics and FLIP map; without a reference, or against itself, there is no map.
+
+    Raises:
+        InputError: the sizes differ, or a plugin's metric fails.
+    """
+    if reference is None or reference.pixels is pixels:
+        return metrics.same(pixels, plugins), None
+    names = (name, reference.name)
+    return metrics.measure(pixels, reference.pixels, encoding=reference.encoding, names=names, plugins=plugins)
+
+
+def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
+    """Return the RMSE of scene-linear light, None where either picture has none."""
+    if light is None or reference is None:
+        return None
+    return metrics.rmse(metrics.colors(light), metrics.colors(reference))
+
+
+def not_finite_pixels(graph: Graph, arrays: Mapping[str, Pixels]) -> int:
+    """Return how many pixels of a graph's outputs hold NaN or infinity."""
+    return sum(not_finite(pixels, graph.textures[graph.outputs[name]].semantic.name) for name, pixels in arrays.items())
+
+
+# --- the best --------------------------------------------------------------------------------------------------------
+
+OBJECTIVES: Mapping[str, Callable[[Result], float | None]] = {
+    "flip": lambda result: result.metrics.flip,
+    "rmse": lambda result: result.metrics.rmse,
+    "radiance_rmse": lambda result: result.radiance_rmse,
+    "ms": lambda result: result.times.headline.median,
+    "bytes": lambda result: result.allocated_bytes,
+}
+"""What can be minimised, besides plugin metrics and a pipeline's figures."""
+
+
+def objective_values(result: Result | None, objectives: Sequence[str]) -> list[float] | None:
+    """Return a result's values of the objectives; None where one of them or the picture is not finite."""
+    if result is None or result.not_finite:
+        return None
+    values = [OBJECTIVES[name](result) if name in OBJECTIVES else result.columns.get(name) for name in objectives]
+    numbers = [float(value) for value in values if value is not None and math.isfinite(value)]
+    return numbers if len(numbers) == len(values) else None
+
+
+def pareto_front(values: Mapping[K, Sequence[float]]) -> tuple[K, ...]:
+    """Return the keys whose values no other one beats: as good in everything and better in something.
+
+    They are sorted by the first value.
+    """
+
+    def beats(one: Sequence[float], other: Sequence[float]) -> bool:
+        return tuple(one) != tuple(other) and all(a <= b for a, b in zip(one, other, strict=True))
+
+    front: list[K] = []
+    for key in sorted(values, key=lambda key: tuple(values[key])):  # one that beats another is sorted before it
+        if not any(beats(values[other], values[key]) for other in front):
+            front.append(key)
+    return tuple(front)
+
+
+def pareto(results: Sequence[Result]) -> list[Result]:
+    """Return the results of which no other one is both faster and more accurate (FLIP), fastest first."""
+    values = {number: objective_values(result, ("ms", "flip")) for number, result in enumerate(results)}
+    return [results[number] for number in pareto_front({key: own for key, own in values.items() if own is not None})]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What an optimiser was asked for, and what it found.
+
+    Attributes:
+        minimise: the objectives.
+        budget: maximum number of runs.
+        order: names of the runs in the order in which the optimiser asked for them; None for a failed one.
+        values: name to values of the objectives.
+        front: names of the runs on the Pareto front.
+    """
+
+    minimise: tuple[str, ...]
+    budget: int
+    order: tuple[str | None, ...]
+    values: Mapping[str, Sequence[float]]
+    front: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        asked = [{"name": name, "values": self.values.get(name) if name else None} for name in self.order]
+        return {"minimise": list(self.minimise), "budget": self.budget, "asked": asked, "front": list(self.front)}
+
+    def improvements(self) -> list[tuple[int, float]]:
+        """Return after how many runs the first objective improved, and its new value."""
+        steps: list[tuple[int, float]] = []
+        for number, name in enumerate(self.order, 1):
+            values = self.values.get(name) if name is not None else None
+            if values is not None and (not steps or values[0] < steps[-1][1]):
+                steps.append((number, values[0]))
+        return steps
+
+
+# --- the machine -----------------------------------------------------------------------------------------------------
+
+
+def machine() -> dict[str, str]:
+    """Describe the computer and the versions of the software."""
+    names = ("rendergraph", "moderngl", "numpy", "OpenImageIO")
+    return {
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "processor": _processor(),
+        "python": platform.python_version(),
+        **{name: version or "" for name, version in versions(names).items()},
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{models[0]}, {len(models)} logical cores" if models else platform.processor()

@@ -1,0 +1,331 @@
+"""Runners: tasks go out to an executor, and what comes back becomes results, in memory or in a sweep's folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+from rendergraph.compare.batches import MOST_RUNS, group_similar
+from rendergraph.compare.prepare import Prepared, SweepOptions, scene_name
+from rendergraph.compare.results import Comparison, Reference, Result, objective_values, pareto_front
+from rendergraph.compare.store import Failure, RunRecord, SweepFolder, find_record, restored_result
+from rendergraph.compare.tasks import (
+    ComparisonTask,
+    DifferenceResult,
+    PassCount,
+    ReferenceResult,
+    ReferenceTask,
+    RenderedResult,
+    RunSpec,
+    TaskError,
+    TimingResult,
+    VariantTask,
+)
+from rendergraph.diff import diff
+from rendergraph.errors import Problem, RendergraphError
+from rendergraph.farm import Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, TaskRetried
+
+
+class Runner:
+    """Compares the runs of a comparison, in memory; a run that fails ends it.
+
+    Attributes:
+        results: by the run's number; a result may lack times.
+        reference: what runs are measured against, once it is known.
+        device: the GL device that rendered last.
+        warnings: about frames.
+    """
+
+    def __init__(self, prepared: Prepared, options: SweepOptions) -> None:
+        self.prepared, self.options = prepared, options
+        self.results: dict[int, Result] = {}
+        self.reference: Reference | None = prepared.picture
+        self.device: Mapping[str, object] = {}
+        self.warnings: list[Problem] = []
+        self._handle: Handle | None = None
+        self._waiting: list[list[int]] = []
+        self._outputs = 0
+
+    @property
+    def missing(self) -> list[int]:
+        """Numbers of the runs that are neither complete nor failed."""
+        return [number for number in range(len(self.prepared.runs)) if number not in self.results]
+
+    def execute(self, farm: Executor, progress: Callable[[int, int], None]) -> None:
+        """Render and measure all runs that are missing.
+
+        Raises:
+            InputError: what runs are measured against cannot be rendered.
+            RenderError: likewise, or results cannot be written, or the cluster is gone.
+            DeviceError: there is no usable GL device.
+        """
+        self._waiting = self._groups(self.missing, farm.workers)
+        if self.reference is not None:
+            self._distribute(farm, self.reference)
+        elif self.prepared.other is not None or 0 in self.results:
+            kind: Literal["variant", "pipeline"] = "variant" if self.prepared.other is None else "pipeline"
+            base = RunSpec.of(self.prepared.base, -1)
+            farm.submit(ReferenceTask(base, kind, self.prepared.encoding, self.options.frame))
+        elif self._waiting:
+            first = self._waiting.pop(0)
+            if farm.workers > 1 and len(first) > 1:  # all others wait for the first run
+                self._waiting.insert(0, first[1:])
+                first = first[:1]
+            self._submit(farm, first)
+        for event in farm.events():
+            if isinstance(event, TaskOutput):
+                self._take(farm, event.value, event.worker)
+            else:
+                self._task_event(farm, event)
+            progress(*self._progress())
+
+    def comparison(self, *, warnings: Sequence[Problem]) -> Comparison:
+        """Return the comparison of all results."""
+        assert self.reference is not None
+        base, linked = self.prepared.base, self.prepared.runs[0].planned.linked
+        results = tuple(self.results[number] for number in sorted(self.results))
+        more = [problem for result in results for problem in result.warnings]
+        return Comparison(
+            results=results,
+            reference=self.reference,
+            base=(base.name, base.planned.linked.graph),
+            scene=scene_name(linked),
+            camera=linked.selection.camera,
+            size=linked.graph.size,
+            frame=self.options.frame,
+            metric=self.options.metric,
+            device=self.device,
+            notes=self.prepared.notes,
+            warnings=tuple(dict.fromkeys([*self.warnings, *warnings, *more])),
+        )
+
+    def _groups(self, numbers: Sequence[int], workers: int) -> list[list[int]]:
+        """Return the runs of each task: in this process all of them, to measure them in turns."""
+        return [list(numbers)] if workers == 1 else [[number] for number in numbers]
+
+    def _progress(self) -> tuple[int, int]:
+        """Return the number of outputs so far, and of all: three for each run."""
+        return min(self._outputs, 3 * len(self.prepared.runs)), 3 * len(self.prepared.runs)
+
+    def _task(self, specs: tuple[RunSpec, ...]) -> Task:
+        o, base = self.options, self.prepared.base
+        spec = RunSpec.of(base, -1 if self.prepared.other else 0)
+        return ComparisonTask(
+            specs, self._handle, self.prepared.encoding, o.frame, o.frames, o.repeats, o.most_bytes, spec
+        )
+
+    def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
+        runs = self.prepared.runs
+        specs = [RunSpec.of(runs[number], number, is_rendered=number in self.results) for number in numbers]
+        farm.submit(self._task(tuple(specs)))
+
+    def _distribute(self, farm: Executor, reference: Reference) -> None:
+        """Submit everything that waits for the reference."""
+        self.reference = reference
+        self._handle = farm.put(reference)
+        waiting, self._waiting = self._waiting, []
+        for numbers in waiting:
+            self._submit(farm, numbers)
+
+    def _take(self, farm: Executor, output: Any, worker: str) -> None:
+        """Store an output of a task; a task that was begun again yields some of them twice."""
+        if isinstance(output, ReferenceResult):
+            self.device = output.device
+            if self.reference is None:
+                self._distribute(farm, output.reference)
+            return
+        self._outputs += 1
+        if isinstance(output, RenderedResult):
+            self.warnings += output.warnings
+            if output.number not in self.results:
+                self._rendered(output)
+        elif isinstance(output, TimingResult):
+            self._timed(output, worker)
+        elif isinstance(output, DifferenceResult):
+            number, base = output.number, self.prepared.base.planned.linked.graph
+            graph = self.prepared.runs[number].planned.linked.graph
+            result = replace(self.results[number], first=output.first, difference=diff(base, graph))
+            self.results[number] = result
+
+    def _rendered(self, output: RenderedResult) -> None:
+        run = self.prepared.runs[output.number]
+        self.device = output.device
+        self.results[output.number] = Result.of(
+            run.name,
+            run.planned,
+            pixels=output.pixels,
+            encoding=self.prepared.encoding,
+            metrics=output.metrics,
+            settings=run.settings,
+            radiance_rmse=output.radiance_rmse,
+            flip_map=output.flip_map,
+            not_finite=output.not_finite,
+            figures=output.figures,
+        )
+
+    def _timed(self, output: TimingResult, worker: str) -> None:
+        self.results[output.number] = replace(self.results[output.number], times=output.times)
+
+    def _task_event(self, farm: Executor, event: TaskFinished | TaskRetried | TaskFailed) -> None:
+        if isinstance(event, TaskFailed):
+            raise type(event.error)(event.error.problems) from event.error
+
+
+class SweepRunner(Runner):
+    """Renders the runs of a sweep into a folder; a run that fails becomes a line with the reason.
+
+    Attributes:
+        folder: where results are stored; only this process writes there.
+        records: as they are stored, by the run's number.
+        failures: by the run's number.
+        executed: number of executed passes.
+        alone: number of passes that the runs need one by one.
+    """
+
+    def __init__(self, prepared: Prepared, options: SweepOptions, folder: SweepFolder) -> None:
+        super().__init__(prepared, options)
+        self.folder = folder
+        self.records: dict[int, RunRecord] = {}
+        self.failures: dict[int, Failure] = {}
+        self.executed = self.alone = 0
+        self._begun, self._completed = time.monotonic(), 0
+        for number, run in enumerate(prepared.runs):
+            record = find_record(run, folder.lines, pictures=options.kept == "all")
+            if record is None:
+                continue
+            if record.frames and run.key not in folder.lines:  # its line was lost
+                folder.append(record.as_json())
+            self.results[number], self.records[number] = restored_result(run, record, prepared.encoding), record
+            self.device = record.device
+        self._drop_pictures(self._beaten())
+
+    @property
+    def missing(self) -> list[int]:
+        numbers = range(len(self.prepared.runs))
+        return [number for number in numbers if number not in self.failures and not self.is_complete(number)]
+
+    def is_complete(self, number: int) -> bool:
+        """Whether a run is rendered and measured."""
+        return number in self.results and self.results[number].times.covers(self.options.frames, self.options.repeats)
+
+    def _groups(self, numbers: Sequence[int], workers: int) -> list[list[int]]:
+        """Return runs that share most in groups, small enough that each worker gets at least two."""
+        most = MOST_RUNS if workers == 1 else max(1, min(MOST_RUNS, -(-len(numbers) // (2 * workers))))
+        return group_similar([run.planned for run in self.prepared.runs], numbers, most)
+
+    def _progress(self) -> tuple[int, int]:
+        total = len(self.prepared.runs)
+        return total - len(self.missing), total
+
+    def _task(self, specs: tuple[RunSpec, ...]) -> Task:
+        o = self.options
+        return VariantTask(specs, self._handle, self.prepared.encoding, o.frame, o.frames, o.repeats, o.most_bytes)
+
+    def _take(self, farm: Executor, output: Any, worker: str) -> None:
+        if isinstance(output, PassCount):
+            self.executed += output.count
+        elif isinstance(output, TaskError):
+            self._fail(output.number, output.error)
+            self._report("run", worker, run=self.prepared.runs[output.number].name, failed=True)
+        else:
+            super()._take(farm, output, worker)
+
+    def _rendered(self, output: RenderedResult) -> None:
+        super()._rendered(output)
+        number = output.number
+        self.records[number] = self.folder.keep(
+            self.prepared.runs[number], self.results[number], output.picture, output.device, output.machine
+        )
+
+    def _timed(self, output: TimingResult, worker: str) -> None:
+        number = output.number
+        if self.is_complete(number):
+            return
+        super()._timed(output, worker)
+        run, record = self.prepared.runs[number], self.records[number]
+        beaten = self._beaten()
+        record = record.without_picture() if number in beaten else record
+        self.records[number] = record.timed(output.times, output.device, output.machine)
+        self.folder.write(run, self.records[number])
+        self._drop_pictures(beaten)
+        self.alone += self.results[number].pass_count
+        self._completed += 1
+        self._report("run", worker, run=run.name, failed=False)
+
+    def _beaten(self) -> set[int]:
+        """Return the runs whose pictures are not kept: another one is as good in everything, and better in something.
+
+        A beaten run stays beaten, so only those with a picture are compared.
+        """
+        if self.options.kept == "all":
+            return set()
+        rendered = {
+            number: result
+            for number, result in self.results.items()
+            if result.times.frames and result.pixels is not None
+        }
+        values = {number: objective_values(result, self.options.best) for number, result in rendered.items()}
+        kept = set(pareto_front({number: own for number, own in values.items() if own is not None}))
+        if self.prepared.other is None and (self.reference is None or self.reference.kind == "variant"):
+            kept.add(0)
+        return set(rendered) - kept
+
+    def _drop_pictures(self, numbers: set[int]) -> None:
+        """Remove pictures, from the folder and from memory."""
+        for number in numbers:
+            if self.records[number].picture is not None:
+                self.records[number] = self.records[number].without_picture()
+                self.folder.write(self.prepared.runs[number], self.records[number])
+            self.results[number] = replace(self.results[number], pixels=None, flip_map=None)
+
+    def _task_event(self, farm: Executor, event: TaskFinished | TaskRetried | TaskFailed) -> None:
+        name = event.task.name
+        if isinstance(event, TaskFinished):
+            self._report("finished", event.worker, task=name, seconds=round(event.seconds, 3))
+        elif isinstance(event, TaskRetried):
+            self._report("lost", event.worker, task=name, reason=_reason(event.problems))
+        else:
+            self._task_failed(farm, event)
+
+    def _task_failed(self, farm: Executor, event: TaskFailed) -> None:
+        """Try each run of a failed task alone; a run that was alone has failed."""
+        if not isinstance(event.task, VariantTask):
+            raise event.error
+        missing = set(self.missing)
+        left = [run.number for run in event.task.runs if run.number in missing]
+        if self.reference is None and (not event.lost or len(event.task.runs) == 1):
+            raise type(event.error)(event.error.problems) from event.error
+        self._report("failed", event.worker, task=event.task.name, reason=_reason(event.problems))
+        for number in left:
+            if len(event.task.runs) > 1:
+                self._submit(farm, [number])
+            else:
+                self._fail(number, event.error)
+
+    def _fail(self, number: int, error: RendergraphError) -> None:
+        self.failures[number] = self.folder.fail(self.prepared.runs[number], error.problems)
+        self._completed += 1
+
+    def _report(self, event: str, worker: str, **more: Any) -> None:
+        """Report an event, with the speed and the remaining time."""
+        if self.options.events is None:
+            return
+        seconds, left, total = time.monotonic() - self._begun, len(self.missing), len(self.prepared.runs)
+        rate = self._completed / seconds if seconds > 0 else 0.0
+        self.options.events(
+            {
+                "event": event,
+                "worker": worker,
+                **more,
+                "done": total - left,
+                "of": total,
+                "runs_per_second": round(rate, 3),
+                "seconds_left": round(left / rate, 1) if rate else None,
+            }
+        )
+
+
+def _reason(problems: Sequence[Problem]) -> str:
+    return "; ".join(str(problem).splitlines()[0] for problem in problems)

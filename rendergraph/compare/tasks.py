@@ -1,0 +1,387 @@
+"""Tasks that any worker can do: render variants, compare them with the reference, and measure them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from rendergraph.compare.batches import Batch, fitting_batches, measure_batch, node_types, render_batch
+from rendergraph.compare.divergence import every_output, first_difference
+from rendergraph.compare.fingerprint import worker_digest
+from rendergraph.compare.prepare import Run
+from rendergraph.compare.results import (
+    Difference,
+    Pixels,
+    Reference,
+    light_error,
+    machine,
+    measure_against,
+    not_finite_pixels,
+)
+from rendergraph.compare.timing import Times, times_of
+from rendergraph.diff import diff
+from rendergraph.errors import InputError, Problem, RenderError
+from rendergraph.farm import Handle, Task, Worker
+from rendergraph.farm.bundle import map_remote_paths, relocate_selection
+from rendergraph.farm.tasks import is_retryable
+from rendergraph.metrics import Encoding, Metrics
+from rendergraph.session import stages
+from rendergraph.session.frame import figures_of
+from rendergraph.session.pipeline import Pipeline
+
+if TYPE_CHECKING:
+    from rendergraph.catalog import Catalog
+    from rendergraph.execute import FrameTimes
+    from rendergraph.link import Graph
+    from rendergraph.session.gpu import Gpu
+    from rendergraph.session.selection import Selection
+    from rendergraph.session.values import Planned
+
+FRAMES_PER_TURN = 2
+"""Few, so that other work of the machine affects all variants alike."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunSpec:
+    """A run as a worker needs it.
+
+    Attributes:
+        number: of the run.
+        name: of the run.
+        selection: the pipeline.
+        digest: of what the picture depends on, as it was when the work began.
+        output: the compared output.
+        extension: of the picture's file.
+        metadata: of the picture.
+        is_rendered: its picture is there already; only times are needed.
+        planned: the pipeline itself, where the worker is the process that made it.
+    """
+
+    number: int
+    name: str
+    selection: Selection
+    digest: str
+    output: str
+    extension: str
+    metadata: Mapping[str, str]
+    is_rendered: bool
+    planned: Planned | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, run: Run, number: int, *, is_rendered: bool = False) -> RunSpec:
+        return cls(
+            number=number,
+            name=run.name,
+            selection=run.planned.linked.selection,
+            digest=worker_digest(run.planned),
+            output=run.output,
+            extension=run.picture.suffix,
+            metadata=run.metadata,
+            is_rendered=is_rendered,
+            planned=run.planned,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "planned": None}
+
+    def plan(self, worker: Worker, catalog: Catalog | None = None) -> Planned:
+        """Return the planned pipeline; the catalog of another run saves the time to make one.
+
+        Raises:
+            InputError: it is not what it was when the work began.
+        """
+        if self.planned is not None:
+            return self.planned
+        pipeline = Pipeline(relocate_selection(self.selection, worker.root), catalog)
+        planned = stages.plan(stages.expand(pipeline.link()))
+        if worker_digest(planned) != self.digest:
+            text = f"input files of '{self.name}' differ on worker '{worker.name}' from those when the work began"
+            raise InputError(Problem("RG642", f"{text}: a file has changed, or another version is installed there"))
+        return planned
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceResult:
+    """The reference has been rendered."""
+
+    reference: Reference
+    device: Mapping[str, object]
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedResult:
+    """A run has been rendered and compared; the fields are those of a `Result`, and the picture's file."""
+
+    number: int
+    pixels: Pixels
+    metrics: Metrics
+    flip_map: Pixels | None
+    radiance_rmse: float | None
+    not_finite: int
+    figures: Mapping[str, float | list[float]]
+    picture: bytes
+    device: Mapping[str, object]
+    machine: Mapping[str, str]
+    warnings: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class TimingResult:
+    """A run has been measured."""
+
+    number: int
+    times: Times
+    device: Mapping[str, object]
+    machine: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class DifferenceResult:
+    """The first pass of a run that differs from the base has been found, or there is none."""
+
+    number: int
+    first: Difference | None
+
+
+@dataclass(frozen=True, eq=False)
+class TaskError:
+    """A run cannot be rendered or compared, on any worker."""
+
+    number: int
+    error: InputError | RenderError
+
+
+@dataclass(frozen=True)
+class PassCount:
+    """This many passes have been executed for a batch."""
+
+    count: int
+
+
+TaskEvent: TypeAlias = "ReferenceResult | RenderedResult | TimingResult | DifferenceResult | TaskError | PassCount"
+
+
+@dataclass(frozen=True, eq=False)
+class VariantTask(Task):
+    """Runs that are rendered together; passes that they share are executed once.
+
+    Attributes:
+        runs: with the same scene, camera and size.
+        reference: what they are measured against; None if it is the first run.
+        encoding: of the compared output.
+        frame: number of the compared frame.
+        frames, repeats: number of measured frames, and of measurements.
+        most_bytes: memory limit for the textures of a batch.
+    """
+
+    runs: tuple[RunSpec, ...]
+    reference: Handle | None
+    encoding: Encoding
+    frame: int
+    frames: int
+    repeats: int
+    most_bytes: int
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # a value of the base class
+        first, *more = self.runs
+        return f"{first.name} and {len(more)} more" if more else first.name
+
+    @property
+    def needs(self) -> tuple[Handle, ...]:  # type: ignore[override]  # a value of the base class
+        return () if self.reference is None else (self.reference,)
+
+    def run(self, worker: Worker) -> Iterator[TaskEvent]:
+        """Yield each run's picture, then its times, batch after batch.
+
+        Raises:
+            InputError: the first run, which others are measured against, cannot be rendered.
+            RenderError: likewise, or the worker lacks memory or its device.
+        """
+        runs: list[tuple[RunSpec, Planned]] = []
+        for run in self.runs:
+            try:
+                runs.append((run, run.plan(worker, runs[-1][1].linked.catalog if runs else None)))
+            except InputError as error:
+                if self.reference is None:
+                    raise
+                yield TaskError(run.number, _mapped(error, worker))
+        planned = [each for _, each in runs]
+        reference: Reference | None = worker.value(self.reference) if self.reference is not None else None
+        waiting = fitting_batches(planned, range(len(runs)), self.most_bytes) if runs else []
+        done: set[int] = set()
+        while waiting:
+            batch = waiting.pop(0)
+            try:
+                for event in self._batch(worker, batch, runs, reference):
+                    if isinstance(event, ReferenceResult):
+                        reference = event.reference
+                    if isinstance(event, TimingResult):
+                        done.add(event.number)
+                    yield event
+            except (InputError, RenderError) as error:
+                left = [place for place in batch.numbers if runs[place][0].number not in done]
+                if len(batch.numbers) > 1:  # each alone, so that only the faulty one fails, with its own message
+                    waiting[:0] = [one for place in left for one in fitting_batches(planned, [place], self.most_bytes)]
+                elif reference is None or is_retryable(error):
+                    raise
+                else:
+                    yield TaskError(runs[batch.numbers[0]][0].number, _mapped(error, worker))
+
+    def _batch(
+        self, worker: Worker, batch: Batch, runs: Sequence[tuple[RunSpec, Planned]], reference: Reference | None
+    ) -> Iterator[TaskEvent]:
+        planned = [each for _, each in runs]
+        unrendered = [place for place in batch.numbers if not runs[place][0].is_rendered]
+        if unrendered:
+            for rendered in list(render_batch(worker.gpu, planned, batch, self.frame)):
+                if rendered.number not in unrendered:
+                    continue
+                run, own = runs[rendered.number]
+                if reference is None:
+                    reference = _reference(run, rendered.arrays, self.encoding)
+                    yield ReferenceResult(reference, rendered.device)
+                yield _rendered(run, own, rendered.arrays, reference, rendered.device, worker, encode=True)
+        device = worker.gpu.device.as_json()
+        warm = bool(unrendered)
+        for place, times in measure_batch(worker.gpu, planned, batch, self.frames, self.repeats, warm=warm):
+            yield TimingResult(runs[place][0].number, times, device, _machine(worker))
+        yield PassCount(batch.pass_count)
+
+
+@dataclass(frozen=True, eq=False)
+class ComparisonTask(VariantTask):
+    """Runs of any structure, each rendered by itself; they are measured in turns, and compared pass by pass.
+
+    Attributes:
+        base: the run that they are compared with in structure.
+    """
+
+    base: RunSpec
+
+    def run(self, worker: Worker) -> Iterator[TaskEvent]:
+        """Yield each run's picture, then its times, then its first difference.
+
+        Raises:
+            InputError: a run cannot be rendered or compared.
+            RenderError: likewise, or the worker lacks memory or its device.
+        """
+        gpu = worker.gpu
+        planned = [run.plan(worker) for run in self.runs]
+        reference: Reference | None = worker.value(self.reference) if self.reference is not None else None
+        for run, each in zip(self.runs, planned, strict=True):
+            frame = stages.draw_last(each.for_frames(range(1, self.frame + 1)), gpu)
+            if reference is None:
+                reference = _reference(run, frame.arrays, self.encoding)
+                yield ReferenceResult(reference, frame.device)
+            yield _rendered(run, each, frame.arrays, reference, frame.device, worker, warnings=frame.warnings)
+        for run, each, times in zip(self.runs, planned, _take_turns(gpu, planned, self.frames), strict=True):
+            device = gpu.device.as_json()
+            yield TimingResult(run.number, times_of(times, node_types(each)), device, _machine(worker))
+        for run, each in zip(self.runs, planned, strict=True):
+            first = None
+            if run.number != self.base.number:
+                graph, base_frame = self._base(worker)
+                frame = every_output(gpu, each, self.frame)
+                own = each.linked.graph
+                first = first_difference(base_frame, frame, each.plan, own, diff(graph, own))
+            yield DifferenceResult(run.number, first)
+
+    def _base(self, worker: Worker) -> tuple[Graph, Any]:
+        key = "outputs", self.base.digest, self.frame
+        if key not in worker.cache:
+            planned = self.base.plan(worker)
+            worker.cache[key] = planned.linked.graph, every_output(worker.gpu, planned, self.frame)
+        graph, frame = worker.cache[key]
+        return graph, frame
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceTask(Task):
+    """The reference, where it is not one of the runs that are rendered."""
+
+    spec: RunSpec
+    kind: Literal["variant", "pipeline"]
+    encoding: Encoding
+    frame: int
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # a value of the base class
+        return self.spec.name
+
+    def run(self, worker: Worker) -> Iterator[ReferenceResult]:
+        planned = self.spec.plan(worker)
+        frame = stages.draw_last(planned.for_frames(range(1, self.frame + 1)), worker.gpu)
+        yield ReferenceResult(_reference(self.spec, frame.arrays, self.encoding, self.kind), frame.device)
+
+
+def _reference(
+    run: RunSpec,
+    arrays: Mapping[str, Pixels],
+    encoding: Encoding,
+    kind: Literal["variant", "pipeline"] = "variant",
+) -> Reference:
+    return Reference(run.name, kind, arrays[run.output], encoding, run.output, arrays.get("radiance"))
+
+
+def _rendered(
+    run: RunSpec,
+    planned: Planned,
+    arrays: Mapping[str, Pixels],
+    reference: Reference,
+    device: Mapping[str, object],
+    worker: Worker,
+    *,
+    encode: bool = False,
+    warnings: tuple[Problem, ...] = (),
+) -> RenderedResult:
+    graph, pixels = planned.linked.graph, arrays[run.output]
+    figures, flip_map = measure_against(pixels, reference, run.name, planned.linked.catalog.extensions.metrics())
+    return RenderedResult(
+        number=run.number,
+        pixels=pixels,
+        metrics=figures,
+        flip_map=flip_map,
+        radiance_rmse=light_error(arrays.get("radiance"), reference.light),
+        not_finite=not_finite_pixels(graph, arrays),
+        figures=figures_of(arrays),
+        picture=_encoded(run, graph, pixels) if encode else b"",
+        device=device,
+        machine=_machine(worker),
+        warnings=warnings,
+    )
+
+
+def _encoded(run: RunSpec, graph: Graph, pixels: Pixels) -> bytes:
+    """Return the file of a run's picture."""
+    from rendergraph.images import PictureInfo, Saved, encoded
+
+    info = graph.textures[graph.outputs[run.output]]
+    picture = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
+    return encoded(Saved(Path(f"{run.output}{run.extension}"), pixels, picture, raw=False), run.metadata)
+
+
+def _take_turns(gpu: Gpu, planned: Sequence[Planned], frames: int) -> list[list[FrameTimes]]:
+    """Measure pipelines in turns, each turn starting with another one."""
+    times: list[list[FrameTimes]] = [[] for _ in planned]
+    for turn, first in enumerate(range(0, frames, FRAMES_PER_TURN)):
+        count = min(FRAMES_PER_TURN, frames - first)
+        for place in range(len(planned)):
+            number = (place + turn) % len(planned)
+            times[number] += stages.draw_last(planned[number].for_frames(range(1, count + 1), timed=True), gpu).times
+    return times
+
+
+def _machine(worker: Worker) -> dict[str, str]:
+    if "machine" not in worker.cache:
+        worker.cache["machine"] = machine()
+    described: dict[str, str] = worker.cache["machine"]
+    return described
+
+
+def _mapped(error: InputError | RenderError, worker: Worker) -> InputError | RenderError:
+    mapped = map_remote_paths(error, worker.root)
+    assert isinstance(mapped, InputError | RenderError)  # of the same class
+    return mapped
