@@ -213,6 +213,7 @@ class Executable(Struct, eq=False, dict=True):
         """These kept values have been put where they belong: the steps that make nothing else have not to run."""
         missing = {key for key in self.due if any(w.resource not in resources for w in self.kept[key].writes)}
         self.due = self._with_dependents(missing)
+        self.reuse.forget()  # what reads them has to run again
         self.assemble()
 
     def take_over(self) -> None:

@@ -129,6 +129,13 @@ def test_a_value_that_was_there_before_is_there_again(bench: Any, session: rg.Se
     assert not np.array_equal(pictures[1.0], pictures[2.0])
 
 
+def test_what_reads_a_value_that_is_there_again_runs_again(bench: Any, session: rg.Session) -> None:
+    pipeline = bench.pipeline(ONE, Table, Show, shaders=SHADERS)
+    first, second, third = (session.render(pipeline.set("a.value", value))["image"] for value in (1.0, 2.0, 1.0))
+    np.testing.assert_array_equal(third, first)
+    assert not np.array_equal(second, first)
+
+
 def test_nothing_is_copied_while_one_pipeline_goes_on(bench: Any, session: rg.Session) -> None:
     pipeline = bench.pipeline(ONE, Table, Show, shaders=SHADERS)
     drawn(session, pipeline)
