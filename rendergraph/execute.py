@@ -13,7 +13,7 @@ import numpy.typing as npt
 from msgspec import Struct, field
 
 from rendergraph.compile import Executable
-from rendergraph.compile.executable import source_of_buffer, source_of_region, source_of_view
+from rendergraph.compile.executable import source_of_view
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import happened
 from rendergraph.document import shown
@@ -107,10 +107,7 @@ class FrameContext(Struct, eq=False):
             argument(name, value, annotation)
         region = self.executable.memory.regions.get((self.node.id, number))
         if region is not None:  # else nobody reads what its steps make
-            before = region.scissor, region.depth_bounds
-            region.scissor, region.depth_bounds = scissor, depth_bounds or (0.0, 1.0)
-            if before != (region.scissor, region.depth_bounds):
-                self.executable.touched.add(source_of_region(self.node.id, number))
+            region.set(scissor, depth_bounds)
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload into a declared buffer."""
@@ -123,14 +120,10 @@ class FrameContext(Struct, eq=False):
         array = np.ascontiguousarray(values)
         if array.dtype.kind not in "biuf":
             raise Misuse(f"write is given {type(values).__name__} of {array.dtype}, not an array of numbers", "RG433")
-        data = array.tobytes()
-        buffer = self.executable.memory.buffer(name)
-        if len(data) > buffer.size:
-            raise Misuse(f"it writes {len(data)} bytes into '{port.name}', which holds {buffer.size}", "RG432")
-        buffer.write(data)
-        if self.executable.filled.get(name) != data:
-            self.executable.filled[name] = data
-            self.executable.touched.add(source_of_buffer(name))
+        data, size = array.tobytes(), self.executable.memory.buffer(name).size
+        if len(data) > size:
+            raise Misuse(f"it writes {len(data)} bytes into '{port.name}', which holds {size}", "RG432")
+        self.executable.write_buffer(name, data)
 
 
 class Runner(Struct, eq=False):
@@ -186,6 +179,7 @@ class Runner(Struct, eq=False):
     def reset(self) -> None:
         """Start history afresh: all of it holds the port's first value."""
         self.drawn, self._seen = 0, None
+        self.executable.forget_updates()
         memory, plan = self.executable.memory, self.executable.plan
         for name, places in plan.placement.items():
             resource = plan.resources[name]
@@ -228,6 +222,7 @@ class Runner(Struct, eq=False):
             before = perf_counter()
             self._update(node, index, time, camera, self._scene)
             updates[node.id] = perf_counter() - before
+        executable.updated()
         if not self._complete:
             self._check_views()
         if not self.drawn:

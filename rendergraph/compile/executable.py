@@ -138,7 +138,8 @@ class Executable(Struct, eq=False, dict=True):
         scene_views: which objects are drawn, and in what order; asked when a view or an object has moved.
         scene: what it draws, which counts its changes.
         reuse: which steps have to run.
-        filled: what the CPU wrote into buffers last.
+        filled: what `update` has written into buffers.
+        filled_before: the buffers among them that this drawing has not written yet.
         touched: the sources that have changed since the last frame, as `_looks` names them, but for the scene's.
         timers: one a step.
         occlusion_queries: they decide which steps the device skips.
@@ -170,6 +171,7 @@ class Executable(Struct, eq=False, dict=True):
     made_kept: bool = False
     shares_kept: bool = True
     filled: dict[str, bytes] = field(default_factory=dict)
+    filled_before: set[str] = field(default_factory=set)
     touched: set[str] = field(default_factory=set)
     _steady: list[list[FrameStep]] = field(default_factory=list)
     _parts: dict[tuple[int, tuple[int, ...]], list[FrameStep]] = field(default_factory=dict)
@@ -215,6 +217,35 @@ class Executable(Struct, eq=False, dict=True):
         self.due = self._with_dependents(missing)
         self.reuse.forget()  # what reads them has to run again
         self.assemble()
+
+    def forget_updates(self) -> None:
+        """A drawing begins: what `update` set in the one before does not hold."""
+        for region in self.memory.regions.values():
+            region.set()
+        self.filled_before = set(self.filled)
+
+    def write_buffer(self, id: str, data: bytes) -> None:
+        """Write a buffer for `update`; after what this drawing has written all is 0."""
+        buffer, before = self.memory.buffer(id), self.filled.get(id, b"")
+        if id in self.filled_before:
+            self.filled_before.discard(id)
+            data = now = data.ljust(len(before), b"\0")
+        else:
+            now = data + before[len(data) :]
+        buffer.write(data)
+        if now != before:
+            self.filled[id] = now
+            self.touched.add(source_of_buffer(id))
+
+    def updated(self) -> None:
+        """All nodes have been updated: note the regions and buffers that are others than in the frame before."""
+        for id in list(self.filled_before):
+            self.write_buffer(id, b"")
+        for (node, number), region in self.memory.regions.items():
+            drawn = region.scissor, region.depth_bounds
+            if drawn != region.drawn:
+                region.drawn = drawn
+                self.touched.add(source_of_region(node, number))
 
     def take_over(self) -> None:
         """Another executable has drawn meanwhile: shared programs hold its uniforms, shared textures its texels."""

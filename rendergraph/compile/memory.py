@@ -53,10 +53,18 @@ class Region(Struct, eq=False):
     Attributes:
         scissor: x, y, width and height; None for everything.
         depth_bounds: least and greatest depth, for drivers that have depth bounds.
+        drawn: what the two were in the last frame.
     """
 
     scissor: tuple[int, int, int, int] | None = None
     depth_bounds: tuple[float, float] = (0.0, 1.0)
+    drawn: tuple[object, object] = (None, (0.0, 1.0))
+
+    def set(
+        self, scissor: tuple[int, int, int, int] | None = None, depth_bounds: tuple[float, float] | None = None
+    ) -> None:
+        """Draw in this part from now on; in everything by default."""
+        self.scissor, self.depth_bounds = scissor, depth_bounds or (0.0, 1.0)
 
     def use(self, framebuffer: moderngl.Framebuffer) -> None:
         """Bind a framebuffer to draw within the scissor."""

@@ -136,3 +136,36 @@ def test_depth_bounds_are_set_for_their_step_alone(bench: Any, monkeypatch: Any,
     name = "bounded" if cls is Bounded else "bounded_later"
     bench.draw(TEXT.replace("NAME", name), cls, shaders=SHADERS, warm_up=False)
     assert called == ["glEnable", bounds, "glDisable"]
+
+
+class Switched(Node):
+    """A rectangle and a buffer, which `update` sets where it is switched on."""
+
+    values = Internal(kind="buffer", bytes=16, doc="Four numbers.")
+    color = Output(Radiance, format="rgba32f", clear=0.0, doc="The numbers in the rectangle.")
+    on: bool = param(default=True, doc="Set both.")
+    count: int = param(default=4, min=0, max=4, doc="How many numbers.")
+
+    def record(self, steps: Steps) -> None:
+        steps.fullscreen("four.frag", values=self.values, region=0)
+
+    def update(self, frame: Frame) -> None:
+        if self.on:
+            frame.set_region(0, (0, 0, 4, 8))
+            frame.write(self.values, np.arange(1, self.count + 1, dtype=np.float32))
+
+
+@pytest.mark.parametrize("reuse", [True, False])
+def test_what_update_sets_in_a_drawing_does_not_hold_in_the_next_one(bench: Any, reuse: bool) -> None:
+    four = (
+        "layout(std430) readonly buffer values { vec4 four; }; out vec4 color;"
+        "void main() { color = four + vec4(gl_FragCoord.x); }"
+    )
+    pipeline = bench.pipeline(TEXT.replace("NAME", "switched"), Switched, shaders={"four.frag": four})
+    variants = [pipeline, pipeline.set("a.on", False), pipeline.set("a.count", 2), pipeline]
+    pictures = [bench.session.render(variant, reuse=reuse)["image"] for variant in variants]
+    for picture, numbers in zip(pictures, ([1, 2, 3, 4], None, [1, 2, 0, 0], [1, 2, 3, 4]), strict=True):
+        expected = np.repeat(np.arange(16)[None, :, None] + np.array(numbers or [0] * 4) + 0.5, 8, axis=0)
+        if numbers is not None:
+            expected[:, 4:] = 0
+        np.testing.assert_array_equal(picture, expected)
