@@ -364,7 +364,7 @@ class Executable(Struct, eq=False, dict=True):
 
     def changed(self, values: Mapping[StepKey, Step]) -> set[StepKey]:
         """The steps whose parameter values are others in these, which must be the same but for their uniforms."""
-        return {c.step.key for c in self.steps[0] if c.values(c.step) != c.values(values[c.step.key])}
+        return {c.step.key for c in self.steps[0] if repr(c.values(c.step)) != repr(c.values(values[c.step.key]))}
 
     def set_uniforms(self, values: Mapping[StepKey, Step]) -> None:
         """Take over changed parameter values."""
@@ -451,12 +451,12 @@ def step_uniforms(step: Step) -> dict[str, Any]:
 
 
 def _differing(draws: Iterable[Draw]) -> set[tuple[int, str]]:
-    """Uniforms that two draws of one program want to be different."""
-    first: dict[tuple[int, str], Any] = {}
+    """Uniforms that two draws of one program want to be different; told apart by text, as 0.0 equals -0.0."""
+    first: dict[tuple[int, str], str] = {}
     differ: set[tuple[int, str]] = set()
     for draw in draws:
         for name, value in draw.uniforms.items():
-            key = (draw.program.glo, name)
-            if first.setdefault(key, value) != value:
+            key, text = (draw.program.glo, name), repr(value)
+            if first.setdefault(key, text) != text:
                 differ.add(key)
     return differ

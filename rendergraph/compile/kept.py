@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec import Struct, field
 
+from rendergraph.compile.executable import step_uniforms
 from rendergraph.gl import textures
 from rendergraph.gl.textures import GpuTexture
 from rendergraph.schedule.dependencies import touched_ids
@@ -98,7 +99,11 @@ def contents(executable: Executable) -> Mapping[str, Content]:
     """
     resources = executable.plan.resources
     steps = {
-        compiled.step.key: (compiled.step, *(tuple(draw.program.texts.items()) for draw in compiled.draws))
+        compiled.step.key: (
+            compiled.step,
+            repr(step_uniforms(compiled.step)),  # 0.0 and -0.0 are equal, and two values
+            *(tuple(draw.program.texts.items()) for draw in compiled.draws),
+        )
         for compiled in executable.steps[0]
         if compiled.step.key in executable.kept
     }

@@ -101,6 +101,12 @@ def test_draws_in_the_eyes_order_set_their_state_each_and_leave_it_unknown() -> 
     ]
 
 
+def test_zero_and_minus_zero_are_two_values() -> None:
+    blur = Program(1, "axis")
+    made = executable(step(0, draw(blur, "across", axis=0.0)), step(1, draw(blur, "down", axis=-0.0)))
+    assert run(made) == ["1.axis=0.0", "across", "1.axis=-0.0", "down"]
+
+
 def test_a_changed_parameter_moves_from_the_whole_frame_into_its_draws() -> None:
     blur = Program(1, "axis")
     made = executable(step(0, draw(blur, "across", axis=0)), step(1, draw(blur, "down", axis=0)))

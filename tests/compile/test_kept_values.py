@@ -37,6 +37,7 @@ SHADERS = {
     "more.frag": "uniform float value; out vec4 table; void main() { table = vec4(value); }",
     "show.frag": "uniform sampler2D table; uniform float gain; out vec4 color;"
     "void main() { color = gain * textureLod(table, gl_FragCoord.xy / 8.0, 1.0); }",
+    "sign.frag": "uniform float value; out vec4 table; void main() { table = vec4(1.0 / value > 0.0 ? 1.0 : -1.0); }",
     "held.frag": "uniform sampler2D picture; out vec4 made; void main() { made = textureLod(picture, vec2(0.5), 0.0); }",
 }
 
@@ -134,6 +135,26 @@ def test_what_reads_a_value_that_is_there_again_runs_again(bench: Any, session: 
     first, second, third = (session.render(pipeline.set("a.value", value))["image"] for value in (1.0, 2.0, 1.0))
     np.testing.assert_array_equal(third, first)
     assert not np.array_equal(second, first)
+
+
+class Sign(Node):
+    """1 or -1, as the sign of zero."""
+
+    table = Output(Radiance, format="rgba32f", size=(1, 1), kept=True, doc="One texel.")
+    color = Output(Radiance, format="rgba32f", size=(1, 1), doc="The same in each frame.")
+    value: float = param(default=1.0, min=-100, max=100, doc="A number.")
+
+    def record(self, steps: Steps) -> None:
+        for out in (self.table, self.color):
+            steps.fullscreen("sign.frag", out={"table": out})
+
+
+def test_zero_and_minus_zero_are_two_values(bench: Any, session: rg.Session) -> None:
+    text = "nodes: {a: {type: sign}}\noutputs: {kept: a.table, image: a.color}\n"
+    pipeline = bench.pipeline(text, Sign, shaders=SHADERS)
+    for value, sign in ((0.0, 1), (-0.0, -1), (0.0, 1), (-0.0, -1)):
+        frame = session.render(pipeline.set("a.value", value))
+        assert (frame["kept"][0, 0, 0], frame["image"][0, 0, 0]) == (sign, sign)
 
 
 def test_nothing_is_copied_while_one_pipeline_goes_on(bench: Any, session: rg.Session) -> None:
