@@ -15,7 +15,7 @@ from msgspec import Struct, field
 from rendergraph.compile import Executable
 from rendergraph.compile.executable import source_of_view
 from rendergraph.declare import Node, Port, Views
-from rendergraph.declare.blame import happened
+from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, RenderError, SceneError, is_interruption, node_named
 from rendergraph.expand import CAMERA
@@ -382,7 +382,7 @@ def _blamed(node: GraphNode, method: str) -> Iterator[None]:
         if is_interruption(error):
             raise
         code = error.code if isinstance(error, Misuse) and error.code == "RG432" else "RG433"
-        problem = happened(error, type(node.node), node.type.file)
+        problem = author_problem(error, type(node.node), node.type.file)
         doing = f"{node_named(node.id, node.type.name)} failed in {method}"
         raise InputError(problem.relocate(node.place, code=code, context=doing)) from error
 

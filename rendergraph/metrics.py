@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.declare import Added
-from rendergraph.declare.extension import Metric
+from rendergraph.declare.extensions import Metric
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.images import from_srgb, to_srgb
 from rendergraph.installed import version

@@ -18,7 +18,7 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from rendergraph.declare.blame import causes, raised_at, told
+from rendergraph.declare.blame import cause_chain, describe_error, source_location
 from rendergraph.errors import Place, Problem, RendergraphError, shown_file
 
 ENDED, OUT_OF_MEMORY = "RG450", "RG453"
@@ -73,15 +73,15 @@ def _shown(problem: Problem) -> Problem:
 
 def _memory(file: Path, limit: int, error: BaseException) -> Problem | None:
     """What to say where memory ran out, however it is wrapped."""
-    if not any(isinstance(cause, MemoryError) for cause in causes(error)):
+    if not any(isinstance(cause, MemoryError) for cause in cause_chain(error)):
         return None
     text = f"it takes more than the {limit / 2**20:.0f} MiB of memory that it may; --limit memory=MiB allows more"
-    return Problem(OUT_OF_MEMORY, text, raised_at(error, file) or Place(shown_file(file)))
+    return Problem(OUT_OF_MEMORY, text, source_location(error, file) or Place(shown_file(file)))
 
 
 def _other(file: Path, error: BaseException) -> dict[str, Any]:
     """What to send for anything else: the author's where it came through the author's lines, else our own mistake."""
-    place = raised_at(error, file)
+    place = source_location(error, file)
     if place is None:
         return {"mistake": "".join(traceback.format_exception(error))}
-    return {"failed": [to_builtins(Problem(ENDED, f"it raises {told(error)}", place))], "exit_code": 3}
+    return {"failed": [to_builtins(Problem(ENDED, f"it raises {describe_error(error)}", place))], "exit_code": 3}

@@ -12,7 +12,7 @@ from rendergraph.authoring.report import Report
 from rendergraph.authoring.trial import SCENE, Trial
 from rendergraph.authoring.variants import variants
 from rendergraph.catalog import Catalog, NodeType
-from rendergraph.declare.blame import declared_by
+from rendergraph.declare.blame import declaration_of
 from rendergraph.errors import InputError, Problem, shown_file
 
 Tell = Callable[[str, str], None]
@@ -70,7 +70,7 @@ def examine(node: NodeType, scene: str = SCENE, tell: Tell = lambda stage, what:
     ):  # what is not drawn looks at nothing
         for name in declarations.unused(node, trial.seen, trial.files):
             text = f"'{name}' is declared, but no program looks at it: none uses it, or it changes nothing"
-            problems.append(Problem("RG455", text, declared_by(node.cls, node.file, name), severity=_mild(node)))
+            problems.append(Problem("RG455", text, declaration_of(node.cls, node.file, name), severity=_mild(node)))
     return Report(node.name, tuple(trial.tried), tuple(dict.fromkeys(problems)))
 
 
@@ -78,11 +78,11 @@ def _declared(node: NodeType) -> list[Problem]:
     """What is wrong with docs and ranges; of a shader file, what it lacks is a warning that its type has already."""
     found = list(node.warnings)
     for mistake in declarations.docs(node.cls) if not node.is_shader else ():
-        place = declared_by(node.cls, node.file, mistake.subject)
+        place = declaration_of(node.cls, node.file, mistake.subject)
         found.append(mistake.relocate(place, context=f"node type '{node.name}'"))
     for name in declarations.ranges(node.cls) if not node.is_shader else ():
         text = f"parameter '{name}' does not say between which values it lies (min, max)"
-        found.append(Problem("RG460", text, declared_by(node.cls, node.file, name), severity="warning"))
+        found.append(Problem("RG460", text, declaration_of(node.cls, node.file, name), severity="warning"))
     return found
 
 

@@ -17,7 +17,7 @@ from rendergraph.authoring.variants import Variant
 from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import Draw
 from rendergraph.declare import Node
-from rendergraph.declare.blame import causes, declared_by, declared_in, raised_at
+from rendergraph.declare.blame import cause_chain, declaration_in, declaration_of, source_location
 from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
 from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device, open_device
@@ -89,7 +89,7 @@ class Trial:
         try:
             self._run(variant)
         except RendergraphError as error:
-            if any(isinstance(cause, MemoryError) for cause in causes(error)):
+            if any(isinstance(cause, MemoryError) for cause in cause_chain(error)):
                 raise  # that is the process's, and ends the check
             rest = tuple(name for name in variant.outputs if not self._is_missing(name, error))
             if len(rest) < len(variant.outputs) and not variant.end:  # one may depend on what is connected or chosen
@@ -184,7 +184,7 @@ class Trial:
 
     def port_place(self, name: str) -> Place:
         """Where a port or parameter is declared."""
-        return declared_by(self.type.cls, self.type.file, name)
+        return declaration_of(self.type.cls, self.type.file, name)
 
     # Running ----------------------------------------------------------------------------------------------------------
 
@@ -263,7 +263,7 @@ class Trial:
 
         colors = [write.name for write in step.writes if write.use == "color"]
         if step.node == self.type.name and colors and not outputs_of(program):
-            place = declared_in(self.type.shader_file(dict(step.shaders)["fragment"])[0], colors[0])
+            place = declaration_in(self.type.shader_file(dict(step.shaders)["fragment"])[0], colors[0])
             self.say(Problem("RG454", f"the shader never writes '{colors[0]}', which its step draws to", place))
 
     def _compare(self, one: Mapping[str, npt.NDArray[Any]], other: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -299,7 +299,7 @@ class Trial:
             return problem
         place = None
         if error is not None:
-            place = raised_at(error, self.type.file) or self.port_place(problem.subject.rpartition(".")[2])
+            place = source_location(error, self.type.file) or self.port_place(problem.subject.rpartition(".")[2])
         return problem.at_cause(place)
 
     def _with_variants(self, problem: Problem, names: Iterable[str]) -> Problem:

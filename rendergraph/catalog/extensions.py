@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.declare import Extension, Extensions, Source, extension_mistakes
-from rendergraph.declare.blame import raised_at, told
+from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.errors import Place, Problem, is_interruption, shown_file
 from rendergraph.installed import EntryPoint
 from rendergraph.stamps import record_read
@@ -66,8 +66,8 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     except BaseException as error:  # whatever a stranger's module raises is a mistake in that module
         if is_interruption(error):
             raise
-        text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {told(error)}"
-        where = (raised_at(error, file.parent) if file.name else None) or place
+        text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {describe_error(error)}"
+        where = (source_location(error, file.parent) if file.name else None) or place
         return Source(plugin, file, None, (Problem("RG494", text, where),))
     if not isinstance(found, Extension):
         text = f"'{value}' of plugin '{plugin}' is {type(found).__name__}, not an Extension"

@@ -9,7 +9,7 @@ from pathlib import Path
 from rendergraph.catalog import find
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes
-from rendergraph.declare.blame import declared_by, raised_at, told
+from rendergraph.declare.blame import declaration_of, describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 
 
@@ -39,7 +39,7 @@ def load(name: str, listed: Listed) -> NodeType:
     (cls,) = classes
     if problems := declaration_mistakes(cls):
         who = f"node type '{name}'"
-        raise InputError([p.relocate(declared_by(cls, listed.file, p.subject), context=who) for p in problems])
+        raise InputError([p.relocate(declaration_of(cls, listed.file, p.subject), context=who) for p in problems])
     return NodeType(
         name, listed.family, cls, listed.file, listed.shaders, listed.plugin, inherited=_inherited(cls, listed)
     )
@@ -54,5 +54,5 @@ def _inherited(cls: type[Node], listed: Listed) -> tuple[Path, ...]:
 
 def _failed(name: str, listed: Listed, error: BaseException, place: Place) -> Problem:
     """The author's own line of what a module raised, or a helper that it imports."""
-    text = f"node type '{name}' cannot be imported: {told(error)}"
-    return Problem("RG491", text, raised_at(error, listed.module, listed.file.parent) or place)
+    text = f"node type '{name}' cannot be imported: {describe_error(error)}"
+    return Problem("RG491", text, source_location(error, listed.module, listed.file.parent) or place)

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from rendergraph.declare.extension import READ_IMAGES, Extension, MeshData, extension_mistakes
-from rendergraph.declare.extensions import NO_EXTENSIONS, Added, Extensions, Source
+from rendergraph.declare.extensions import (
+    NO_EXTENSIONS,
+    READ_IMAGES,
+    Added,
+    Extension,
+    Extensions,
+    MeshData,
+    Source,
+    extension_mistakes,
+)
 from rendergraph.declare.mistakes import RESERVED_NAMES, declaration_mistakes
 from rendergraph.declare.node import DROPPED, Node
 from rendergraph.declare.parameters import Parameter, define, param, structural

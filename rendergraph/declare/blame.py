@@ -16,7 +16,7 @@ from rendergraph.declare.node import Node
 from rendergraph.errors import Misuse, Place, Problem, is_framework, is_interruption, nearest, shown_file, suggestion
 
 
-def raised_at(error: BaseException, *own: Path | str) -> Place | None:
+def source_location(error: BaseException, *own: Path | str) -> Place | None:
     """The innermost line of an author's that an exception, or else what caused it, came through.
 
     A syntax error is in its own line. Helpers beside a node count as the author's; the framework, NumPy and the like
@@ -38,7 +38,7 @@ def raised_at(error: BaseException, *own: Path | str) -> Place | None:
             return True
         return any(Path(frame.f_code.co_filename).is_relative_to(folder) for folder in folders)
 
-    for cause in causes(error):
+    for cause in cause_chain(error):
         if isinstance(cause, SyntaxError) and cause.filename:
             file = Path(cause.filename)
             if any(file.is_relative_to(folder) for folder in folders):
@@ -53,7 +53,7 @@ def raised_at(error: BaseException, *own: Path | str) -> Place | None:
     return None
 
 
-def declared_by(cls: type[Node], file: Path, name: str = "") -> Place:
+def declaration_of(cls: type[Node], file: Path, name: str = "") -> Place:
     """Where a node declares a port, a parameter or a method: in its own file, or in that of a base; else its class.
 
     Args:
@@ -65,14 +65,14 @@ def declared_by(cls: type[Node], file: Path, name: str = "") -> Place:
         own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
         for base in (base for base in own if name in {**vars(base), **get_annotations(base)}):
             module = getattr(sys.modules.get(base.__module__), "__file__", None)
-            found = declared_in(Path(module) if module else file, name)
+            found = declaration_in(Path(module) if module else file, name)
             if found.line:
                 return found
-        return declared_in(file, cls.__name__)
-    return declared_in(file, name)
+        return declaration_in(file, cls.__name__)
+    return declaration_in(file, name)
 
 
-def declared_in(file: Path, name: str) -> Place:
+def declaration_in(file: Path, name: str) -> Place:
     """Where a file declares a name: a Python class, its attribute or method, or a shader's variable.
 
     Returns:
@@ -110,7 +110,7 @@ _OF_A_STRUCT = ("Unexpected keyword argument", "Missing required argument", "Ext
 """How the exceptions of msgspec's constructors begin, which do not say whose they are."""
 
 
-def told(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """`KeyError: 'x'` in one line; a text that is endless is cut, and one that cannot be had is left out."""
     try:
         said = " ".join(str(error)[: 4 * _MOST_SAID].split())
@@ -132,7 +132,7 @@ def _called(error: BaseException) -> str:
     return f"{called[0]}(): " if called else ""
 
 
-def happened(error: BaseException, cls: type, file: Path | None = None, subject: str = "") -> Problem:
+def author_problem(error: BaseException, cls: type, file: Path | None = None, subject: str = "") -> Problem:
     """`KeyError: 'x'` with the author's line, without the exception's name where the framework refused a call.
 
     The caller relocates it to a place of the pipeline, with a code of its own.
@@ -143,10 +143,10 @@ def happened(error: BaseException, cls: type, file: Path | None = None, subject:
         file: the place where the exception never met the author's code.
         subject: see `Problem`.
     """
-    place = raised_at(error, cls.__module__)
+    place = source_location(error, cls.__module__)
     if place is None and file is not None and file.name:
         place = Place(shown_file(file))
-    text = str(error) if isinstance(error, Misuse) else f"{told(error)}{_meant(error)}"
+    text = str(error) if isinstance(error, Misuse) else f"{describe_error(error)}{_meant(error)}"
     return Problem("RG420", text, subject=subject, cause=place)
 
 
@@ -162,7 +162,7 @@ def _meant(error: BaseException) -> str:
     return f"; did you mean '{near}'?" if near is not None else ""
 
 
-def causes(error: BaseException) -> Iterator[BaseException]:
+def cause_chain(error: BaseException) -> Iterator[BaseException]:
     """An error, what it came from, and so on."""
     found: BaseException | None = error
     while found is not None:

@@ -1,33 +1,130 @@
-"""What all plugins add, looked up by name; plugins are imported when the first name is asked for."""
+"""What plugins add beside node types: semantics, choices, readers of meshes and images, metrics."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar
 
 from msgspec import Struct
+from msgspec.structs import replace
 
-from rendergraph.declare.blame import raised_at, told
-from rendergraph.declare.extension import Extension, ImageLoader, MeshLoader, Metric
+from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
 from rendergraph.glsl import about
 from rendergraph.stamps import Stamps, replay_reads, track_reads
 from rendergraph.textures import SEMANTICS, Semantic
+from rendergraph.typecheck import Matching, mistakes_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Metric: TypeAlias = Callable[[npt.NDArray[Any], npt.NDArray[Any]], float]
+    ImageLoader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
+    MeshLoader: TypeAlias = "Callable[[Path], MeshData | Sequence[MeshData]]"
+else:
+    Metric = ImageLoader = MeshLoader = Callable
 
 T = TypeVar("T")
 R = TypeVar("R")
+Include: TypeAlias = Annotated[str | Path, "the name of an include"]
+Word: TypeAlias = Annotated[
+    str, Matching(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z"), "a word of small letters, digits and single '_'"
+]
+"""A part of a macro's name."""
+Ending: TypeAlias = Annotated[
+    str, Matching(r"\.[a-z0-9][a-z0-9_-]*\Z"), "a file's ending, a dot and small letters as in '.stl'"
+]
+
+
+@dataclass(frozen=True, eq=False)  # no struct: help() would work out its types, and so import NumPy's
+class MeshData:
+    """Triangles of one material, as a mesh loader gives them: right-handed, +Y up, metres.
+
+    Attributes:
+        positions: (n, 3) finite numbers.
+        indices: (m, 3) whole numbers below n, counter-clockwise seen from outside.
+        normals: (n, 3); the mean of the adjacent faces' by default, so that shared vertices are smooth.
+        uv0, uv1: (n, 2) texture coordinates, origin at the image's top left.
+        colors: (n, 3) or (n, 4), linear.
+        name: of the object; the file's by default.
+        base_color, metallic, roughness: the material, where the scene file names none.
+    """
+
+    positions: npt.ArrayLike
+    indices: npt.ArrayLike
+    normals: npt.ArrayLike | None = None
+    uv0: npt.ArrayLike | None = None
+    uv1: npt.ArrayLike | None = None
+    colors: npt.ArrayLike | None = None
+    name: str = ""
+    base_color: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    metallic: float = 0.0
+    roughness: float = 1.0
+
+
+class Extension(Struct, frozen=True):
+    """What a plugin adds beside node types, each by name; it is imported when the first name is asked for.
+
+    It is found by the entry point group `rendergraph.extensions`, or as `EXTENSION` in `extension.py` at the top of a
+    plugin's folder.
+
+    Attributes:
+        semantics: meanings of ports.
+        choices: parameter name to further choices of it, each with its include, relative to the folder of the
+            extension's module. The parameter's node says what the include defines; its opening comment is its
+            documentation, and `#pragma needs(…)` names what it needs and other choices do not.
+        meshes: a file's ending (`.stl`) to the function that reads such a file, as a scene and as an object's `file`.
+        images: a file's ending to the function that decodes its bytes: (height, width), or with 1 to 4 channels behind,
+            the top row first, uint8 (sRGB where the slot is a colour) or floats (linear light).
+        metrics: name to a function of two pictures, (height, width, 3) in float64, sRGB-encoded from 0 to 1 where they
+            are display-referred and linear otherwise, the second the reference; the result grows with the error.
+    """
+
+    semantics: tuple[Semantic, ...] = ()
+    choices: Mapping[str, Mapping[Word, Include]] = {}
+    meshes: Mapping[Ending, MeshLoader] = {}
+    images: Mapping[Ending, ImageLoader] = {}
+    metrics: Mapping[Word, Metric] = {}
+
+
+READ_IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".bmp", ".tga")
+"""Endings of image files that need no plugin."""
+_TAKEN = {
+    "meshes": ((".yaml", ".yml", ".obj", ".gltf", ".glb"), "meshes has '{}', which rendergraph reads itself"),
+    "images": (READ_IMAGES, "images has '{}', which rendergraph reads itself"),
+    "metrics": (
+        ("flip", "rmse", "psnr", "ssim", "radiance_rmse"),
+        "metric '{}' is one of rendergraph's own; choose another name",
+    ),
+}
+
+
+def extension_mistakes(extension: Extension, folder: Path) -> list[Problem]:
+    """Return what is wrong with an extension whose includes are in a folder; the subjects are its fields."""
+    if mistakes := list(mistakes_of(extension, "")):
+        return mistakes
+    for parameter, choices in extension.choices.items():
+        for name, include in choices.items():
+            if not (folder / include).is_file():
+                text = f"choices['{parameter}']['{name}']: there is no file '{include}' beside the extension"
+                mistakes.append(Problem("RG495", text, subject="choices"))
+    for field, (taken, text) in _TAKEN.items():
+        names = [name for name in getattr(extension, field) if name in taken]
+        mistakes += [Problem("RG495", text.format(name), subject=field) for name in names]
+    return mistakes
 
 
 class Added(Struct, Generic[T], frozen=True):
     """One thing that a plugin adds.
 
     Attributes:
-        name: what it is asked for by.
-        value: what it is.
-        plugin: whose it is: a distribution, or a folder.
+        name: its name.
+        value: the thing.
+        plugin: a distribution, or a folder.
         file: the module of the extension.
     """
 
@@ -42,7 +139,7 @@ class Added(Struct, Generic[T], frozen=True):
         Args:
             code: of the error.
             doing: what could not be done, as a sentence without its end.
-            arguments: what it is called with.
+            arguments: of the call.
 
         Raises:
             InputError: it raised.
@@ -52,19 +149,13 @@ class Added(Struct, Generic[T], frozen=True):
         except BaseException as error:
             if is_interruption(error):
                 raise
-            place = raised_at(error, self.file.parent) or Place(shown_file(self.file))
-            raise InputError(Problem(code, f"{doing}: {told(error)} (plugin '{self.plugin}')", place)) from error
+            place = source_location(error, self.file.parent) or Place(shown_file(self.file))
+            text = f"{doing}: {describe_error(error)} (plugin '{self.plugin}')"
+            raise InputError(Problem(code, text, place)) from error
 
 
 class Source(Struct, frozen=True):
-    """One extension, or what is wrong with it.
-
-    Attributes:
-        plugin: a distribution, or a folder.
-        file: its module.
-        extension: None where it cannot be used.
-        problems: why.
-    """
+    """One extension: `extension` is None where `problems` say why it cannot be used."""
 
     plugin: str
     file: Path
@@ -73,79 +164,58 @@ class Source(Struct, frozen=True):
 
 
 class Extensions:
-    """What all plugins add. Asking for a name imports every extension, so it is done for names nobody else knows."""
+    """What all plugins add. Asking for a name imports every extension, so only names nobody else knows are asked for.
+
+    Two plugins that add one name are an error (RG496) for whoever asks for it.
+    """
 
     def __init__(self, find: Callable[[], Iterable[Source]] = tuple) -> None:
         self._find = find
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Every extension there is."""
-        found, stamps = self._found
+        """Every extension."""
+        found, stamps = self._sources
         replay_reads(stamps)
         return found
 
     @cached_property
-    def _found(self) -> tuple[tuple[Source, ...], Stamps]:
+    def _sources(self) -> tuple[tuple[Source, ...], Stamps]:
         with track_reads() as stamps:
             return tuple(self._find()), stamps
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """What is wrong with extensions: it may be why a name is unknown, so it is said beside that."""
+        """What is wrong with extensions, to be reported beside an unknown name, as it may be the reason."""
         return tuple(problem for source in self.sources for problem in source.problems)
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """The same for whoever lists everything: what is broken is left out."""
-        return tuple(problem.as_warning() for problem in self.problems)
-
-    # By name; two plugins that bring one name are an error for whoever asks for it ------------------------------------
+        """The same as warnings, for lists of everything, which leave out what is broken."""
+        return tuple(replace(problem, severity="warning") for problem in self.problems)
 
     def semantic(self, name: str) -> Semantic | None:
-        """A meaning by name, the framework's or a plugin's.
-
-        Raises:
-            InputError: two plugins give it different meanings.
-        """
-        own = next((known for known in SEMANTICS if known.name == name), None)
-        if own is not None:
-            return own
-        found = self._one(name, self.semantics(), "semantic")
+        """A meaning by name, the framework's or a plugin's."""
+        for semantic in SEMANTICS:
+            if semantic.name == name:
+                return semantic
+        found = _one("semantic", name, self.semantics())
         return found.value if found is not None else None
 
     def choice(self, parameter: str, name: str) -> Added[Path] | None:
-        """The include of a plugin's choice of a parameter.
-
-        Raises:
-            InputError: two plugins have it.
-        """
-        return self._one(name, self.choices(parameter), f"choice of '{parameter}'")
+        """The include of a plugin's choice of a parameter."""
+        return _one(f"choice of '{parameter}'", name, self.choices(parameter))
 
     def mesh_loader(self, ending: str) -> Added[MeshLoader] | None:
-        """What reads mesh files of an ending.
-
-        Raises:
-            InputError: two plugins do.
-        """
-        return self._one(ending.lower(), self.meshes(), "mesh loader")
+        """The reader of mesh files of an ending."""
+        return _one("mesh loader", ending.lower(), self.meshes())
 
     def image_loader(self, ending: str) -> Added[ImageLoader] | None:
-        """What decodes image files of an ending.
-
-        Raises:
-            InputError: two plugins do.
-        """
-        return self._one(ending.lower(), self.images(), "image loader")
-
-    # All of a kind, each with whose it is -----------------------------------------------------------------------------
-
-    def semantic_names(self) -> list[str]:
-        """The names of plugins' meanings."""
-        return [added.name for added in self.semantics()]
+        """The decoder of image files of an ending."""
+        return _one("image loader", ending.lower(), self.images())
 
     def semantics(self) -> list[Added[Semantic]]:
-        """Plugins' meanings; what several plugins declare alike is there once."""
+        """Plugins' meanings; equal ones of several plugins are listed once."""
         found: list[Added[Semantic]] = []
         for source, extension in self._usable():
             for value in extension.semantics:
@@ -154,47 +224,32 @@ class Extensions:
         return found
 
     def choices(self, parameter: str) -> list[Added[Path]]:
-        """The includes of plugins' choices of a parameter, absolute."""
-        return [added for name, added in self.all_choices() if name == parameter]
-
-    def all_choices(self) -> list[tuple[str, Added[Path]]]:
-        """Parameter and choice, of all parameters."""
-        return [
-            (str(parameter), Added(name, source.file.parent / include, source.plugin, source.file))
-            for source, extension in self._usable()
-            for parameter, choices in extension.choices.items()
-            for name, include in choices.items()
-        ]
+        """The absolute includes of plugins' choices of a parameter."""
+        return [added for name, added in self._choices() if name == parameter]
 
     def meshes(self) -> list[Added[MeshLoader]]:
         """Loaders of mesh files, by ending."""
-        return [Added(*row) for row in self._table("meshes")]
+        return self._added("meshes")
 
     def images(self) -> list[Added[ImageLoader]]:
         """Loaders of image files, by ending."""
-        return [Added(*row) for row in self._table("images")]
+        return self._added("images")
 
     def metrics(self) -> list[Added[Metric]]:
-        """Metrics of pictures.
-
-        Raises:
-            InputError: two plugins have one of the same name.
-        """
-        found: list[Added[Metric]] = [Added(*row) for row in self._table("metrics")]
+        """Metrics of pictures, by name; two plugins with one name are an error."""
+        found: list[Added[Metric]] = self._added("metrics")
         for metric in found:
-            self._one(metric.name, found, "metric")
+            _one("metric", metric.name, found)
         return found
 
     def listed(self) -> list[dict[str, str]]:
         """Everything that plugins add, as plain values: `kind`, `name`, `plugin`, `doc`."""
-        kinds: list[tuple[str, Sequence[Added[Any]]]] = [("semantic", self.semantics())]
-        kinds += [(parameter, [added]) for parameter, added in self.all_choices()]
-        tables = (("meshes", "mesh loader"), ("images", "image loader"), ("metrics", "metric"))
-        kinds += [(word, [Added(*row) for row in self._table(kind)]) for kind, word in tables]
+        rows: list[tuple[str, Added[Any]]] = [("semantic", added) for added in self.semantics()]
+        rows += self._choices()
+        for field, kind in (("meshes", "mesh loader"), ("images", "image loader"), ("metrics", "metric")):
+            rows += [(kind, added) for added in self._added(field)]
         return [
-            {"kind": kind, "name": added.name, "plugin": added.plugin, "doc": _doc(added.value)}
-            for kind, found in kinds
-            for added in found
+            {"kind": kind, "name": added.name, "plugin": added.plugin, "doc": _doc(added.value)} for kind, added in rows
         ]
 
     def _usable(self) -> Iterator[tuple[Source, Extension]]:
@@ -202,22 +257,31 @@ class Extensions:
             if source.extension is not None:
                 yield source, source.extension
 
-    def _table(self, kind: str) -> Iterator[tuple[str, Any, str, Path]]:
+    def _choices(self) -> Iterator[tuple[str, Added[Path]]]:
         for source, extension in self._usable():
-            for name, value in getattr(extension, kind).items():
-                yield name, value, source.plugin, source.file
+            for parameter, choices in extension.choices.items():
+                for name, include in choices.items():
+                    yield str(parameter), Added(name, source.file.parent / include, source.plugin, source.file)
 
-    def _one(self, name: str, known: Sequence[Added[T]], what: str) -> Added[T] | None:
-        found = [added for added in known if added.name == name]
-        if len(found) > 1:
-            plugins = " and ".join(f"'{added.plugin}' ({shown_file(added.file)})" for added in found)
-            text = f"{what} '{name}' comes from {plugins}; rename one, or uninstall one plugin"
-            raise InputError(Problem("RG496", text, Place(shown_file(found[0].file))))
-        return found[0] if found else None
+    def _added(self, field: str) -> list[Added[Any]]:
+        return [
+            Added(name, value, source.plugin, source.file)
+            for source, extension in self._usable()
+            for name, value in getattr(extension, field).items()
+        ]
+
+
+def _one(what: str, name: str, added: Sequence[Added[T]]) -> Added[T] | None:
+    found = [one for one in added if one.name == name]
+    if len(found) > 1:
+        plugins = " and ".join(f"'{one.plugin}' ({shown_file(one.file)})" for one in found)
+        text = f"{what} '{name}' comes from {plugins}; rename one, or uninstall one plugin"
+        raise InputError(Problem("RG496", text, Place(shown_file(found[0].file))))
+    return found[0] if found else None
 
 
 def _doc(value: object) -> str:
-    """The first line of what a thing says about itself."""
+    """The first line of the documentation of what a plugin adds."""
     if isinstance(value, Path):
         return about(value)
     doc = value.doc if isinstance(value, Semantic) else inspect.getdoc(value) or ""

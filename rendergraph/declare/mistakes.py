@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from inspect import get_annotations
 from typing import Literal, get_args, get_origin
 from weakref import WeakSet
 
-from rendergraph.declare.blame import told
+from rendergraph.declare.blame import describe_error
 from rendergraph.declare.node import Node
 from rendergraph.declare.parameters import Parameter
-from rendergraph.declare.port_mistakes import port_mistakes
 from rendergraph.errors import Problem, is_interruption, suggestion
-from rendergraph.ports import History, Internal
-from rendergraph.typecheck import accepts, mistakes_in, parts_of, quoted
+from rendergraph.ports import Function, History, InOut, Input, Internal, Output, Port, Views, WrittenPort
+from rendergraph.textures import Semantic, Signature
+from rendergraph.typecheck import accepts, mistakes_in, mistakes_of, parts_of, quoted
 
 _IDENTIFIER = re.compile(r"[a-z][a-z0-9_]*\Z")
 
@@ -74,9 +74,10 @@ def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Prob
         cls.parameters()
     except Exception as error:  # whatever evaluating an annotation raises
         named = [name for name, hint in get_annotations(cls).items() if str(getattr(error, "name", None)) in str(hint)]
-        return [_problem(next(iter(named), ""), f"the types of its parameters cannot be worked out: {told(error)}")]
+        text = f"the types of its parameters cannot be worked out: {describe_error(error)}"
+        return [_problem(next(iter(named), ""), text)]
     docs = [] if lenient else _docs(cls)
-    found = [*_names(cls, lenient), *docs, *port_mistakes(cls), *_macros(cls), *_parameters(cls)]
+    found = [*_names(cls, lenient), *docs, *_ports(cls), *_macros(cls), *_parameters(cls)]
     if not found and not lenient:
         _SOUND.add(cls)
     return found
@@ -127,6 +128,57 @@ def _docs(cls: type[Node]) -> Iterator[Problem]:
             yield _problem(name, f"parameter '{name}' is a plain value; declare it with {_ROLES}")
         elif not parameter.doc:
             yield _problem(name, f"parameter '{name}' has no doc")
+
+
+def _ports(cls: type[Node]) -> Iterator[Problem]:
+    ports = cls.ports()
+    for name, port in ports.items():
+        wrong = list(mistakes_of(port, f"port '{name}'", name))
+        texts = (*_alone(name, port), *_named(name, port, ports))
+        yield from wrong or (_problem(name, text) for text in texts)
+
+
+def _alone(name: str, port: Port) -> Iterator[str]:
+    """Rules between the fields of one port."""
+    if isinstance(port, Input):
+        wanted, example = (Signature, "ShadowLookup") if port.kind == "function" else (Semantic, "Radiance")
+        if not isinstance(port.semantic, wanted):
+            yield f"port '{name}': semantic is {quoted(port.semantic)}, not a {wanted.__name__} such as {example}"
+    elif isinstance(port, WrittenPort):
+        if port.semantic is None and port.like is None and not isinstance(port, Internal | History):
+            yield f"port '{name}' has neither a semantic nor `like`"
+        if port.kind != "buffer":
+            if port.bytes != 0:
+                yield f"port '{name}' has bytes={quoted(port.bytes)}, but is no buffer; say kind='buffer'"
+            return
+        if port.bytes == 0:
+            yield f"port '{name}' is a buffer without bytes; say bytes=…, from 1 up"
+        if isinstance(port, History):
+            yield f"'{name}' is a History of a buffer; only textures keep last frame's values"
+        if not callable(port.clear) and port.clear not in (None, 0):
+            yield f"port '{name}' is a buffer, which is cleared to 0 alone, not to {port.clear!r}"
+
+
+def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
+    """Rules that name other ports of the node."""
+    inputs, viewed = (Input, InOut), (Input, InOut, Views)
+    made = isinstance(port, WrittenPort)
+    size = (port.size[0] if isinstance(port.size, tuple) else port.size) if isinstance(port, WrittenPort) else None
+    needs = port.needs if isinstance(port, Output | Function) else ()
+    reads = port.read_names if isinstance(port, Function) else ()
+    named: list[tuple[str, object, tuple[type[Port], ...], str]] = [
+        ("is like", getattr(port, "like", None), inputs, "no input"),
+        ("is view", getattr(port, "view", None), viewed, "no input and no table of views"),
+        ("is lights", getattr(port, "lights", None) if made else None, viewed, "no input and no table of views"),
+        ("has the size of", size, inputs, "no input"),
+        *(("needs", target, inputs, "no input") for target in needs),
+        *(("reads", target, (Input, WrittenPort), "no texture and no buffer") for target in reads),
+    ]
+    for rule, target, kinds, otherwise in named:
+        if isinstance(target, str) and target not in ports:
+            yield f"port '{name}' {rule} '{target}', which is no port{suggestion(target, ports, most=0)}"
+        elif isinstance(target, str) and not isinstance(ports[target], kinds):
+            yield f"port '{name}' {rule} '{target}', which is {otherwise}"
 
 
 def _macros(cls: type[Node]) -> Iterator[Problem]:
@@ -208,7 +260,7 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
     except BaseException as error:  # what the author's own check raises
         if is_interruption(error):
             raise
-        yield _problem("", f"it cannot be made with its defaults: {told(error)}")
+        yield _problem("", f"it cannot be made with its defaults: {describe_error(error)}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from rendergraph.declare import Facts, Function, InOut, Input, Node, Part, Port, Views
-from rendergraph.declare.blame import happened
+from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Misuse, Problem, SceneError, is_interruption, node_named, suggestion
 from rendergraph.expand.model import ENVIRONMENT
@@ -295,7 +295,7 @@ def _author_problem(node: GraphNode, error: BaseException) -> Problem:
     who = node_named(node.id, node.type.name)
     if isinstance(error, SceneError):
         return Problem("RG209", f"{who}: {shown(error, 200)}", node.place)
-    problem = happened(error, type(node.node), node.type.file)
+    problem = author_problem(error, type(node.node), node.type.file)
     if isinstance(error, Misuse):
         return problem.relocate(node.place, code=error.code, context=who)
     return problem.relocate(node.place, context=f"{who} failed while recording")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rendergraph.declare import Added
-from rendergraph.declare.extension import ImageLoader
+from rendergraph.declare.extensions import ImageLoader
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.images.encode import HALF_MAX, PREFIX
 from rendergraph.images.viewable import from_srgb

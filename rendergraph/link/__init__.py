@@ -249,7 +249,8 @@ class _Linker:
                     continue
                 where = line_of(nodes[found.source.node].spec.place, entered.given.place)
                 text = f"'{entered.name}' takes {entered.semantic}, but '{found.source}' ({where}) carries {carried}"
-                known = [*(semantic.name for semantic in SEMANTICS), *self.catalog.extensions.semantic_names()]
+                added = [added.value for added in self.catalog.extensions.semantics()]
+                known = [semantic.name for semantic in (*SEMANTICS, *added)]
                 text += "" if entered.semantic in known else suggestion(entered.semantic, known, most=0)
                 return entered.given.problem("RG110", text)
         return None

@@ -25,7 +25,7 @@ from rendergraph.declare import (
     Views,
     WrittenPort,
 )
-from rendergraph.declare.blame import happened
+from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
 from rendergraph.errors import Problem, SceneError, is_interruption, node_named
 from rendergraph.link.graph import Endpoint
@@ -231,7 +231,7 @@ class TextureInference:
             elif isinstance(error, SceneError):
                 self._refused(draft, error)
             else:
-                problem = happened(error, draft.type.cls, subject=end.port)
+                problem = author_problem(error, draft.type.cls, subject=end.port)
                 self._add(end, problem, "RG209", f": the rule for its {what} fails")
             raise _Unknown from None
 

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Extensions, Input, Node, Output, Parameter
-from rendergraph.declare.blame import happened
+from rendergraph.declare.blame import author_problem
 from rendergraph.document import Value, said, shown
 from rendergraph.errors import InputError, Problem, is_interruption, nearest, node_named, shown_file, suggestion
 from rendergraph.glsl.source import needs, needs_place
@@ -57,7 +57,7 @@ def _refused(spec: NodeSpec, node_type: NodeType, values: Mapping[str, Any], err
     """Report a node's own check at the value without which it passes, if there is exactly one."""
     who = node_named(spec.id, node_type.name)
     if not isinstance(error, ValueError):
-        problem = happened(error, node_type.cls)
+        problem = author_problem(error, node_type.cls)
         return spec.value.relocate(problem, key=True, code="RG209", context=f"{who}: its own checks fail")
     guilty = []
     for name in values:

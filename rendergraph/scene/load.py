@@ -10,7 +10,7 @@ import numpy.typing as npt
 from msgspec.structs import replace
 
 from rendergraph.declare import NO_EXTENSIONS, Added, Extensions, MeshData
-from rendergraph.declare.extension import MeshLoader
+from rendergraph.declare.extensions import MeshLoader
 from rendergraph.document import shown
 from rendergraph.errors import InputError, Place, Problem, shown_file
 from rendergraph.scene.geometry import face_normals, filled_normals

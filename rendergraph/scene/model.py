@@ -18,7 +18,7 @@ import numpy.typing as npt
 from msgspec import Struct, field
 
 from rendergraph.declare import Added
-from rendergraph.declare.extension import ImageLoader
+from rendergraph.declare.extensions import ImageLoader
 from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
 

@@ -305,7 +305,7 @@ def test_python_in_its_folder_is_never_imported(write: Write) -> None:
     words = [sys.executable, "-c", PROGRAM, str(folder / "p.yaml")]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == ["RG152", "rendergraph.declare.extension"]
+    assert done.stdout.splitlines() == ["RG152", ""]
     assert list(folder.rglob("*.ran")) == []
     # The same folder named by the user does run: the test would notice.
     words += ["--", "evil"]
