@@ -21,15 +21,24 @@ vec3 diffuse_light(vec3 d) {
     return max(sum, 0.0);
 }
 
+// A measure of how narrow a lobe is. Its peak goes with the fourth power of 1 / roughness; the third power leaves the
+// least error at the peak and on its slopes together. The constant keeps it finite for mirrors.
+float lobe_narrowness(float roughness) {
+    return 1.0 / (roughness * roughness * roughness + 1.25e-4);
+}
+
+// Radiance of a mirrored lobe, interpolated between the two nearest levels. The weights are linear in the lobe's
+// narrowness and not in roughness: otherwise highlights of small lights would be far too bright between two levels.
 vec3 mirrored_light(vec3 d, float roughness) {
     int sharp = textureQueryLevels(specular), last = sharp + textureQueryLevels(rough) - 1;
-    float place = 2.0 * float(last) * roughness;  // even numbers are levels, odd ones lie between
-    int below = min(int(place), 2 * last - 1), even = (below + 1) / 2, odd = below / 2;
+    float step = 0.5 / float(last);  // of roughness, between a level of `specular` or `rough` and one between
+    int below = min(int(roughness / step), 2 * last - 1), even = (below + 1) / 2, odd = below / 2;
     vec3 at_even =
         even < sharp ? textureLod(specular, d, float(even)).rgb : textureLod(rough, d, float(even - sharp)).rgb;
     vec3 at_odd =
         odd < sharp ? textureLod(between, d, float(odd)).rgb : textureLod(rough_between, d, float(odd - sharp)).rgb;
-    float share = place - float(below);
+    float narrow = lobe_narrowness(float(below) * step), wide = lobe_narrowness(float(below + 1) * step);
+    float share = clamp((narrow - lobe_narrowness(roughness)) / (narrow - wide), 0.0, 1.0);
     return mix(at_even, at_odd, (below & 1) == 0 ? share : 1.0 - share);
 }
 
