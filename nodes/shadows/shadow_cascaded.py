@@ -28,7 +28,7 @@ class ShadowCascaded(ShadowMapNode):
 
     cascades: int = structural(default=4, min=1, max=8, doc="Parts of the distance, a layer each.")
     weight: float = param(
-        default=0.7, min=0, max=1, doc="Between parts of equal length, 0, and parts that grow like a power, 1."
+        default=0.9, min=0, max=1, doc="Splits of equal length (0), logarithmic splits (1), or a mix of both."
     )
     blend: float = param(default=0.1, min=0, max=0.5, doc="Share of each part over which the next is blended in.")
     reach: float = param(

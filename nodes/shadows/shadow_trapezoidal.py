@@ -25,10 +25,10 @@ class ShadowTrapezoidal(ShadowMapNode):
     """
 
     focus: float = param(
-        default=0.2,
+        default=0.5,
         min=0.01,
         max=1,
-        doc="Share of what is seen, from the eye on, that takes four fifths of the texels.",
+        doc="Share of the visible range, from the eye on, that takes four fifths of the texels.",
     )
 
     def light_views(self, light: Any, frame: Frame) -> Sequence[ViewMatrices]:

@@ -188,6 +188,26 @@ def test_a_long_field(session: rg.Session, shared: Path, kind: str, most: float)
     assert found < wrong_share(session, shared, *filtered, "sun.resolution=1024")
 
 
+@pytest.mark.parametrize("pipeline", ["shadow-cascaded", "shadow-trapezoidal"])
+@pytest.mark.parametrize("scene", ["avenue", "courtyard"])
+def test_defaults_suit_long_and_short_scenes(session: rg.Session, pipeline: str, scene: str) -> None:
+    """Against eight fine cascades, away from edges and on faces that the sun reaches."""
+
+    def lit(name: str, *sets: str) -> npt.NDArray[np.bool_]:
+        loaded = rg.load(name, scene=scene, size=(160, 90), sets=sets)
+        frame = session.render(loaded, outputs=(), taps=("shadows.visibility", "gbuffer.normal"), warm_up=False)
+        sun = next(light for light in loaded.link().scene.lights if light.type == "directional")
+        facing = frame["gbuffer.normal"][..., :3] @ -np.asarray(sun.direction) > 0.2
+        return np.where(facing, frame["shadows.visibility"][0, ..., 0] > 0.5, True)
+
+    fine = ("sun.cascades=8", "sun.resolution=2048", "sun.weight=0.95", "shadows.taps=1", "shadows.normal_offset=0.5")
+    truth, found = lit("shadow-cascaded", *fine), lit(pipeline)
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(truth, 1, mode="edge"), (3, 3))
+    inside = windows.all((-1, -2)) | ~windows.any((-1, -2))
+    assert (~truth).mean() > 0.01
+    assert (found != truth)[inside].mean() < (0.003 if pipeline == "shadow-cascaded" else 0.01)
+
+
 MOVING = """scene: 1
 objects:
   floor: {shape: plane, size: [200, 200]}

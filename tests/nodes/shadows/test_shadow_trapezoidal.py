@@ -109,7 +109,7 @@ def test_a_long_field(session: rg.Session, shared: Path, kind: str) -> None:
     given, masks = json.loads((here / "case.json").read_text())["camera"], np.load(here / "masks.npz")
     judged = np.isin(masks["cls"], (1, 2)) & ~masks["edge"].astype(bool)
     wrong = []
-    for sun in (("sun.type=shadow_trapezoidal", "sun.focus=0.05"), ()):
+    for sun in (("sun.type=shadow_trapezoidal",), ()):
         sets = (
             f"shadows.type={kind}",
             "sun.resolution=1024",
