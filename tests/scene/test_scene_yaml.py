@@ -163,7 +163,7 @@ WRONG = {
     "environment: {file: ../../sky.hdr}": "RG302",
     "orbit: {camera: man}": "2:17: RG322 there is no camera 'man'; there are no cameras",
     "keyframes: {cameras.m.eye: {0: [0, 0, 0]}}": "2:13: RG322 keyframes: there is no 'm' under cameras",
-    "keyframes: {camera.m.eye: {0: 1}}": "keyframes name no section 'camera'; did you mean 'cameras'?",
+    "keyframes: {camera.m.eye: {0: 1}}": "keyframes: there is no section 'camera'; did you mean 'cameras'?",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eyes: {0: 1}}": "3:13: RG322 keyframes: cameras have no moving key 'eyes'",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {0: 1}}": "3:32: RG321 'eye': expected a list of 3 numbers, got 1",
     "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {a: [1, 2, 3]}}": "'a' is not a time in seconds",
