@@ -9,8 +9,7 @@ from typing import Any, Literal
 from rendergraph.declare import Parameter
 from rendergraph.document import Value
 from rendergraph.errors import Problem, suggestion
-from rendergraph.glsl.globals import Global
-from rendergraph.glsl.literals import literal
+from rendergraph.glsl.globals import Global, literal
 from rendergraph.typecheck import Range, fits
 
 _SCALAR: dict[str, type] = {"float": float, "int": int, "uint": int, "bool": bool}

@@ -156,7 +156,7 @@ def _alone(name: str, port: Port) -> Iterator[str]:
         if isinstance(port, History):
             yield f"'{name}' is a History of a buffer; only textures keep last frame's values"
         if not callable(port.clear) and port.clear not in (None, 0):
-            yield f"port '{name}' is a buffer, which is cleared to 0 alone, not to {port.clear!r}"
+            yield f"port '{name}' is a buffer, which can only be cleared to 0, not to {port.clear!r}"
 
 
 def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:

@@ -241,7 +241,7 @@ def _wrap(ctx: moderngl.Context, load: Any, *, owned: bool) -> Device:
         "color_targets": min(raw.integer(0x8CDF), raw.integer(0x8824)),  # attachments, draw buffers
         "images": raw.integer(0x8F38),
         "storage_bindings": raw.integer(0x90DD),
-        **{f"groups_{axis}": raw.integer_at(0x91BE, number) for number, axis in enumerate("xyz")},
+        **{f"groups_{axis}": raw.integer(0x91BE, number) for number, axis in enumerate("xyz")},
     }
     raw.error()  # from limits that this driver does not know
     return Device(ctx, raw, owned, limits)

@@ -28,26 +28,12 @@ _ACTIVE, _BUFFER_DATA_SIZE = 0x92F5, 0x9303
 _LINK_STATUS = 0x8B82
 
 _VALUES = {  # GL type: name in GLSL, ending of the `glProgramUniform…` that writes it
-    0x1406: ("float", "1fv"),
-    0x8B50: ("vec2", "2fv"),
-    0x8B51: ("vec3", "3fv"),
-    0x8B52: ("vec4", "4fv"),
-    0x1404: ("int", "1iv"),
-    0x8B53: ("ivec2", "2iv"),
-    0x8B54: ("ivec3", "3iv"),
-    0x8B55: ("ivec4", "4iv"),
-    0x1405: ("uint", "1uiv"),
-    0x8DC6: ("uvec2", "2uiv"),
-    0x8DC7: ("uvec3", "3uiv"),
-    0x8DC8: ("uvec4", "4uiv"),
-    0x8B56: ("bool", "1iv"),
-    0x8B57: ("bvec2", "2iv"),
-    0x8B58: ("bvec3", "3iv"),
-    0x8B59: ("bvec4", "4iv"),
-    0x8B5A: ("mat2", "Matrix2fv"),
-    0x8B5B: ("mat3", "Matrix3fv"),
-    0x8B5C: ("mat4", "Matrix4fv"),
-}
+    0x1406: ("float", "1fv"), 0x8B50: ("vec2", "2fv"), 0x8B51: ("vec3", "3fv"), 0x8B52: ("vec4", "4fv"),
+    0x1404: ("int", "1iv"), 0x8B53: ("ivec2", "2iv"), 0x8B54: ("ivec3", "3iv"), 0x8B55: ("ivec4", "4iv"),
+    0x1405: ("uint", "1uiv"), 0x8DC6: ("uvec2", "2uiv"), 0x8DC7: ("uvec3", "3uiv"), 0x8DC8: ("uvec4", "4uiv"),
+    0x8B56: ("bool", "1iv"), 0x8B57: ("bvec2", "2iv"), 0x8B58: ("bvec3", "3iv"), 0x8B59: ("bvec4", "4iv"),
+    0x8B5A: ("mat2", "Matrix2fv"), 0x8B5B: ("mat3", "Matrix3fv"), 0x8B5C: ("mat4", "Matrix4fv"),
+}  # fmt: skip
 _SAMPLERS = {
     0x8B5D: "sampler1D", 0x8B5E: "sampler2D", 0x8B5F: "sampler3D", 0x8B60: "samplerCube", 0x8B62: "sampler2DShadow",
     0x8DC1: "sampler2DArray", 0x8DC4: "sampler2DArrayShadow", 0x8DC5: "samplerCubeShadow", 0x8DCA: "isampler2D",

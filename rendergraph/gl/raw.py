@@ -10,16 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 _TYPES: dict[str, Any] = {
-    "v": None,
-    "u": ctypes.c_uint,
-    "i": ctypes.c_int,
-    "f": ctypes.c_float,
-    "d": ctypes.c_double,
-    "b": ctypes.c_ubyte,
-    "q": ctypes.c_uint64,
-    "s": ctypes.c_ssize_t,
-    "p": ctypes.c_void_p,
-}
+    "v": None, "u": ctypes.c_uint, "i": ctypes.c_int, "f": ctypes.c_float, "d": ctypes.c_double, "b": ctypes.c_ubyte,
+    "q": ctypes.c_uint64, "s": ctypes.c_ssize_t, "p": ctypes.c_void_p,
+}  # fmt: skip
 _FUNCTIONS = {
     "v": "glPauseTransformFeedback glResumeTransformFeedback glEndConditionalRender",
     "vb": "glDepthMask",
@@ -99,6 +92,12 @@ _FUNCTIONS = {
 PROTOTYPES = {name: signature for signature, names in _FUNCTIONS.items() for name in names.split()}
 
 
+_ERRORS = {
+    0x500: "INVALID_ENUM", 0x501: "INVALID_VALUE", 0x502: "INVALID_OPERATION", 0x503: "STACK_OVERFLOW",
+    0x504: "STACK_UNDERFLOW", 0x505: "OUT_OF_MEMORY", 0x506: "INVALID_FRAMEBUFFER_OPERATION",
+}  # fmt: skip
+
+
 class RawGL:
     """Raw functions by name, without moderngl's checks: `raw.glDepthFunc(0x0203)`.
 
@@ -127,14 +126,9 @@ class RawGL:
     def delete(self, function: str, name: int) -> None:
         getattr(self, function)(1, ctypes.byref(ctypes.c_uint(name)))
 
-    def integer(self, parameter: int) -> int:
+    def integer(self, parameter: int, *index: int) -> int:
         value = ctypes.c_int()
-        self.glGetIntegerv(parameter, ctypes.byref(value))
-        return value.value
-
-    def integer_at(self, parameter: int, index: int) -> int:
-        value = ctypes.c_int()
-        self.glGetIntegeri_v(parameter, index, ctypes.byref(value))
+        (self.glGetIntegeri_v if index else self.glGetIntegerv)(parameter, *index, ctypes.byref(value))
         return value.value
 
     def current_query(self, target: int) -> int:
@@ -149,13 +143,4 @@ class RawGL:
         code = first
         while code:
             code = self.glGetError()
-        names = {
-            0x500: "INVALID_ENUM",
-            0x501: "INVALID_VALUE",
-            0x502: "INVALID_OPERATION",
-            0x503: "STACK_OVERFLOW",
-            0x504: "STACK_UNDERFLOW",
-            0x505: "OUT_OF_MEMORY",
-            0x506: "INVALID_FRAMEBUFFER_OPERATION",
-        }
-        return names.get(first, hex(first)) if first else None
+        return _ERRORS.get(first, hex(first)) if first else None

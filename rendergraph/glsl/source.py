@@ -149,35 +149,34 @@ class Includes:
             inherited: more folders for includes in quotes that are not beside the file, each a root.
         """
         root = Path(self._links.of(root or source.parent))
-        blocks: list[Block] = []
+        self._blocks: list[Block] = []
+        self._conditions = 0  # open `#if`
         self._certain.add((self._links.of(source), prefix))
         self._plugged = dict(plugged or {})
         self._versions = versions
         self._inherited = inherited
-        self._file(source, root, Origin(prefix=prefix), [], blocks, [0])
-        return SourceText(tuple(blocks))
+        self._file(source, root, Origin(prefix=prefix), [])
+        return SourceText(tuple(self._blocks))
 
-    def _file(
-        self, file: Path, root: Path, base: Origin, stack: list[str], blocks: list[Block], depth: list[int]
-    ) -> None:
+    def _file(self, file: Path, root: Path, base: Origin, stack: list[str]) -> None:
         raw, found = runs(file)
         stack = [*stack, self._links.of(file)]
         for run in found:
             line = run.end
-            self._take(run, replace(base, file=file, line=run.first), raw, blocks)
-            depth[0] += run.nests
+            self._add(run, replace(base, file=file, line=run.first), raw)
+            self._conditions += run.nests
             if line is None:
                 return
             origin = replace(base, file=file, line=line.number)
             if line.word == "needs" or (line.is_version and self._versions and len(stack) == 1):
-                blocks.append(Block(("",), origin))
+                self._blocks.append(Block(("",), origin))
                 continue
             if line.word != "include":
-                text = f"'#{line.word}' is written by rendergraph; take the line out"
+                text = f"'#{line.word}' is written by rendergraph; remove the line"
                 raise _error("RG404", text, origin, raw)
             parameter = _PARAMETER.match(line.rest)
             if parameter is not None and parameter[1] not in self._plugged:
-                blocks.append(Block(("",), origin))
+                self._blocks.append(Block(("",), origin))
                 continue
             if parameter is not None:
                 target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
@@ -189,9 +188,9 @@ class Includes:
             if len(stack) > MAX_DEPTH:
                 raise _error("RG403", f"includes are nested deeper than {MAX_DEPTH}", origin, raw)
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)
-            self._include(target, home, inner, stack, blocks, depth)
+            self._include(target, home, inner, stack)
 
-    def _take(self, run: Run, first: Origin, raw: str, blocks: list[Block]) -> None:
+    def _add(self, run: Run, first: Origin, raw: str) -> None:
         if self.bytes + run.bytes > MAX_BYTES:
             sizes = accumulate(len(line) + 1 for line in run.lines)
             beyond = sum(self.bytes + size <= MAX_BYTES for size in sizes)
@@ -199,34 +198,26 @@ class Includes:
             raise _error("RG403", text, replace(first, line=first.line + beyond), raw)
         self.bytes += run.bytes
         if run.lines:
-            blocks.append(Block(run.lines, first))
+            self._blocks.append(Block(run.lines, first))
 
-    def _include(
-        self,
-        file: Path,
-        root: Path,
-        base: Origin,
-        stack: list[str],
-        blocks: list[Block],
-        depth: list[int],
-    ) -> None:
+    def _include(self, file: Path, root: Path, base: Origin, stack: list[str]) -> None:
         key = (self._links.of(file), base.prefix)
         if key in self._certain:
             return
-        certain = depth[0] <= 0
+        certain = self._conditions <= 0
         if certain:
             self._certain.add(key)
         guard = self._guards.get(key)
         if guard is None and not certain:
             guard = self._guards[key] = f"INCLUDED_{len(self._guards)}"
         if guard is None:
-            self._file(file, root, base, stack, blocks, depth)
+            self._file(file, root, base, stack)
             return
-        blocks.append(Block((f"#ifndef {guard}", f"#define {guard}"), Origin(shared=True)))
-        depth[0] += 1
-        self._file(file, root, base, stack, blocks, depth)
-        depth[0] -= 1
-        blocks.append(Block(("#endif",), Origin(shared=True)))
+        self._blocks.append(Block((f"#ifndef {guard}", f"#define {guard}"), Origin(shared=True)))
+        self._conditions += 1
+        self._file(file, root, base, stack)
+        self._conditions -= 1
+        self._blocks.append(Block(("#endif",), Origin(shared=True)))
 
     def _find(
         self, written: str, file: Path, root: Path, origin: Origin, raw: str, in_shared: bool

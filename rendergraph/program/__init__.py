@@ -16,8 +16,7 @@ from __future__ import annotations
 
 from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
 from rendergraph.program.macros import positions_macro
-from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts
-from rendergraph.program.text_key import text_key
+from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts, text_key
 
 __all__ = [
     "StageText",

@@ -12,9 +12,8 @@ from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.names import declarators, head, statements, tokens, without_directives
-from rendergraph.glsl.reached import reached
-from rendergraph.program.text import StageText, prefix, stage_texts
-from rendergraph.program.text_key import text_key
+from rendergraph.glsl.reachable import reachable_names
+from rendergraph.program.text import StageText, prefix, stage_texts, text_key
 from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, TextureDesc
@@ -47,7 +46,7 @@ def check_texts(
     """Build the program texts of steps and check them.
 
     Raises:
-        InputError: files are missing or cannot be combined (RG400 to RG408), a sampler does not fit its texture (RG447),
+        InputError: files are missing or cannot be combined (RG400 to RG408), a sampler misfits its texture (RG447),
             an `out` has no target (RG448), or a persistent value depends on what changes (RG439).
     """
     problems: list[Problem] = []
@@ -114,7 +113,7 @@ def unfit_sampler(step: Step, declared: str, read: Read, resources: Mapping[str,
     assert isinstance(desc, TextureDesc)
     if desc.samples > 1 and declared == right.replace("MS", ""):
         text = (
-            f"'{read.name}' is read as one sample a texel ({declared}), but '{read.resource}' has {desc.samples} "
+            f"'{read.name}' is read as one sample per texel ({declared}), but '{read.resource}' has {desc.samples} "
             f"samples; resolve it before, or declare it as {right}"
         )
         return step.problem("RG214", text)
@@ -199,7 +198,7 @@ def check_kept_text(step: Step, texts: Texts, cls: type[Node], resources: Mappin
 
 @lru_cache(maxsize=256)
 def _reached(text: str) -> tuple[set[str], set[str], list[tuple[str, set[str]]]]:
-    return reached(text), set(_samplers(text)), list(_blocks(text))
+    return reachable_names(text), set(_samplers(text)), list(_blocks(text))
 
 
 def _kept(step: Step, resources: Mapping[str, Resource]) -> str | None:
@@ -219,7 +218,7 @@ def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
 @lru_cache(maxsize=256)
 def looked_at(text: str) -> frozenset[str]:
     """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
-    names = reached(text)
+    names = reachable_names(text)
     return frozenset(block for block, members in _blocks(text) if not names.isdisjoint(members))
 
 

@@ -31,7 +31,7 @@ def compile_problems(message: str, text: StageText) -> list[Problem]:
     if found:
         return found
     where = _first_place(text.source)
-    plain = " ".join(message.split()) or "the driver refused the shader and did not say why"
+    plain = " ".join(message.split()) or "the driver refused the shader without a reason"
     return [Problem("RG410", f"{text.who}: {plain}", where.place() if where else None)]
 
 
@@ -51,7 +51,7 @@ def link_problems(message: str, texts: Mapping[str, StageText]) -> list[Problem]
     if found:
         return found
     text = re.sub(r"^error:\s*", "", "; ".join(row.strip() for row in rows))
-    text = text or "the driver refused the program and did not say why"
+    text = text or "the driver refused the program without a reason"
     last = list(texts.values())[-1]
     text = f"{last.of_node}the stages {', '.join(texts)} do not link: {text}"
     lacking = _LACKS.search(text)

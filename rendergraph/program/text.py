@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct, field
 from msgspec.structs import replace
@@ -18,10 +19,9 @@ from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
 from rendergraph.glsl.source import Block, Includes, Origin, SourceText, generated
 from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
-from rendergraph.program.text_key import text_key
 from rendergraph.resources import folder
 from rendergraph.stamps import FileCache
-from rendergraph.steps import FunctionBinding, Read, Resource, Step
+from rendergraph.steps import FunctionBinding, Read, Resource, Step, Write
 from rendergraph.textures import SIGNATURES, TEXTURE_KINDS, Signature, TextureDesc
 
 VERSION = "#version 450 core"
@@ -95,16 +95,54 @@ def stage_texts(
     macros = {**read_defines(step.reads, resources, views), **dict(step.defines), **(defines or {})}
     if step.kind != "compute":
         macros = {**dict(sample_macros("PASS", step.samples)), **macros}
-    wanted = signatures_of(step, types)
+    program = _Program(step, types, resources, views, macros)
     texts: dict[str, StageText] = {}
     for stage in ("vertex", "geometry", "fragment", "compute"):
         if stage in shaders:
-            args = (step, types, resources, views, macros, wanted, includes.fresh())
             try:
-                texts[stage] = _stage(stage, shaders[stage], *args)
+                texts[stage] = program.stage(stage, shaders[stage], includes.fresh())
             except InputError as error:  # the place of a missing file is the call that names it
                 raise InputError([p if p.place else step.relocate(p) for p in error.problems]) from error
     return texts
+
+
+_IRRELEVANT: dict[str, Any] = {
+    "node": "", "index": 0, "reads": (), "writes": (), "uniforms": (), "functions": (), "label": "", "if_drawn": None,
+    "size": (0, 0), "groups": (0, 0, 0), "invocations": None,
+}  # fmt: skip
+"""Fields of a step that do not affect its texts, or only as `text_key` says."""
+
+
+def text_key(
+    step: Step, types: Mapping[str, NodeType], resources: Mapping[str, Resource], views: Mapping[str, ViewTable]
+) -> Hashable:
+    """Return all that a step's texts depend on besides files: equal keys give equal texts, even of two graphs."""
+
+    def seen(use: Read | Write) -> Hashable:
+        resource = resources[use.resource]
+        count = resource.view and views.get(resource.view, ViewTable()).count
+        desc = resource.desc  # no text contains its size, as `textureSize` and `imageSize` return it
+        what = (desc.kind, desc.format, desc.layers, desc.samples) if isinstance(desc, TextureDesc) else desc
+        return replace(use, resource="", version=0, mip=None), what, resource.lights, count
+
+    def made_of(node: str) -> Hashable:
+        type = types[node]
+        return type.cls, type.file, type.shaders, type.inherited
+
+    return (
+        made_of(step.node),
+        replace(step, **_IRRELEVANT),
+        tuple(
+            (
+                replace(each, reads=(), uniforms=tuple((name, 0) for name, _ in each.uniforms)),
+                made_of(each.node),
+                tuple(seen(use) for use in each.reads),
+            )
+            for each in step.functions
+        ),
+        tuple(seen(use) for use in step.reads),
+        tuple(seen(use) for use in step.writes),
+    )
 
 
 class StepTexts(Struct, eq=False):
@@ -128,49 +166,122 @@ class StepTexts(Struct, eq=False):
 # --- one stage -------------------------------------------------------------------------------------------------------
 
 
-def _stage(
-    stage: str,
-    name: str,
-    step: Step,
-    types: Mapping[str, NodeType],
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
-    macros: Mapping[str, str],
-    wanted: Mapping[str, Signature],
-    includes: Includes,
-) -> StageText:
-    include_folder = includes.include_folder
-    view = includes.expand(include_folder / "view.glsl")
-    view = SourceText(tuple(Block(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
-    node = types[step.node]
-    file, root = node.shader_file(name, include_folder)
-    # What the file calls decides which functions stand before it, so it is read as if there were none.
-    versions = node.is_shader and not name.startswith("<")
+class _Program(Struct, frozen=True):
+    """A step with what its program text depends on, as in `stage_texts`."""
 
-    def expanded(by: Includes) -> SourceText:
-        plugged = dict(step.includes)
-        return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
+    step: Step
+    types: Mapping[str, NodeType]
+    resources: Mapping[str, Resource]
+    views: Mapping[str, ViewTable]
+    macros: Mapping[str, str]
 
-    source = expanded(includes.copy())
-    functions = SourceText()
-    for signature in wanted.values():
-        if calls(source.text, signature.name):
-            functions += _functions(stage, signature, step, types, resources, views, includes)
-        if mentions(source.text, f"{signature.name.upper()}_LIGHT_COUNT"):
-            table = _light_table(signature, step, node, resources)
-            functions += generated(table, f"the lights of {signature.name}()")
-    if functions.blocks:  # which may include what it includes
-        source = expanded(includes)
-    if stage == "compute":
-        from rendergraph.program.images import with_formats  # many pipelines compute nothing
+    def stage(self, stage: str, name: str, includes: Includes) -> StageText:
+        include_folder = includes.include_folder
+        view = includes.expand(include_folder / "view.glsl")
+        view = SourceText(tuple(Block(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
+        step, node = self.step, self.types[self.step.node]
+        file, root = node.shader_file(name, include_folder)
+        # What the file calls decides which functions stand before it, so it is read as if there were none.
+        versions = node.is_shader and not name.startswith("<")
 
-        source = with_formats(source, step, resources)
-    extensions, source = _hoisted(source)
-    body = functions.text + source.text
-    declarations = _read_declarations(step.reads, resources, "", body)
-    text = view + declarations + functions + source
-    head = generated([VERSION, *extensions]) + written(looked_at(macros, text.text))
-    return StageText(stage, head + text, step.node)
+        def expanded(by: Includes) -> SourceText:
+            plugged = dict(step.includes)
+            return by.expand(file, root=root, plugged=plugged, versions=versions, inherited=node.inherited)
+
+        source = expanded(includes.copy())
+        functions = SourceText()
+        for signature in signatures_of(step, self.types).values():
+            if calls(source.text, signature.name):
+                functions += self._functions(stage, signature, includes)
+            if mentions(source.text, f"{signature.name.upper()}_LIGHT_COUNT"):
+                table = self._light_table(signature)
+                functions += generated(table, f"the lights of {signature.name}()")
+        if functions.blocks:  # which may include what it includes
+            source = expanded(includes)
+        if stage == "compute":
+            from rendergraph.program.images import with_formats  # many pipelines compute nothing
+
+            source = with_formats(source, step, self.resources)
+        extensions, source = _hoisted(source)
+        body = functions.text + source.text
+        declarations = _read_declarations(step.reads, self.resources, "", body)
+        text = view + declarations + functions + source
+        head = generated([VERSION, *extensions]) + written(looked_at(self.macros, text.text))
+        return StageText(stage, head + text, step.node)
+
+    def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
+        """Return the providers' texts with prefixed names, and the function that joins them."""
+        text = SourceText()
+        factors: list[str] = []
+        arguments = ", ".join(signature.arguments)
+        for binding in self.step.functions:
+            if binding.signature != signature.name:
+                continue
+            text += self._provider_text(binding, includes)
+            factors.append(f"result = result {signature.combine} {prefix(binding.node)}{signature.name}({arguments});")
+        lines: list[str] = []
+        if stage == "fragment":
+            for read in screen_reads(signature, self.step, self.types[self.step.node]):
+                lines.append(f"uniform sampler2DArray {read.name};")
+                factors += _screen_factors(read, self._lights(read), signature)
+        kind = signature.declaration.split()[0]
+        lines += [f"{signature.declaration} {{", f"    {kind} result = {signature.neutral};"]
+        lines += [f"    {factor}" for factor in factors]
+        return text + generated([*lines, "    return result;", "}"], f"{signature.name}() of all that provide it")
+
+    def _light_table(self, signature: Signature) -> Iterator[str]:
+        """Yield the lights that some provider or texture of the function knows, for shaders that need them."""
+        reads = [
+            read for binding in self.step.functions if binding.signature == signature.name for read in binding.reads
+        ]
+        reads += screen_reads(signature, self.step, self.types[self.step.node])
+        known = list(dict.fromkeys(light for read in reads for light in self._lights(read)))
+        yield f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"
+        if known:
+            yield f"const int {signature.name}_lights[{len(known)}] = int[]({', '.join(map(str, known))});"
+
+    def _lights(self, read: Read) -> tuple[int, ...]:
+        return self.resources[read.resource].lights if read.resource in self.resources else ()
+
+    def _provider_text(self, binding: FunctionBinding, includes: Includes) -> SourceText:
+        """Return one provider's text with every name it declares, its inputs and its parameters prefixed."""
+        before, node = prefix(binding.node), self.types[binding.node]
+        file, root = node.shader_file(binding.shader)
+        plugged = dict(binding.includes)
+        source = includes.expand(file, root=root, prefix=before, plugged=plugged, inherited=node.inherited)
+        own = SourceText(tuple(block for block in source.blocks if not block.origin.shared))
+        names = declared(own.text)
+        if binding.signature not in names:
+            signature = _declared_signatures(node)[binding.signature]
+            text = (
+                f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{signature.declaration}'"
+            )
+            raise InputError(Problem("RG408", text, Origin(file, 1).place()))
+        macros = {**read_defines(binding.reads, self.resources, self.views), **dict(binding.defines)}
+        names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
+        for port in (*node.cls.ports(), *(read.name for read in binding.reads)):
+            endings = ("_LAYERS", "_SAMPLES", "_SAMPLE_POSITIONS", "_COUNT", "_VIEW_COUNT")
+            names |= {
+                port,
+                f"{port}_views",
+                f"previous_{port}_views",
+                f"{port}_lights",
+                f"HAS_{port.upper()}",
+                *(port.upper() + e for e in endings),
+            }
+
+        def rename(word: str) -> str:
+            return before + word if word in names else word
+
+        lines = iter(renamed(own.text, rename).split("\n"))
+        final = SourceText(
+            tuple(
+                block if block.origin.shared else Block(tuple(islice(lines, len(block.lines))), block.origin)
+                for block in source.blocks
+            )
+        )
+        head = written({before + key: renamed(value, rename) for key, value in macros.items()})
+        return head + _read_declarations(binding.reads, self.resources, before, final.text) + final
 
 
 def _hoisted(source: SourceText) -> tuple[list[str], SourceText]:
@@ -225,49 +336,6 @@ def _declared_signatures(node: NodeType) -> dict[str, Signature]:
     return {signature.name: signature for signature in signatures}
 
 
-def _functions(
-    stage: str,
-    signature: Signature,
-    step: Step,
-    types: Mapping[str, NodeType],
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
-    includes: Includes,
-) -> SourceText:
-    """Return the providers' texts with prefixed names, and the function that joins them."""
-    text = SourceText()
-    factors: list[str] = []
-    arguments = ", ".join(signature.arguments)
-    for binding in step.functions:
-        if binding.signature != signature.name:
-            continue
-        text += provider_text(binding, types[binding.node], resources, views, includes)
-        factors.append(f"result = result {signature.combine} {prefix(binding.node)}{signature.name}({arguments});")
-    lines: list[str] = []
-    if stage == "fragment":
-        for read in screen_reads(signature, step, types[step.node]):
-            lines.append(f"uniform sampler2DArray {read.name};")
-            factors += _screen_factors(read, _lights(read, resources), signature)
-    kind = signature.declaration.split()[0]
-    lines += [f"{signature.declaration} {{", f"    {kind} result = {signature.neutral};"]
-    lines += [f"    {factor}" for factor in factors]
-    return text + generated([*lines, "    return result;", "}"], f"{signature.name}() of all that provide it")
-
-
-def _light_table(signature: Signature, step: Step, node: NodeType, resources: Mapping[str, Resource]) -> Iterator[str]:
-    """Yield the lights that some provider or texture of the function knows, for shaders that need them."""
-    reads = [read for binding in step.functions if binding.signature == signature.name for read in binding.reads]
-    reads += screen_reads(signature, step, node)
-    known = list(dict.fromkeys(light for read in reads for light in _lights(read, resources)))
-    yield f"#define {signature.name.upper()}_LIGHT_COUNT {len(known)}"
-    if known:
-        yield f"const int {signature.name}_lights[{len(known)}] = int[]({', '.join(str(light) for light in known)});"
-
-
-def _lights(read: Read, resources: Mapping[str, Resource]) -> tuple[int, ...]:
-    return resources[read.resource].lights if read.resource in resources else ()
-
-
 def screen_reads(signature: Signature, step: Step, node: NodeType) -> list[Read]:
     """Return the step's textures that hold the function's values in screen space."""
     names = [
@@ -295,48 +363,3 @@ def _screen_factors(read: Read, lights: tuple[int, ...], signature: Signature) -
         f"for (int layer = 0; layer < {len(lights)}; ++layer)",
         f"    if ({read.name}_table[layer] == {light}) {join}{fetch.format('layer')};",
     ]
-
-
-def provider_text(
-    binding: FunctionBinding,
-    node: NodeType,
-    resources: Mapping[str, Resource],
-    views: Mapping[str, ViewTable],
-    includes: Includes,
-) -> SourceText:
-    """Return one provider's text with every name it declares, its inputs and its parameters prefixed."""
-    before = prefix(binding.node)
-    file, root = node.shader_file(binding.shader)
-    plugged = dict(binding.includes)
-    source = includes.expand(file, root=root, prefix=before, plugged=plugged, inherited=node.inherited)
-    own = SourceText(tuple(block for block in source.blocks if not block.origin.shared))
-    names = declared(own.text)
-    if binding.signature not in names:
-        signature = _declared_signatures(node)[binding.signature]
-        text = f"{node_named(binding.node, node.name)}: '{binding.shader}' does not define '{signature.declaration}'"
-        raise InputError(Problem("RG408", text, Origin(file, 1).place()))
-    macros = {**read_defines(binding.reads, resources, views), **dict(binding.defines)}
-    names |= {*macros, *(name for name, _ in binding.uniforms), *node.cls.parameters()}
-    for port in (*node.cls.ports(), *(read.name for read in binding.reads)):
-        endings = ("_LAYERS", "_SAMPLES", "_SAMPLE_POSITIONS", "_COUNT", "_VIEW_COUNT")
-        names |= {
-            port,
-            f"{port}_views",
-            f"previous_{port}_views",
-            f"{port}_lights",
-            f"HAS_{port.upper()}",
-            *(port.upper() + e for e in endings),
-        }
-
-    def rename(word: str) -> str:
-        return before + word if word in names else word
-
-    lines = iter(renamed(own.text, rename).split("\n"))
-    final = SourceText(
-        tuple(
-            block if block.origin.shared else Block(tuple(islice(lines, len(block.lines))), block.origin)
-            for block in source.blocks
-        )
-    )
-    head = written({before + key: renamed(value, rename) for key, value in macros.items()})
-    return head + _read_declarations(binding.reads, resources, before, final.text) + final

@@ -284,7 +284,7 @@ def _unwritten(step: Step, resource: str, versions: Versions, idle: Mapping[str,
 
 def _loads_nothing(step: Step, resource: str) -> Problem:
     text = (
-        f"the first step that writes '{resource}' keeps what is there, but nothing is there yet; "
+        f"the first step that writes '{resource}' loads its content, but it has none yet; "
         "give the port a `clear` value or fill it in an earlier step"
     )
     return step.problem("RG603", text)

@@ -73,7 +73,7 @@ def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versio
         if not ids:
             culled[node] = "it writes nothing"
         elif readers:
-            culled[node] = f"only {_listed(sorted(readers))} would read {_listed(ids)}, and that does not run"
+            culled[node] = f"only {_listed(sorted(readers))} would read {_listed(ids)}, which does not run"
         else:
             culled[node] = f"nothing reads {_listed(ids)}"
     return culled

@@ -1,4 +1,4 @@
-"""What a node may give to a step, checked while the author's own line is still on the stack."""
+"""Checks of a step's arguments, while the author's own line is still on the stack."""
 
 from __future__ import annotations
 
@@ -28,17 +28,13 @@ P = ParamSpec("P")
 
 
 def argument(name: str, value: object, annotation: Any) -> None:
-    """Refuse an argument that is not what its annotation says.
-
-    Raises:
-        Misuse: it is something else.
-    """
+    """Refuse an argument that does not fit its annotation."""
     for mistake in mistakes_in(name, value, annotation):
         raise Misuse(mistake.text)
 
 
 def checked(method: Callable[P, None]) -> Callable[P, None]:
-    """A method whose arguments are looked at first; those that may be ports it looks at itself, knowing the node."""
+    """Check a method's arguments first, except those that may be ports, which it checks itself, knowing the node."""
 
     @cache
     def looked_at() -> tuple[list[str], dict[str, tuple[Any, Callable[[Any], bool]]]]:
@@ -57,16 +53,7 @@ def checked(method: Callable[P, None]) -> Callable[P, None]:
 
 
 def own_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
-    """A port that the node itself declares.
-
-    Args:
-        ports: those that it declares, by name.
-        value: what its author gives.
-        what: what that is given as, for messages.
-
-    Raises:
-        Misuse: it is something else, or the port of another class.
-    """
+    """Return a port that the node itself declares; `what` is the argument's name in messages."""
     if isinstance(value, Part):
         value = value.port
     if not isinstance(value, Port):
@@ -84,7 +71,7 @@ def own_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
 
 
 def part_of(ports: Mapping[str, Port], value: object, what: str) -> Part:
-    """A port of the node, or a part of one."""
+    """Return a port of the node, or a part of one."""
     port = own_port(ports, value, what)
     return value if isinstance(value, Part) else port.whole
 
@@ -100,7 +87,7 @@ def within(part: Part, desc: TextureDesc | BufferDesc) -> None:
 
 
 def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
-    """What `out` names: the shader's name to what is written."""
+    """Return what `out` names: the shader's name to what is written."""
     if isinstance(out, Port | Part):
         part = part_of(ports, out, "out")
         found = {part.port.name: part}
@@ -129,11 +116,7 @@ def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
 
 
 def uniform(name: str, value: Any) -> UniformValue:
-    """A uniform's value as plain numbers; arrays and nested lists become one tuple.
-
-    Raises:
-        Misuse: it is no number.
-    """
+    """Return a uniform's value as plain numbers; arrays and nested lists become one tuple."""
     if hasattr(value, "tolist"):  # NumPy's scalars and arrays
         value = value.tolist()
     if isinstance(value, bool | int | float):
@@ -141,7 +124,7 @@ def uniform(name: str, value: Any) -> UniformValue:
     numbers = tuple(_flat(value)) if isinstance(value, list | tuple) else ()
     if not numbers or not all(isinstance(number, bool | int | float) for number in numbers):
         hint = "; give the port itself" if isinstance(value, str) else ""
-        raise Misuse(f"{name}={quoted(value)}: a step takes ports, numbers and lists of numbers{hint}")
+        raise Misuse(f"{name}={quoted(value)}: expected a port, a number or a list of numbers{hint}")
     return numbers
 
 
@@ -150,33 +133,29 @@ def _flat(value: Any) -> list[Any]:
 
 
 def macro(name: str, value: Macro) -> str:
-    """A macro's value as program text.
-
-    Raises:
-        Misuse: its name is none, or GLSL cannot write the value.
-    """
+    """Return a macro's value as program text."""
     if not re.match(r"[A-Za-z_]\w*\Z", name):
-        raise Misuse(f"defines has the name {quoted(name)}, which cannot be a macro's")
+        raise Misuse(f"defines has the name {quoted(name)}, which is not a valid macro name")
     if (isinstance(value, float) and not math.isfinite(value)) or "\n" in str(value):
         raise Misuse(f"defines gives {name} the value {value!r}, which GLSL cannot write")
     return define_text(value)
 
 
 def define_text(value: object) -> str:
-    """A Python value as macro text."""
+    """Return a Python value as macro text."""
     if isinstance(value, bool):
         return "1" if value else "0"
     return repr(value) if isinstance(value, float) else str(value)
 
 
 def counts(given: Counts) -> tuple[int, int, int]:
-    """Up to three whole numbers, filled up with 1."""
+    """Return up to three integers, filled up with 1."""
     x, y, z = (*(given if isinstance(given, Sequence) else (given,)), 1, 1)[:3]
     return x, y, z
 
 
 def objects(value: str | Sequence[str]) -> str | tuple[str, ...]:
-    """Which objects a geometry step draws."""
+    """Return which objects a geometry step draws."""
     if not isinstance(value, str):
         return tuple(value)
     near = nearest(value, ("all", "opaque", "transparent", "casters"))
@@ -186,7 +165,7 @@ def objects(value: str | Sequence[str]) -> str | tuple[str, ...]:
 
 
 def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> dict[str, Port]:
-    """Layouts of a draw step's buffers: `3f 2f in_position in_uv` to the buffer's port."""
+    """Return layouts of a draw step's buffers: `3f 2f in_position in_uv` to the buffer's port."""
     mapping: Any = Annotated[Mapping[Any, Any], "a mapping from layouts to buffers"]
     argument("attributes", value, mapping | None)
     found = {}
@@ -206,32 +185,28 @@ def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> d
 
 
 def unconnected(port: Port) -> Misuse:
-    """What to say of an input that nothing is linked to, where a step cannot do without."""
+    """Return the misuse of an input that is not connected."""
     return Misuse(f"input '{port.name}' is not connected; ask `steps.connected` first")
 
 
 def buffer(port: Port, what: str) -> Port:
-    """A port that is a buffer."""
+    """Return a port after checking that it is a buffer."""
     if getattr(port, "kind", "") != "buffer":
-        raise Misuse(f"{what} is {quoted(port)}, which is no buffer")
+        raise Misuse(f"{what} is {quoted(port)}, which is not a buffer")
     return port
 
 
 def resolved(source: Port, out: Port, descs: Sequence[TextureDesc | BufferDesc | None]) -> None:
-    """Refuse what no device averages: one sample, depth, whole numbers, unit vectors, another format or size.
-
-    Raises:
-        Misuse: it is that.
-    """
+    """Refuse what no device averages: one sample, depth, integers, unit vectors, another format or size."""
     given, made = descs
     if given is None:
         raise unconnected(source)
     if not (isinstance(given, TextureDesc) and isinstance(made, TextureDesc)):
-        raise Misuse(f"'{source.name}' or '{out.name}' is a buffer; samples are those of textures")
+        raise Misuse(f"'{source.name}' or '{out.name}' is a buffer; only textures have samples")
     if given.samples == 1:
-        raise Misuse(f"source is '{source.name}', which has one sample a texel; there is nothing to resolve")
+        raise Misuse(f"source is '{source.name}', which has one sample per texel, so nothing to resolve")
     texel = FORMATS[given.format]
     if texel.is_depth or texel.family in ("uint", "int") or getattr(source, "semantic", None) == Normal:
-        raise Misuse(f"'{source.name}' holds what has no mean; choose a sample in a shader, by texelFetch")
+        raise Misuse(f"'{source.name}' has values that cannot be averaged; choose a sample in a shader with texelFetch")
     if replace(given, samples=1) != made:
         raise Misuse(f"'{out.name}' is not what '{source.name}' becomes; declare it like that input, with samples=1")

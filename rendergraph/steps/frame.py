@@ -1,4 +1,4 @@
-"""What a node's `update` may ask and do in each frame."""
+"""What a node's `update` can read and do in each frame."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ViewMatrices:
-    """One view: column-vector matrices as float64 arrays of shape (4, 4), and the size drawn at.
+    """One view: column-vector matrices as float64 arrays of shape (4, 4), and the size it is rendered at.
 
     Attributes:
         view: world to view space.
         projection: view space to clip space, z in -w…w.
         size: width and height in texels.
         near, far: distances in metres; far may be infinite.
-        light: the scene's light index it belongs to, -1 for none.
-        span: distances from the camera, along its axis, between which the view is looked at; several of one light share
-            the picture by them, and are blended where they overlap. Everywhere by default. `range.zw` in GLSL.
-        jitter: how far `projection` moves the picture, in widths and heights of it, where pictures of many frames are
-            put together (`Node.camera_jitter`). `jitter.xy` in GLSL.
+        light: index of the scene's light it belongs to, -1 for none.
+        span: distances from the camera, along its axis, between which the view is used; several views of one light
+            divide the picture by them, and are blended where they overlap. Everywhere by default. `range.zw` in GLSL.
+        jitter: the subpixel offset in `projection`, as fractions of the picture's width and height, if several frames
+            are accumulated (`Node.camera_jitter`). `jitter.xy` in GLSL.
     """
 
     view: npt.NDArray[np.float64]
@@ -41,60 +41,52 @@ class ViewMatrices:
 
 
 class FrameScene(Protocol):
-    """The scene where a frame finds it: `Frame.scene`."""
+    """The scene in one frame: `Frame.scene`."""
 
     @property
     def lights(self) -> Sequence[Any]:
         """The scene's lights, in its order."""
-        ...
 
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """Least and greatest corner of what is drawn."""
-        ...
+        """Minimum and maximum corner of all visible objects."""
 
     @property
     def corners(self) -> npt.NDArray[np.float64]:
-        """World-space corners of the box of each object, (n, 8, 3); do not write into it."""
-        ...
+        """World-space corners of the box of each object, (n, 8, 3); read-only."""
 
     @property
     def casting(self) -> npt.NDArray[np.bool_]:
-        """Which objects are drawn and cast a shadow, (n,)."""
-        ...
+        """Which objects are visible and cast a shadow, (n,)."""
 
     @property
     def shown(self) -> npt.NDArray[np.bool_]:
         """Which objects are not hidden, (n,)."""
-        ...
 
     @property
     def objects(self) -> Sequence[Any]:
         """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`."""
-        ...
 
     @property
     def meshes(self) -> Sequence[Any]:
-        """What an object's `mesh` counts through.
+        """The meshes that an object's `mesh` indexes.
 
-        `box` is a mesh's least and greatest corner, `edges` which of its triangles meet at each edge, `plane`
-        the one that they lie in, or None; found once.
+        `box` is a mesh's minimum and maximum corner, `edges` the triangles that meet at each edge, `plane` the plane
+        that contains them, or None; each is computed once.
         """
-        ...
 
     @property
     def materials(self) -> Sequence[Any]:
-        """What an object's `material` counts through."""
-        ...
+        """The materials that an object's `material` indexes."""
 
 
 class Frame(Protocol):
-    """What `update` may ask and do.
+    """What `update` can read and do.
 
     Attributes:
         index: frame number, from 1.
         time: seconds since frame 1.
-        camera: the pipeline's camera in this frame, as it is drawn with.
+        camera: the pipeline's camera in this frame, as it renders.
     """
 
     index: int
@@ -104,19 +96,15 @@ class Frame(Protocol):
     @property
     def scene(self) -> FrameScene:
         """The scene in this frame, a `FrameScene`."""
-        ...
 
     def connected(self, port: Port) -> bool:
-        """Whether anything is linked to an input."""
-        ...
+        """Whether an input is connected."""
 
     def views(self, port: Port) -> Sequence[ViewMatrices]:
-        """The views that what is linked to an input was drawn with, one after another; none where nothing is linked."""
-        ...
+        """Return the views that the texture at an input was rendered with, in order; none if it is not connected."""
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
-        ...
 
     def set_region(
         self,
@@ -124,17 +112,15 @@ class Frame(Protocol):
         scissor: tuple[int, int, int, int] | None = None,
         depth_bounds: tuple[float, float] | None = None,
     ) -> None:
-        """Draw the steps of a `region` in a part of the picture from now on.
+        """Restrict the steps of a `region` to a part of the picture from now on.
 
         Args:
             number: the region's.
             scissor: x, y, width and height in texels from the bottom left; None for the whole target. With a width or
                 height of 0 nothing is drawn.
-            depth_bounds: least and greatest depth that what the depth texture holds may have there, 0 to 1. Where the
-                driver has no depth bounds this is passed over: it saves work, and must not change the picture.
+            depth_bounds: minimum and maximum of the values in the depth texture where fragments pass, 0 to 1. A driver
+                without depth bounds ignores it: it saves work, and must not change the picture.
         """
-        ...
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
-        """Upload into a declared buffer; the array's bytes may be fewer than the buffer's."""
-        ...
+        """Upload an array into a declared buffer; it may have fewer bytes than the buffer."""

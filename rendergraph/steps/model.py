@@ -1,4 +1,4 @@
-"""A step: one draw, dispatch or clear with what it reads and writes; and the resources it touches."""
+"""A step: one draw, dispatch or clear with its reads and writes; and the resources it touches."""
 
 from __future__ import annotations
 
@@ -18,23 +18,21 @@ DrawOrder = Literal["front_to_back", "back_to_front", "scene"]
 Use: TypeAlias = Literal["sample", "depth_test", "image", "buffer", "attach"]
 UniformValue: TypeAlias = float | int | bool | Sequence[float] | Sequence[int]
 
-MOST_STEPS = 10_000
-"""Of one pipeline."""
+MOST_STEPS = 10_000  # of one pipeline
 
 
 class Read(Struct, frozen=True, gc=False):
-    """A resource a step reads, and how.
+    """A resource that a step reads, and how.
 
     Attributes:
         name: the name in the shader.
         resource: id of the resource, `node.port`.
-        version: which version of it; versions order readers and writers of one texture.
+        version: orders readers and writers of one texture.
         use: `sample`, `depth_test` (attached read-only), `image`, `buffer` or `attach` (the target of an `InOut`
             whose old content stays).
-        sampler: how it is sampled.
         mip, layer: the part read, None for all.
         previous: last frame's value; orders nothing in this frame.
-        kind: the GLSL view of it, `texture2d` where a single mip or layer is read.
+        kind: the GLSL view of it, `texture2d` if a single mip or layer is read.
     """
 
     name: str
@@ -49,15 +47,14 @@ class Read(Struct, frozen=True, gc=False):
 
 
 class Write(Struct, frozen=True, gc=False):
-    """A resource a step writes: version `version` comes into being.
+    """A resource that a step writes; this creates version `version`.
 
     Attributes:
         name: the name in the shader, or the port's name.
         resource: id of the resource.
-        version: the version that this write makes; it continues `version - 1` where that is at least 1.
-        use: `color`, `depth`, `image`, `buffer`.
-        load: `clear` first, `load` what is there, or `discard`.
-        clear: value of every channel, or one a channel.
+        version: the version that this write creates; it continues `version - 1` if that is at least 1.
+        load: `clear` first, `load` the old content, or `discard`.
+        clear: value of every channel, or one per channel.
         mip, layer: the part written, None for mip 0 and all layers (layered).
     """
 
@@ -72,15 +69,14 @@ class Write(Struct, frozen=True, gc=False):
 
 
 class FunctionBinding(Struct, frozen=True):
-    """One provider of a function a step's shader calls; its text's names get the provider node's prefix.
+    """One provider of a function that a step's shader calls; names of its text get the provider node's prefix.
 
     Attributes:
         signature: the function's name.
         node: the providing node's id.
         shader: the file of its text, relative to the providing node's shaders.
         reads: what the text samples, by the names in its text.
-        defines: the provider's own defines.
-        uniforms: the provider's parameters that are uniforms.
+        defines, uniforms: the provider's own.
         includes: parameters whose choice is a plugin's, in capitals, and the include it brings.
     """
 
@@ -94,11 +90,11 @@ class FunctionBinding(Struct, frozen=True):
 
 
 class Where(Struct, frozen=True, eq=False, gc=False):
-    """Where a step is written. All are equal: steps that do the same are, wherever they come from.
+    """Where a step is written. All are equal, so that equal steps are equal wherever they come from.
 
     Attributes:
-        place: where the node stands in the pipeline's file.
-        caller: the author's file and line of the call that recorded it; None where the framework did by itself.
+        place: the node's place in the pipeline's file.
+        caller: the author's file and line of the call that recorded it; None if the framework did itself.
     """
 
     place: Place | None = None
@@ -117,36 +113,33 @@ class Step(Struct, frozen=True, gc=False):
     Attributes:
         node: id of the node that recorded it.
         index: its number within the node.
-        kind: what it does; a `copy` is the framework's own, of a version that is wanted and then written over.
+        kind: a `copy` is the framework's own, of a version that is needed after it is overwritten.
         shaders: stage to file name (`fragment`, `vertex`, `geometry`, `compute`), relative to the node's shaders, or
             `<name>` for one in `shaders/include/`.
-        reads, writes: resources, with versions.
-        functions: providers of functions its shader calls.
+        functions: providers of functions that its shader calls.
         includes: parameters whose choice is a plugin's, in capitals, and the include it brings.
         defines: names and program text.
         uniforms: names and values that belong to this step alone.
-        state: fixed function.
         size: width and height of the target in texels.
         samples: samples of the target.
-        view: id of the view table a geometry step is drawn with.
-        view_index: which view of it; None where the shader chooses by `gl_Layer`.
+        view: id of the view table of a geometry step.
+        view_index: which view of it; None if the shader chooses by `gl_Layer`.
         objects: which objects a geometry step draws: `all`, `opaque`, `transparent`, `casters`, or names.
-        materials: what of the material its shader looks at: `full`, `alpha` (only what an alpha mask needs) or `none`.
-        order: `front_to_back` (free to regroup), `back_to_front` or `scene` (kept as given).
-        in_place: whether a geometry step's triangles end up where the objects are: those outside the view are left out.
-        region: the number of the node's rectangle that it is drawn in, as `update` sets it; None for the whole target.
-        if_drawn: the number of the node's step without which, where that drew nothing, the device leaves this one out.
-        per_light: a light's index where the step draws for one light alone.
+        materials: what of the material its shader uses: `full`, `alpha` (only what an alpha mask needs) or `none`.
+        order: `front_to_back` (free to regroup), `back_to_front` or `scene` (unchanged).
+        in_place: whether a geometry step's triangles end up where the objects are: those outside the view are culled.
+        region: number of the node's rectangle that it is drawn in, as `update` sets it; None for the whole target.
+        if_drawn: number of the node's step without whose visible fragments the device skips this one.
+        per_light: a light's index if the step draws for one light alone.
         vertices: vertex count of a `draw` step, or the name of the buffer that holds the indirect command.
         command: which of the commands of that buffer.
         topology: primitives of a `draw` step; `triangles` or `triangles_adjacency` of a geometry step.
-        instances: instance count of a `draw` step.
         attributes: for a `draw` step, buffer resource to attribute names with formats (`3f in_position`).
         groups: work groups of a compute step.
-        invocations: what a compute step covers along x, y and z; the groups are then as many as its shader needs.
-        label: what the author calls it, or what a copy is for; shown in plans and beside times.
+        invocations: what a compute step covers along x, y and z, instead of `groups`.
+        label: the author's name for it, or a copy's purpose; in plans and timings.
         type: the node's type.
-        where: where it is written, in no way part of what it is.
+        where: where it is written, which is not part of its identity.
     """
 
     node: str
@@ -183,11 +176,11 @@ class Step(Struct, frozen=True, gc=False):
     where: Where = Where()
 
     def problem(self, code: str, text: str, subject: str = "") -> Problem:
-        """What is wrong with the step, as `node 'id' (type): file:line: …`, at the node's place in the pipeline."""
+        """Return a problem of the step, as `node 'id' (type): file:line: …`, at the node's place in the pipeline."""
         return self.relocate(Problem(code, text, subject=subject))
 
     def relocate(self, problem: Problem) -> Problem:
-        """A problem that was found without knowing the step, as one of the step."""
+        """Return a problem that was found without knowing the step, as one of the step."""
         caller = self.where.caller
         line = Place(shown_file(caller[0]), caller[1], 1) if caller is not None else None
         return problem.relocate(self.where.place, context=node_named(self.node, self.type), cause=line)
@@ -207,19 +200,19 @@ class Step(Struct, frozen=True, gc=False):
 
 Role = Literal["transient", "internal", "output", "history", "kept", "scene"]
 _COPIES: Mapping[str, int] = {"history": 2, "scene": 0}
-"""Where it is not one."""
+"""Roles whose number of copies is not 1."""
 
 
 class Resource(Struct, frozen=True, gc=False):
     """A texture or buffer of the pipeline before it has memory.
 
     Attributes:
-        id: `node.port` of whoever made it first; an `InOut` continues the id.
+        id: `node.port` of its first writer; an `InOut` continues the id.
         desc: what it is allocated from.
         role: `transient` and `internal` may be aliased; `output`, `history` and `kept` live the whole frame,
-            the last two from frame to frame; what is the `scene`'s is there before, and takes no memory here.
+            the last two from frame to frame; a `scene` resource exists already, and takes no memory here.
         first: every channel's value before the first frame, for history.
-        view: id of the view table it is drawn with.
+        view: id of the view table it is rendered with.
         lights: the scene's light index of each layer.
     """
 
@@ -232,5 +225,5 @@ class Resource(Struct, frozen=True, gc=False):
 
     @property
     def bytes(self) -> int:
-        """Bytes by formula; a history texture has two copies, and the scene's is not the pipeline's."""
+        """Bytes by formula; a history texture has two copies, and the scene's takes none of the pipeline's."""
         return self.desc.bytes * _COPIES.get(self.role, 1)

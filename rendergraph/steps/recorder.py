@@ -21,38 +21,32 @@ from rendergraph.typecheck import quoted
 
 
 class Recorder(Protocol):
-    """What `Steps` asks of the stage that expands a graph; node authors never meet it."""
+    """What `Steps` needs from the stage that expands a graph; node authors never use it."""
 
     @property
     def facts(self) -> Facts:
-        """What the node may ask."""
-        ...
+        """What the node may ask about the graph and the scene."""
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
-        """What a port's texture or buffer is allocated from."""
-        ...
+        """Return the description that a port's texture or buffer is allocated from."""
 
     def used(self, port: Port) -> bool:
-        """Whether anybody reads an output."""
-        ...
+        """Whether any node reads an output."""
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """What the choice of a parameter needs."""
-        ...
+        """Return what the choice of a parameter needs."""
 
     def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
-        """The inputs that a step reads which names none."""
-        ...
+        """Return the inputs that a step reads if it names none."""
 
     def add(self, request: StepRequest) -> None:
         """Keep a request."""
-        ...
 
 
 class StepRequest(Struct, frozen=True, gc=False):
-    """What a node asked for, before its ports are mapped to resources.
+    """A step as the node requested it, before its ports are mapped to resources.
 
-    `caller` is the author's file and line of the call, None where the framework recorded the step by itself.
+    `caller` is the author's file and line of the call, None if the framework recorded the step itself.
     """
 
     kind: Literal["fullscreen", "geometry", "draw", "compute", "clear", "mipmaps", "resolve"]
@@ -68,21 +62,21 @@ class StepRequest(Struct, frozen=True, gc=False):
 Target: TypeAlias = Port | Part
 Defines: TypeAlias = Annotated[Mapping[str, Macro], "a mapping from macros to values"]
 IN_PLACE = ("<geometry.vert>", "<depth.vert>")
-"""The vertex shaders that are known to draw objects where they are."""
+"""The vertex shaders known to keep objects in place."""
 Objects: TypeAlias = Annotated[str | Sequence[str], "all, opaque, transparent, casters or a list of objects' names"]
 
 
 class Steps:
     """The list a node fills in `record`.
 
-    Textures a step reads are given by the name they have in the shader (`source=self.source`); with none named the
-    step reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a
-    port, a part, or a mapping from the shader's output names; without it the step writes every output of the node
-    that is used. A texture with a depth format is attached as depth. What is None, a port that a subclass drops, is
-    left out. A step with the number of a `region` is drawn in the rectangle that `update` sets for that number
-    (`Frame.set_region`), until then everywhere. A `label` is what plans and `bench --steps` call the step, beside its
+    Textures that a step reads are given by their name in the shader (`source=self.source`); a step that names none
+    reads every connected input under its own name. Other keyword values become the step's uniforms. `out` is a port, a
+    part, or a mapping from the shader's output names; by default the step writes every used output of the node. A
+    texture with a depth format is attached as depth. Arguments that are None, such as a port that a subclass drops, are
+    ignored. A step with a `region` number is drawn in the rectangle that `update` sets for that number
+    (`Frame.set_region`), until then everywhere. A `label` is the step's name in plans and `bench --steps`, beside its
     node and number. A step that draws nothing where an earlier one of the node drew nothing names that one's label
-    (`if_drawn`): the device then leaves it out, without the CPU waiting for the answer.
+    (`if_drawn`): the device then skips it, without the CPU waiting for the answer.
     """
 
     def __init__(self, ports: Mapping[str, Port], node_id: str, type_name: str, recorder: Recorder) -> None:
@@ -91,7 +85,7 @@ class Steps:
         self.type_name = type_name
         self._recorder = recorder
 
-    # What is known before the schedule ------------------------------------------------------------------------------
+    # Queries before scheduling ------------------------------------------------------------------------------
 
     @property
     def facts(self) -> Facts:
@@ -104,11 +98,11 @@ class Steps:
         return self.facts.lights
 
     def connected(self, port: Port | None) -> bool:
-        """Whether anything is linked to an input; nothing is to one that the class drops."""
+        """Whether an input is connected; False for one that the class drops."""
         return port is not None and self.facts.connected(checks.own_port(self.ports, port, "connected's argument").name)
 
     def used(self, port: Port | None) -> bool:
-        """Whether anybody reads an output; one that nobody reads, or that the class drops, need not be written."""
+        """Whether any node reads an output; an unused one, or one that the class drops, need not be written."""
         return port is not None and self._recorder.used(checks.own_port(self.ports, port, "used's argument"))
 
     def draws(self, objects: str | Sequence[str]) -> bool:
@@ -116,14 +110,14 @@ class Steps:
         return bool(self.facts.drawn(checks.objects(objects)))
 
     def needs(self, parameter: str) -> tuple[str, ...]:
-        """What the choice of a parameter says that it needs, where choices are includes."""
+        """Return what the choice of a parameter needs, if its choices are includes."""
         return self._recorder.needs(parameter)
 
     def desc(self, port: Port) -> TextureDesc:
-        """Size, format, mips and layers of a port's texture.
+        """Return size, format, mips and layers of a port's texture.
 
         Raises:
-            Misuse: it is no port of this node, holds no texture, or is an input that is not connected.
+            Misuse: it is not a port of this node, holds no texture, or is an input that is not connected.
         """
         own = checks.own_port(self.ports, port, "desc's argument")
         found = self._desc(own)
@@ -134,12 +128,10 @@ class Steps:
         return found
 
     def _connected(self, port: Port) -> None:
-        """Refuse an input that nothing is linked to."""
         if isinstance(port, Input) and not self.facts.connected(port.name):
             raise checks.unconnected(port)
 
     def _desc(self, port: Port) -> TextureDesc | BufferDesc | None:
-        """What a port is allocated from, None where nothing is linked to an input."""
         if isinstance(port, Input) and not self.facts.connected(port.name):
             return None
         return self._recorder.desc(port)
@@ -159,11 +151,9 @@ class Steps:
         label: str = "",
         **bindings: Target | UniformValue,
     ) -> None:
-        """One fragment shader over the whole target."""
-        shaders = {"fragment": shader}
-        self._add(
-            "fullscreen", shaders, out, bindings, defines, label=label, state=state, region=region, if_drawn=if_drawn
-        )
+        """Run one fragment shader over the whole target."""
+        options = {"label": label, "state": state, "region": region, "if_drawn": if_drawn}
+        self._add("fullscreen", {"fragment": shader}, out, bindings, defines, **options)
 
     @checked
     def geometry(
@@ -188,50 +178,36 @@ class Steps:
         topology: Literal["triangles", "triangles_adjacency"] = "triangles",
         **bindings: Target | UniformValue,
     ) -> None:
-        """The scene's objects, one indirect multi-draw a batch.
+        """Draw the scene's objects, with one indirect multi-draw per batch.
 
         Args:
-            fragment: fragment shader, None for depth alone.
+            fragment: fragment shader, None for depth only.
             vertex, geometry: other stages; the default vertex shader transforms by object and view.
             out, state, region, if_drawn, defines, label, bindings: see the class.
             view: a `Views` port, a `view` input or a texture that carries one; the node's connected `view` input, else
                 the pipeline's camera.
-            view_index: which view of it, None where a geometry shader sets `gl_Layer`.
+            view_index: which view of it, None if a geometry shader sets `gl_Layer`.
             objects: `all`, `opaque`, `transparent`, `casters`, an object's name or several.
-            materials: what of the material the shader looks at.
+            materials: the part of the material that the shader uses.
             order: `front_to_back`, `back_to_front` or `scene`.
             in_place: whether triangles end up where the objects are, so that objects outside of the view (with
-                `view_index=None` of all of them) need not be drawn. By default that is taken of `<geometry.vert>` and
-                `<depth.vert>` without a geometry shader; say so of your own shaders where it is true of them.
-            per_light: one light's index, for a pass a light.
-            topology: `triangles_adjacency` gives a geometry shader six vertices a triangle: behind each corner the one
-                across the edge from there to the next, vertices with equal positions taken for one. The objects have to
-                be `closed`.
+                `view_index=None` of all views) are culled. By default true for `<geometry.vert>` and `<depth.vert>`
+                without a geometry shader; set it for your own shaders if it holds.
+            per_light: one light's index, for a pass per light.
+            topology: `triangles_adjacency` gives a geometry shader six vertices per triangle: after each corner the
+                vertex across the edge to the next one; vertices with equal positions count as one. The objects must be
+                `closed`.
         """
         if per_light is not None and per_light >= len(self.lights):
             raise Misuse(f"per_light is {per_light}, but the scene has {len(self.lights)} lights, counted from 0")
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
         if in_place is None:
             in_place = vertex in IN_PLACE and geometry is None
-        self._add(
-            "geometry",
-            shaders,
-            out,
-            bindings,
-            defines,
-            label=label,
-            state=state,
-            region=region,
-            if_drawn=if_drawn,
-            view=view,
-            view_index=view_index,
-            objects=checks.objects(objects),
-            materials=materials,
-            order=order,
-            in_place=in_place,
-            per_light=per_light,
-            topology=topology,
-        )
+        target = {"label": label, "state": state, "region": region, "if_drawn": if_drawn}
+        camera = {"view": view, "view_index": view_index, "in_place": in_place}
+        selection = {"objects": checks.objects(objects), "materials": materials, "order": order, "per_light": per_light}
+        options = target | camera | selection | {"topology": topology}
+        self._add("geometry", shaders, out, bindings, defines, **options)
 
     @checked
     def draw(
@@ -254,12 +230,12 @@ class Steps:
         view_index: Count | None = 0,
         **bindings: Target | UniformValue,
     ) -> None:
-        """A draw over the node's own buffers.
+        """Draw the node's own buffers.
 
         Args:
             fragment, vertex, geometry: shaders.
-            vertices: how many, or a buffer port with indirect draw commands: four 32-bit integers (count, instances,
-                first, base instance) and one that is passed over.
+            vertices: a count, or a buffer port with indirect draw commands: four 32-bit integers (count, instances,
+                first, base instance) and one that is ignored.
             command: which of those commands, from 0.
             attributes: layout to buffer port, the layout as `3f 2f in_position in_uv`.
             topology, instances: as in OpenGL.
@@ -271,27 +247,13 @@ class Steps:
             self._connected(vertices)
         else:
             checks.argument("vertices", vertices, Count)
-        held = checks.attributes(self.ports, attributes)
-        for port in held.values():
+        buffers = checks.attributes(self.ports, attributes)
+        for port in buffers.values():
             self._connected(port)
         shaders = {"vertex": vertex, "geometry": geometry, "fragment": fragment}
-        self._add(
-            "draw",
-            shaders,
-            out,
-            bindings,
-            defines,
-            label=label,
-            state=state,
-            region=region,
-            vertices=vertices,
-            command=command,
-            topology=topology,
-            view=view,
-            view_index=view_index,
-            instances=instances,
-            attributes=held,
-        )
+        target = {"label": label, "state": state, "region": region, "view": view, "view_index": view_index}
+        source = {"vertices": vertices, "command": command, "topology": topology, "instances": instances}
+        self._add("draw", shaders, out, bindings, defines, **target, **source, attributes=buffers)
 
     @checked
     def compute(
@@ -305,13 +267,14 @@ class Steps:
         label: str = "",
         **bindings: Target | UniformValue,
     ) -> None:
-        """A compute dispatch: `out` is bound as images and buffers; barriers follow from who reads them next.
+        """Dispatch a compute shader: `out` is bound as images and buffers; barriers follow from the next readers.
 
         Args:
             shader: the compute shader, whose `layout(local_size_x = …)` is the size of a work group.
-            over: what it covers with one invocation a texel: a texture, or so many invocations along x, y and z. By
-                default the first texture it writes, else the first that it reads. There are as many work groups as
-                that takes, so the last ones reach beyond the edge: the shader leaves those invocations out.
+            over: what it covers with one invocation per texel: a texture, or this many invocations along x, y and z. By
+                default the first texture that it writes, else the first that it reads. The last work groups may reach
+                beyond
+                the edge: the shader skips those invocations.
             groups: the number of work groups instead.
             out, defines, label, bindings: see the class.
         """
@@ -321,12 +284,12 @@ class Steps:
         self._add("compute", {"compute": shader}, out, bindings, defines, label=label, **options)
 
     def clear(self, out: Target, value: float | tuple[float, ...] = 0.0) -> None:
-        """Fill a texture with one value in every channel, or one a channel; a buffer with 0."""
+        """Fill a texture with one value in every channel, or one per channel; a buffer with 0."""
         part = checks.part_of(self.ports, out, "out")
         numbers = checks.uniform("value", value)
         checks.argument("value", numbers, Texel)
         if getattr(part.port, "kind", "") == "buffer" and numbers != 0:
-            raise Misuse(f"'{part.port.name}' is a buffer, which is cleared to 0 alone")
+            raise Misuse(f"'{part.port.name}' is a buffer, which can only be cleared to 0")
         self._add("clear", {}, out, {}, None, value=numbers)
 
     def mipmaps(self, out: Port) -> None:
@@ -340,9 +303,9 @@ class Steps:
         self._add("mipmaps", {}, out, {}, None)
 
     def resolve(self, source: Port, out: Port) -> None:
-        """Write the mean of the samples of `source`, by the device: right for colours, and for nothing else.
+        """Write the mean of the samples of `source`, by the device: right for colours only.
 
-        A mean of depths, of unit vectors or of whole numbers means nothing: a shader chooses among them.
+        A mean of depths, of unit vectors or of integers is meaningless: a shader chooses among the samples instead.
         """
         ports = checks.own_port(self.ports, source, "source"), checks.own_port(self.ports, out, "out")
         checks.resolved(*ports, [self._desc(port) for port in ports])
@@ -393,7 +356,7 @@ class Steps:
     def _bindings(
         self, bindings: Mapping[str, Target | UniformValue]
     ) -> tuple[dict[str, Target], dict[str, UniformValue]]:
-        """What a step reads by the shader's name, and its own uniforms."""
+        """Split keyword arguments into what a step reads, by the shader's name, and its own uniforms."""
         textures: dict[str, Target] = {}
         uniforms: dict[str, UniformValue] = {}
         for name, value in bindings.items():
@@ -409,7 +372,6 @@ class Steps:
         return textures, uniforms
 
     def _check_options(self, options: Mapping[str, Any]) -> None:
-        """What several kinds of step take."""
         if options.get("view") is not None:
             port = checks.own_port(self.ports, options["view"], "view")
             if not isinstance(port, Views | Input):
@@ -418,7 +380,7 @@ class Steps:
     def _invocations(
         self, over: Target | Counts | None, targets: Mapping[str, Part], reads: Mapping[str, Target]
     ) -> tuple[int, int, int]:
-        """How many invocations a dispatch needs along each axis."""
+        """Return how many invocations a dispatch needs along each axis."""
         if over is not None and not isinstance(over, Port | Part | str):
             checks.argument("over", over, Counts)
             return checks.counts(over)
@@ -426,7 +388,7 @@ class Steps:
             part = checks.part_of(self.ports, over, "over")
             desc = self._desc(part.port)
             if isinstance(desc, BufferDesc):
-                raise Misuse(f"over is the buffer '{part.port.name}'; say how many invocations, as in over=256")
+                raise Misuse(f"over is the buffer '{part.port.name}'; give the number of invocations, as in over=256")
             if desc is None:
                 raise Misuse(f"over is input '{part.port.name}', which is not connected; ask `steps.connected` first")
             checks.within(part, desc)
@@ -436,11 +398,11 @@ class Steps:
             if isinstance(desc, TextureDesc):
                 return _texels(desc, part)
         if not targets:
-            return 1, 1, 1  # nobody reads what it makes
-        raise Misuse("it writes and reads no texture that says how many work groups there are; give over or groups")
+            return 1, 1, 1  # its outputs are unused
+        raise Misuse("no texture determines the number of work groups; give over or groups")
 
     def _reads(self, named: Mapping[str, Target]) -> Iterator[Part]:
-        """What a step reads, every input where it names none."""
+        """Yield what a step reads, every input if it names none."""
         for target in named.values() or (port for port in self.ports.values() if isinstance(port, Input | InOut)):
             part = target if isinstance(target, Part) else target.whole
             if getattr(part.port, "kind", "function") not in ("view", "function"):
@@ -448,7 +410,7 @@ class Steps:
 
 
 def _caller() -> tuple[str, int] | None:
-    """The line of an author that asked for a step; None where the framework did by itself."""
+    """Return the author's line that requested a step; None if the framework did itself."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_globals.get("__package__") == __package__:
         frame = frame.f_back

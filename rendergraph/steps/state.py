@@ -33,7 +33,7 @@ DepthBounds: TypeAlias = Annotated[tuple[_Fraction, _Fraction], "the least and t
 
 
 class Blend(Struct, frozen=True):
-    """Blending of one target: `source × src + destination × dst` with `op` between."""
+    """Blending of one target: `source × src + destination × dst` with `op` in between."""
 
     src: BlendFactor = "one"
     dst: BlendFactor = "zero"
@@ -46,7 +46,7 @@ class Blend(Struct, frozen=True):
 
     @property
     def takes_destination(self) -> bool:
-        """Whether what is in the target shows in what comes out."""
+        """Whether the result depends on the target's content."""
         factors = [name or "" for name in (self.src, self.dst, self.src_alpha, self.dst_alpha)]
         dst_alpha = self.dst if self.dst_alpha is None else self.dst_alpha
         return (
@@ -91,25 +91,25 @@ class State(Struct, frozen=True):
     """The fixed function of a step.
 
     Attributes:
-        depth_test: compare with the attached depth; None: yes where a depth texture is attached to a geometry or draw
+        depth_test: compare with the attached depth; None: yes if a depth texture is attached to a geometry or draw
             step. Without the test every fragment's depth is written.
-        depth_func: the comparison of window depth, which is reversed: what is `greater` is nearer.
-        depth_write: write depth; None: yes where depth is written by the step.
-        blend: one `Blend` for all targets, one a target, or None.
+        depth_func: the comparison of window depth, which is reversed: `greater` is nearer.
+        depth_write: write depth; None: yes if the step writes depth.
+        blend: one `Blend` for all targets, one per target, or None.
         color_mask: which of RGBA are written.
-        cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`; `solid` culls those that
-            front faces hide from whoever looks from outside: of closed meshes with opaque, single-sided materials.
-        front: which triangles show their front: those that run counter-clockwise on the screen, and with `object` of an
-            object that its transform mirrors those that run clockwise, as the winding of its corners is turned, too. A
-            geometry shader that winds its triangles by itself, and does not pass on the order it is given, says one.
+        cull: `material` culls back faces of single-sided materials; `back`, `front`, `none`; `solid` culls faces that
+            front faces hide from outside: of closed meshes with opaque, single-sided materials.
+        front: which triangles are front faces: those that run counter-clockwise on the screen, and with `object` for an
+            object whose transform mirrors it those that run clockwise, as its winding is reversed, too. A geometry
+            shader that winds its triangles itself must not use `object`.
         stencil: stencil state, None for off.
         scissor: x, y, width, height in texels from the bottom left.
-        polygon_offset: factor and units of filled triangles' depth, positive for nearer; not of `wireframe`'s lines.
-        depth_bounds: least and greatest depth that what a depth texture already holds may have where fragments pass.
-            Not every driver has it: `rendergraph doctor` says, and elsewhere such a step is an error.
+        polygon_offset: factor and units of filled triangles' depth, positive for nearer; not for `wireframe` lines.
+        depth_bounds: minimum and maximum of the values in the depth texture where fragments pass. Not every driver
+            supports it: see `rendergraph doctor`; elsewhere such a step is an error.
         depth_clamp: clamp instead of clipping at the near and far plane.
-        clip_distances: how many `gl_ClipDistance[…]` the vertex or geometry shader writes: where one is below 0
-            nothing is drawn.
+        clip_distances: how many `gl_ClipDistance[…]` the vertex or geometry shader writes: fragments with one below 0
+            are clipped.
         wireframe: draw lines instead of filled triangles.
     """
 

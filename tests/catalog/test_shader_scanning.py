@@ -17,8 +17,7 @@ from rendergraph.declare import Input, Output, WrittenPort
 from rendergraph.declare.mistakes import RESERVED_NAMES
 from rendergraph.errors import InputError
 from rendergraph.glsl import strip_comments
-from rendergraph.glsl.globals import globals_of
-from rendergraph.glsl.literals import literal
+from rendergraph.glsl.globals import globals_of, literal
 
 TAKEN = set("out uniform float int bool vec sampler half filter copy json schema image".split())  # noqa: SIM905 - as text
 WORDS = st.from_regex(r"\A[a-z]{3,8}\Z").filter(lambda word: word not in TAKEN | RESERVED_NAMES)
@@ -305,7 +304,7 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
             "layout(location = 1) out vec4 c;",
             "1:31: RG441 locations of outputs go from 0 without gaps, for all or for none; leave the layouts out",
         ),
-        ("#version 300 es\nout vec4 c;", "1:1: RG404 '#version' is written by rendergraph; take the line out"),
+        ("#version 300 es\nout vec4 c;", "1:1: RG404 '#version' is written by rendergraph; remove the line"),
         (
             "out vec4 c;\nuniform float distance;",
             "2:15: RG490 shader 'effect.frag': 'distance' is reserved by GLSL or by the node's base class; "

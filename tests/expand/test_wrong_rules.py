@@ -143,7 +143,7 @@ UPDATES = {
     "frame.set_views(self.views, [None])": "set_views is given NoneType, not ViewMatrices",
     "frame.set_views(self.color, [frame.camera])": "set_views is given 'color', which is no Views port",
     "frame.set_views('views', [])": "set_views is the text 'views'; give the port itself, self.views",
-    "frame.write(self.color, numpy.zeros(4))": "write is the Output 'color', which is no buffer",
+    "frame.write(self.color, numpy.zeros(4))": "write is the Output 'color', which is not a buffer",
     "frame.write(self.numbers, [None])": "write is given list of object, not an array of numbers",
     "frame.write(self.numbers, numpy.zeros(17, numpy.float32))": "RG432 it writes 68 bytes into 'numbers', which holds 64",
     "frame.connected('color')": "connected's argument is the text 'color'; give the port itself, self.color",

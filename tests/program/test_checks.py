@@ -117,7 +117,7 @@ def test_a_missing_shader_is_found_by_check(bench: Any) -> None:
 
 def test_one_sample_of_a_multisampled_texture_wants_a_resolve(bench: Any) -> None:
     said = (
-        r"reader\.frag:1:19: RG214 node 'r' \(reader\): 'many' is read as one sample a texel \(sampler2D\), but 'm.many' "
+        r"reader\.frag:1:19: RG214 node 'r' \(reader\): 'many' is read as one sample per texel \(sampler2D\), but 'm.many' "
         r"has 4 samples; resolve it before, or declare it as sampler2DMS"
     )
     with pytest.raises(InputError, match=said):
@@ -153,7 +153,7 @@ def test_an_inout_that_is_read_has_one_sample(bench: Any) -> None:
     text = "nodes: {m: {type: many}, g: {type: glow, inputs: {radiance: m.radiance}}}\noutputs: {image: g.radiance}"
     glow = bench.pipeline(text, Many, Glow, shaders=shaders)
     glow.set("m.samples", 1).check()
-    with pytest.raises(InputError, match=r"RG214 node 'g' \(glow\): \S+: 'radiance' is read as one sample a texel"):
+    with pytest.raises(InputError, match=r"RG214 node 'g' \(glow\): \S+: 'radiance' is read as one sample per texel"):
         glow.check()
 
 

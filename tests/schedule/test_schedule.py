@@ -174,7 +174,7 @@ def test_nothing_unwanted_runs() -> None:
     assert order(found) == ["a", "show"]
     assert set(found.resources) == {"a.x", "show.x"}
     assert found.culled == {
-        "lost": "only after would read lost.x and lost.y, and that does not run",
+        "lost": "only after would read lost.x and lost.y, which does not run",
         "after": "nothing reads after.x",
         "empty": "it recorded no step",
     }
@@ -440,7 +440,7 @@ def test_the_page_of_a_code_has_its_message(code: str) -> None:
 
 def test_a_first_write_that_loads_is_refused() -> None:
     one = replace(step("a"), writes=writes("a.x", load="load"))
-    with pytest.raises(InputError, match=r"RG603 node 'a': the first step that writes 'a\.x' keeps"):
+    with pytest.raises(InputError, match=r"RG603 node 'a': the first step that writes 'a\.x' loads"):
         schedule(expansion(one))
 
 

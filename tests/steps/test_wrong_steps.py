@@ -24,8 +24,8 @@ def record(self, steps):
 
 CALLS = {
     # ports and parts of ports
-    'steps.fullscreen("wrong.frag", source="source")': "RG423 source='source': a step takes ports, numbers and lists of numbers; give the port itself",
-    'steps.fullscreen("wrong.frag", source=None)': "RG423 source=None: a step takes ports, numbers and lists of numbers",
+    'steps.fullscreen("wrong.frag", source="source")': "RG423 source='source': expected a port, a number or a list of numbers; give the port itself",
+    'steps.fullscreen("wrong.frag", source=None)': "RG423 source=None: expected a port, a number or a list of numbers",
     'steps.fullscreen("wrong.frag", source=self.views)': "RG423 source is the view table 'views'; give it as `view=` to a step that draws",
     'steps.fullscreen("wrong.frag", source=Internal(Radiance))': "RG424 source is an Internal made in place; declare it as an attribute of the class",
     'steps.fullscreen("wrong.frag", out="color")': "RG423 out is the text 'color'; give the port itself, self.color",
@@ -47,12 +47,12 @@ CALLS = {
     'steps.fullscreen("wrong.frag", out=self.color, if_drawn=1)': "RG423 if_drawn is 1, not text",
     'steps.fullscreen("wrong.frag", out=self.color, if_drawn="a")': "RG423 if_drawn is 'a', but no earlier step has that label",
     # numbers
-    'steps.fullscreen("wrong.frag", axis=[])': "RG423 axis=[]: a step takes ports, numbers and lists of numbers",
-    'steps.fullscreen("wrong.frag", axis=(1, "0"))': "RG423 axis=(1, '0'): a step takes ports, numbers and lists of numbers",
-    'steps.fullscreen("wrong.frag", axis=object)': "RG423 axis=<class 'object'>: a step takes ports, numbers and lists of numbers",
+    'steps.fullscreen("wrong.frag", axis=[])': "RG423 axis=[]: expected a port, a number or a list of numbers",
+    'steps.fullscreen("wrong.frag", axis=(1, "0"))': "RG423 axis=(1, '0'): expected a port, a number or a list of numbers",
+    'steps.fullscreen("wrong.frag", axis=object)': "RG423 axis=<class 'object'>: expected a port, a number or a list of numbers",
     'steps.fullscreen("wrong.frag", defines=["TAPS"])': "RG423 defines is ['TAPS'], not a mapping from macros to values or None",
     'steps.fullscreen("wrong.frag", defines={"TAPS": [1, 2]})': "RG423 defines['TAPS'] is [1, 2], not a number, True, False or text",
-    'steps.fullscreen("wrong.frag", defines={"2X": 1})': "RG423 defines has the name '2X', which cannot be a macro's",
+    'steps.fullscreen("wrong.frag", defines={"2X": 1})': "RG423 defines has the name '2X', which is not a valid macro name",
     'steps.fullscreen("wrong.frag", defines={"FAR": float("inf")})': "RG423 defines gives FAR the value inf, which GLSL cannot write",
     # shaders and state
     "steps.fullscreen(self.color)": "RG423 shader is the Output 'color', not the name of a file",
@@ -86,13 +86,13 @@ CALLS = {
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, topology="triangle")': "RG423 topology is 'triangle'; did you mean 'triangles'?",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=-3)': "RG423 vertices is -3, not a whole number from 0 up",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=12 / 3)': "RG423 vertices is 4.0, not a whole number from 0 up; divide with //",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.small)': "RG423 vertices is the Internal 'small', which is no buffer",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=self.small)': "RG423 vertices is the Internal 'small', which is not a buffer",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, instances=True)': "RG423 instances is True, not a whole number from 0 up",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"in_position": self.numbers})': "RG423 attributes has the layout 'in_position'; it reads like '3f 2f in_position in_uv'",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f 2f in_position": self.numbers})': "RG423 attributes has the layout '3f 2f in_position': 2 formats, 1 names; it reads like "
     "'3f 2f in_position in_uv'",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"vec3 in_position": self.numbers})': "RG423 attributes has the layout 'vec3 in_position'; it reads like '3f 2f in_position in_uv'",
-    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_position": self.small})': "RG423 attributes['3f in_position'] is the Internal 'small', which is no buffer",
+    'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes={"3f in_position": self.small})': "RG423 attributes['3f in_position'] is the Internal 'small', which is not a buffer",
     'steps.draw("wrong.frag", vertex="a.vert", vertices=3, attributes=[self.numbers])': "RG423 attributes is [Internal('numbers')], not a mapping from "
     "layouts to buffers or None",
     # compute
@@ -102,14 +102,14 @@ CALLS = {
     'steps.compute("a.comp", groups="8", out=self.small)': "RG423 groups is '8', not one to three whole numbers from 1 up or None",
     'steps.compute("a.comp", groups=(1, 1, 1), over=self.small, out=self.small)': "RG423 both over and groups are given; over finds the number of groups itself",
     'steps.compute("a.comp", over="small", out=self.small)': "RG423 over is the text 'small'; give the port itself, self.small",
-    'steps.compute("a.comp", over=self.numbers, out=self.numbers)': "RG423 over is the buffer 'numbers'; say how many invocations, as in over=256",
+    'steps.compute("a.comp", over=self.numbers, out=self.numbers)': "RG423 over is the buffer 'numbers'; give the number of invocations, as in over=256",
     'steps.compute("a.comp", over=self.source, out=self.numbers)': "RG423 over is input 'source', which is not connected; ask `steps.connected` first",
     'steps.compute("a.comp", over=-5, out=self.numbers)': "RG423 over is -5, not one to three whole numbers from 1 up",
-    'steps.compute("a.comp", out=self.numbers)': "RG423 it writes and reads no texture that says how many work groups there are; give over or groups",
+    'steps.compute("a.comp", out=self.numbers)': "RG423 no texture determines the number of work groups; give over or groups",
     # clears and mips
-    'steps.clear(self.color, "black")': "RG423 value='black': a step takes ports, numbers and lists of numbers; give the port itself",
+    'steps.clear(self.color, "black")': "RG423 value='black': expected a port, a number or a list of numbers; give the port itself",
     "steps.clear(self.color, (0, 0, 0, 0, 0))": "RG423 value is (0, 0, 0, 0, 0), not a number, up to four of them",
-    "steps.clear(self.numbers, 1.0)": "RG423 'numbers' is a buffer, which is cleared to 0 alone",
+    "steps.clear(self.numbers, 1.0)": "RG423 'numbers' is a buffer, which can only be cleared to 0",
     'steps.clear("color")': "RG423 out is the text 'color'; give the port itself, self.color",
     "steps.mipmaps(self.color)": "RG423 'color' has no mips to make; declare it with mips=0 for the whole chain",
     "steps.mipmaps(self.chain.mip(0))": "RG423 out is a part of 'chain'; mips are made of a whole texture",

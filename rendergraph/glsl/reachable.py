@@ -13,7 +13,7 @@ _DEFINE = re.compile(r"([A-Za-z_]\w*)(?:\(([^()]*)\))?(.*)")
 _DEFINED = re.compile(r"(!?)\s*defined\s*\(?\s*(\w+)\s*\)?\s*\Z")
 
 
-def reached(text: str) -> set[str]:
+def reachable_names(text: str) -> set[str]:
     """Return the names in `main` of a text without comments and in all that it uses; members after a dot do not count.
 
     Branches of `#ifdef` are followed according to the text's own macros; of other conditions every branch counts.
