@@ -16,7 +16,7 @@ from rendergraph import metrics
 from rendergraph.compare.space import typed
 from rendergraph.compare.timing import NO_TIMES, Times
 from rendergraph.declare import Added
-from rendergraph.declare.extension import Metric
+from rendergraph.declare.extensions import Metric
 from rendergraph.diff import GraphDiff, diff_json
 from rendergraph.errors import Place, Problem
 from rendergraph.installed import versions
