@@ -29,6 +29,7 @@ _BLOCK_BYTES = 8 << 20  # large enough that a call for each costs nothing, small
 _STATES = (b"o", b"g", b"s", b"usemtl")
 _SILENT = (b"vp", b"mg", b"lod", b"bevel", b"c_interp", b"d_interp", b"usemap", b"maplib", b"shadow_obj", b"trace_obj")
 _CORNER = re.compile(rb"[-+]?[0-9]+(/([-+]?[0-9]+)?(/([-+]?[0-9]+)?)?)?\Z")
+_COMMENT = re.compile(rb"#(?<!\S#)[^\n]*")
 _BLANKS = np.zeros(256, bool)
 _BLANKS[[9, 11, 12, 13, 32]] = True
 _COLUMNS: dict[str, npt.NDArray[Any]] = {
@@ -117,7 +118,7 @@ def _blocks(data: bytes, block_bytes: int) -> Iterator[tuple[bytes, int]]:
 
 
 def text_of(raw: bytes) -> str:
-    """A name's bytes as text: UTF-8, or Latin-1 where it is none."""
+    """Decode a name as UTF-8, or as Latin-1 if it is not UTF-8."""
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
@@ -125,7 +126,7 @@ def text_of(raw: bytes) -> str:
 
 
 class _Block:
-    """One block of lines: finds words, sorts lines by statement, and parses each kind at once."""
+    """One block of lines with the positions of its words."""
 
     def __init__(self, block: bytes, first_line: int, parsed: _Parsed, reading: Reading) -> None:
         self.parsed, self.reading, self.first_line = parsed, reading, first_line
@@ -195,21 +196,19 @@ class _Block:
         start, length = self.words[first], self.word_ends[first] - self.words[first]
         one, two = self.bytes[start], self.bytes[np.minimum(start + 1, len(self.bytes) - 1)]
         short, pair = length == 1, length == 2
-        found = np.full(len(used), 9, np.int8)
-        found[short & (one == ord("v"))] = 0
-        found[pair & (one == ord("v")) & (two == ord("t"))] = 1
-        found[pair & (one == ord("v")) & (two == ord("n"))] = 2
-        found[short & (one == ord("f"))] = 3
-        for place in np.flatnonzero(found == 9):
-            found[place] = self._other(int(used[place]))
-        kinds[used] = found
+        kind_of = np.full(len(used), 9, np.int8)
+        kind_of[short & (one == ord("v"))] = 0
+        kind_of[pair & (one == ord("v")) & (two == ord("t"))] = 1
+        kind_of[pair & (one == ord("v")) & (two == ord("n"))] = 2
+        kind_of[short & (one == ord("f"))] = 3
+        for place in np.flatnonzero(kind_of == 9):
+            kind_of[place] = self._other(int(used[place]))
+        kinds[used] = kind_of
         return kinds
 
     def _other(self, row: int) -> int:
-        """A line that is neither vertex nor face: 4 where it changes the state, else -1 with a warning where needed."""
-        start = self.words[self.first_word[row]]
-        end = self.word_ends[self.first_word[row]]
-        word = self.block[start:end]
+        """The kind of a line that is neither vertex nor face: 4 if it changes the state, else -1."""
+        word = self._statement(row)
         if word in _STATES:
             return 4
         if word == b"mtllib":
@@ -221,6 +220,10 @@ class _Block:
             name = shown(text_of(word), 30)
             self.reading.warn("RG331", name, f"unknown statement '{name}' is left out", line=self.line(row))
         return -1
+
+    def _statement(self, row: int) -> bytes:
+        first = self.first_word[row]
+        return self.block[self.words[first] : self.word_ends[first]]
 
     def _rest(self, row: int) -> bytes:
         end = self.starts[row] + self.lengths[row]
@@ -244,14 +247,12 @@ class _Block:
             text = text.replace(b"/", b" ")
         return text
 
-    def _parse(
-        self, text: bytes, kind: type[np.float64] | type[np.int64], count: int
-    ) -> npt.NDArray[np.generic] | None:
-        """The numbers in a text, or None where it holds something else or another number of them."""
+    def _parse(self, text: bytes, kind: type[np.float64 | np.int64], count: int) -> npt.NDArray[Any] | None:
+        """The numbers in a text, or None if it contains anything else or another number of them."""
         with warnings.catch_warnings():
             warnings.simplefilter("error", DeprecationWarning)
             try:
-                values: npt.NDArray[np.generic] = np.fromstring(text, kind, sep=" ")
+                values: npt.NDArray[Any] = np.fromstring(text, kind, sep=" ")
             except (DeprecationWarning, ValueError):
                 return None
         return values if len(values) == count else None
@@ -260,17 +261,18 @@ class _Block:
         """Arguments of lines as finite numbers, how many each line has, and where each line's first is."""
         counts = self.word_counts[rows] - 1
         for row in rows[(counts < least) | (counts > most)][:1]:
-            name = text_of(self.block[self.words[self.first_word[row]] : self.word_ends[self.first_word[row]]])
             count = self.word_counts[row] - 1
-            raise self._wrong(int(row), f"'{name}' takes {least} to {most} numbers, got {count}")
+            raise self._wrong(
+                int(row), f"'{text_of(self._statement(row))}' takes {least} to {most} numbers, got {count}"
+            )
         values = self._parse(self._text(rows), np.float64, int(counts.sum()))
         if values is None:
-            row = self._first_bad(
-                rows,
-                lambda some: (
-                    self._parse(self._text(some), np.float64, int((self.word_counts[some] - 1).sum())) is not None
-                ),
-            )
+
+            def good(some: Ints) -> bool:
+                count = int((self.word_counts[some] - 1).sum())
+                return self._parse(self._text(some), np.float64, count) is not None
+
+            row = self._first_bad(rows, good)
             for word in self._rest(row).split():
                 if self._parse(word, np.float64, 1) is None:
                     raise self._wrong(row, f"'{shown(text_of(word), 30)}' is not a number")
@@ -279,11 +281,8 @@ class _Block:
         bad = ~(np.abs(values) <= FARTHEST)
         if bad.any():
             row = int(rows[np.searchsorted(at, int(np.flatnonzero(bad)[0]), side="right") - 1])
-            raise self.reading.error(
-                "RG306",
-                f"'{shown(text_of(self._rest(row)), 60)}' is not finite, or beyond {FARTHEST:g}",
-                line=self.line(row),
-            )
+            text = f"'{shown(text_of(self._rest(row)), 60)}' is not finite, or beyond {FARTHEST:g}"
+            raise self.reading.error("RG306", text, line=self.line(row))
         return values.astype(np.float64), counts, at
 
     def _first_bad(self, rows: Ints, good: Callable[[Ints], bool]) -> int:
@@ -336,25 +335,25 @@ class _Block:
     def _corners(self, faces: Ints, sizes: Ints) -> Ints:
         """Indices of every corner as written, `ABSENT` for missing ones."""
         marks = np.flatnonzero(self.bytes == ord("/"))
-        words = np.repeat(self.first_word[faces] + 1, sizes) + _within(sizes)
+        within = np.arange(int(sizes.sum())) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+        words = np.repeat(self.first_word[faces] + 1, sizes) + within
         slashes = np.searchsorted(marks, self.word_ends[words]) - np.searchsorted(marks, self.words[words])
         if int(slashes.max()) <= 2:
             values = self._parse(self._text(faces, slashes=True), np.int64, int((slashes + 1).sum()))
             if values is not None:
                 table = np.full((len(slashes), 3), ABSENT, np.int64)
                 at = np.cumsum(slashes + 1) - (slashes + 1)
-                whole = values.astype(np.int64)
-                table[:, 0] = whole[at]
-                for column in (1, 2):
+                for column in range(3):
                     has = slashes >= column
-                    table[has, column] = whole[at[has] + column]
-                table[:, 0] = np.where(table[:, 0] == ABSENT, 0, table[:, 0])
+                    table[has, column] = values[at[has] + column]
+                table[table[:, 0] == ABSENT, 0] = 0
                 return table
 
         def good(some: Ints) -> bool:
-            text = self._text(some, slashes=True)
-            between = text.translate(None, b"+-0123456789 \t\v\f\r\n") == b""
-            return between and self._parse(text, np.int64, _needed(self._text(some))) is not None
+            text, written = self._text(some, slashes=True), self._text(some)
+            count = len(written.split()) + written.count(b"/")  # with those left out between and behind slashes
+            has_only_digits = text.translate(None, b"+-0123456789 \t\v\f\r\n") == b""
+            return has_only_digits and self._parse(text, np.int64, count) is not None
 
         row = self._first_bad(faces, good)
         for word in self._rest(row).split():
@@ -367,8 +366,7 @@ class _Block:
         parsed = self.parsed
         table = [list(parsed.current)]
         for row in changes:
-            start, end = self.words[self.first_word[row]], self.word_ends[self.first_word[row]]
-            column = _STATES.index(self.block[start:end])
+            column = _STATES.index(self._statement(row))
             name = text_of(self._rest(int(row)))
             if column == 2:
                 parsed.has_smoothing = True
@@ -381,30 +379,6 @@ class _Block:
         return np.array(table, np.int64)[np.searchsorted(changes, faces)]
 
 
-def _needed(text: bytes) -> int:
-    """How many numbers the corners in a text have, those left out between and behind slashes counted."""
-    return len(text.split()) + text.count(b"/")
-
-
-def _within(sizes: Ints) -> Ints:
-    """0, 1, … within each run."""
-    total = int(sizes.sum())
-    return np.arange(total) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-
-
 def _without_comments(block: bytes) -> bytes:
     """Blank every `#` that starts a word, up to the line's end."""
-    pieces, at = [], 0
-    while True:
-        found = block.find(b"#", at)
-        if found < 0:
-            break
-        if found and block[found - 1] not in b" \t\r\n\v\f":  # part of a name
-            pieces.append(block[at : found + 1])
-            at = found + 1
-            continue
-        end = block.find(b"\n", found)
-        end = len(block) if end < 0 else end
-        pieces += [block[at:found], b" " * (end - found)]
-        at = end
-    return b"".join([*pieces, block[at:]])
+    return _COMMENT.sub(lambda comment: b" " * len(comment[0]), block)

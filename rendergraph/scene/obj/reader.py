@@ -12,7 +12,6 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from rendergraph.document import shown
 from rendergraph.projection import unit
@@ -27,11 +26,7 @@ _MOST_LIBRARIES = 256
 
 
 def read_obj(path: Path, reading: Reading) -> Scene:
-    """The scene in an OBJ file with the materials its MTL files give.
-
-    Raises:
-        InputError: the file is missing or malformed, an index out of range, a vertex not finite, or a limit passed.
-    """
+    """Read the scene in an OBJ file with the materials of its MTL files."""
     parsed = parse(reading.read(path, "scene file"), reading)
     _check_indices(parsed, reading)
     library = _libraries(parsed, reading)
@@ -39,36 +34,25 @@ def read_obj(path: Path, reading: Reading) -> Scene:
         reading.warn("RG332", "empty", "contains no face; nothing is drawn")
         return Scene(path.stem, path)
     try:
-        places, faces = triangulate(parsed.positions, parsed.corners[:, 0], parsed.sizes)
+        corners, faces = triangulate(parsed.positions, parsed.corners[:, 0], parsed.sizes)
     except ValueError as problem:
         line = int(parsed.lines[problem.args[0]])
         text = f"a concave face has more than {MOST_CORNERS} corners; cut it into smaller ones"
         raise reading.error("RG307", text, line=line) from None
-    distinct = _distinct(parsed.corners[:, 0][places])
+    a, b, c = parsed.corners[:, 0][corners].T
+    distinct = (a != b) & (b != c) & (c != a)
     if not distinct.all():
         line = int(parsed.lines[faces[np.flatnonzero(~distinct)[0]]])
         number = int((~distinct).sum())
         reading.warn("RG332", "degenerate", f"{number} triangles with a repeated corner are left out", line=line)
-        places, faces = places[distinct], faces[distinct]
-    normals, normal_of = _normals(parsed, reading)
-    return _assemble(path, parsed, library, places, faces, normals, normal_of, reading)
-
-
-def _distinct(triangles: Ints) -> npt.NDArray[np.bool_]:
-    a, b, c = triangles.T
-    result: npt.NDArray[np.bool_] = (a != b) & (b != c) & (c != a)
-    return result
+        corners, faces = corners[distinct], faces[distinct]
+    return _assemble(path, parsed, library, corners, faces, reading)
 
 
 def _check_indices(parsed: Statements, reading: Reading) -> None:
-    for column, (count, what) in enumerate(
-        (
-            (len(parsed.positions), "vertices"),
-            (len(parsed.uvs), "texture coordinates"),
-            (len(parsed.normals), "normals"),
-        )
-    ):
-        values = parsed.corners[:, column]
+    tables = (parsed.positions, "vertices"), (parsed.uvs, "texture coordinates"), (parsed.normals, "normals")
+    for column, (table, what) in enumerate(tables):
+        values, count = parsed.corners[:, column], len(table)
         wrong = ((values < 0) | (values >= count)) & (values != ABSENT)
         if wrong.any():
             corner = int(np.flatnonzero(wrong)[0])
@@ -97,7 +81,7 @@ def _libraries(parsed: Statements, reading: Reading) -> dict[str, Material]:
 
 
 def _normals(parsed: Statements, reading: Reading) -> tuple[Doubles, Ints]:
-    """Unit normals, and which one each corner has: the file's, or computed ones behind them."""
+    """Unit normals, the file's and then computed ones, and the number of the normal at each corner."""
     normals = unit(parsed.normals)
     corner_face = np.repeat(np.arange(len(parsed.sizes)), parsed.sizes)
     chosen = parsed.corners[:, 2].copy()
@@ -107,11 +91,11 @@ def _normals(parsed: Statements, reading: Reading) -> tuple[Doubles, Ints]:
         number = int(zero[np.unique(used)].sum())
         reading.warn("RG332", "normals", f"{number} normals of length zero are computed from the faces")
         chosen[(chosen != ABSENT) & zero[np.where(chosen == ABSENT, 0, chosen)]] = ABSENT
-    lacking = chosen == ABSENT
-    if not lacking.any():
+    missing = chosen == ABSENT
+    if not missing.any():
         return normals, chosen
     faces = _polygon_normals(parsed)
-    corners = np.flatnonzero(lacking)
+    corners = np.flatnonzero(missing)
     face, vertex = corner_face[corners], parsed.corners[corners, 0]
     group = parsed.states[face, 2]
     flat = (group == 0) & parsed.has_smoothing
@@ -151,31 +135,35 @@ def _numbered(columns: Ints) -> Ints:
 
 
 def _assemble(
-    path: Path,
-    parsed: Statements,
-    library: dict[str, Material],
-    places: Ints,
-    faces: Ints,
-    normals: Doubles,
-    normal_of: Ints,
-    reading: Reading,
+    path: Path, parsed: Statements, library: dict[str, Material], places: Ints, faces: Ints, reading: Reading
 ) -> Scene:
-    """Objects and meshes: one for each object, group and material, in the order of first use."""
+    """Objects and meshes: one for each object, group and material, in the order of first use.
+
+    Args:
+        path: the file.
+        parsed: its statements.
+        library: its materials.
+        places: (m, 3), rows of `parsed.corners` that are the corners of triangles.
+        faces: (m,), face of each triangle.
+        reading: of the file.
+    """
+    normals, normal_of = _normals(parsed, reading)
     states = parsed.states[faces][:, [0, 1, 3]]
     part, owners = _in_order(_numbered(states), states)
     if len(owners) > reading.limits.objects:
         raise reading.over(f"has {len(owners):,} objects", "objects")
     corners, corner_part = places.reshape(-1), np.repeat(part, 3)
     uv = parsed.corners[corners, 1]
-    key = np.stack(
-        [corner_part, parsed.corners[corners, 0], np.where(uv == ABSENT, -1, uv), normal_of[corners]], axis=1
-    )
-    vertex = _numbered(key)  # keeps the order of its first column: the vertices of a part lie behind each other
+    position, uv = parsed.corners[corners, 0], np.where(uv == ABSENT, -1, uv)
+    key = np.stack([corner_part, position, uv, normal_of[corners]], axis=1)
+    vertex = _numbered(key)  # keeps the order of its first column: the vertices of a part are neighbours
     count = int(vertex.max(initial=-1)) + 1
     if count > reading.limits.vertices:
         raise reading.over(f"has {count:,} vertices", "vertices")
     key = key[_firsts(vertex, count)]
-    columns = _Columns(parsed, key, normals, reading)
+    positions = parsed.positions[key[:, 1]].astype(np.float32)
+    uvs, colors = _uvs(parsed, key[:, 2]), _colors(parsed, key[:, 1], reading)
+    vertex_normals = normals[key[:, 3]].astype(np.float32)
     vertex_starts = np.searchsorted(key[:, 0], np.arange(len(owners) + 1))
     order = np.argsort(part, kind="stable")
     triangles = vertex.reshape(-1, 3)[order]
@@ -191,15 +179,16 @@ def _assemble(
         indices = (triangles[triangle_starts[k] : triangle_starts[k + 1]] - a).astype(np.uint32)
         name = names.unique(f"{node}#{parts_of[node]}" if parts_of[node] else node, "object")
         parts_of[node] += 1
-        meshes.append(columns.mesh(name, a, b, indices))
-        reading.warn_unmapped(name, materials[word][1], meshes[-1])
+        part_uvs, part_colors = _given(uvs, a, b, 0.0), _given(colors, a, b, 1.0)
+        mesh = Mesh(name, positions[a:b], indices, vertex_normals[a:b], None, part_uvs, colors=part_colors)
+        meshes.append(mesh)
+        reading.warn_unmapped(name, materials[word][1], mesh)
         objects.append(Object(name, k, materials[word][0], np.eye(4), casts, hidden, node))
-    listed = tuple(material for _, material in materials.values())
-    return Scene(path.stem, path, tuple(objects), tuple(meshes), listed, warnings=reading.warnings)
+    return Scene(path.stem, path, tuple(objects), tuple(meshes), tuple(m for _, m in materials.values()))
 
 
 def _firsts(numbers: Ints, count: int) -> Ints:
-    """Where each number stands first."""
+    """The first position of each number."""
     first = np.zeros(count, np.int64)
     first[numbers[::-1]] = np.arange(len(numbers) - 1, -1, -1)  # of equal targets the last assignment stays
     return first
@@ -215,9 +204,9 @@ def _in_order(part: Ints, states: Ints) -> tuple[Ints, Ints]:
 
 
 def _owners(parsed: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
-    """For each part its node's name, whether it is hidden, and whether it casts shadows.
+    """For each part the name of its node, whether it is hidden, and whether it casts shadows.
 
-    The name is the object's, or the group's where there is no object; an object of several groups gives `object/group`.
+    The name is the object's, or the group's if there is no object; an object of several groups gives `object/group`.
     """
     groups: dict[int, set[int]] = {}
     for number, group in {(int(row[0]), int(row[1])) for row in owners}:
@@ -225,10 +214,10 @@ def _owners(parsed: Statements, owners: Ints) -> list[tuple[str, bool, bool]]:
     result = []
     for number, group, _ in owners.tolist():
         words = [printable(parsed.names[0][number]), printable(parsed.names[1][group])]
-        given = [word for word in words if word]
-        node = words[0] if words[0] and len(groups[number]) == 1 else "/".join(given)
-        casts = not any(word.endswith("NS") for word in given)
-        result.append((node or "object", "ShadowPlaneNS" in given, casts))
+        present = [word for word in words if word]
+        node = words[0] if words[0] and len(groups[number]) == 1 else "/".join(present)
+        casts = not any(word.endswith("NS") for word in present)
+        result.append((node or "object", "ShadowPlaneNS" in present, casts))
     return result
 
 
@@ -236,37 +225,33 @@ def _material(word: str, library: dict[str, Material], parsed: Statements, readi
     if printable(word) in library:
         return library[printable(word)]
     if word:
-        kind = f"usemtl {word}" if parsed.libraries else "usemtl"  # where none is named, once for all
+        kind = f"usemtl {word}" if parsed.libraries else "usemtl"  # once for all if no library is named
         text = f"material '{shown(word)}' is in no material library; it is the default one"
         reading.warn("RG330", kind, text)
     return Material(printable(word) or _DEFAULT, base_color=(0.8, 0.8, 0.8, 1.0))
 
 
-class _Columns:
-    """The attributes of all vertices, to be cut into meshes; NaN where a vertex lacks one."""
+def _uvs(parsed: Statements, uv: Ints) -> Floats | None:
+    """Texture coordinates of all vertices, v downwards; NaN for a vertex without."""
+    if not (uv >= 0).any():
+        return None
+    uvs: Floats = (parsed.uvs[uv] * (1, -1) + (0, 1)).astype(np.float32)
+    uvs[uv < 0] = np.nan
+    return uvs
 
-    def __init__(self, parsed: Statements, key: Ints, normals: Doubles, reading: Reading) -> None:
-        place, uv, normal = key[:, 1], key[:, 2], key[:, 3]
-        self.positions = parsed.positions[place].astype(np.float32)
-        self.normals = normals[normal].astype(np.float32)
-        self.uvs: Floats | None = None
-        self.colors: Floats | None = None
-        if (uv >= 0).any():
-            self.uvs = (parsed.uvs[uv] * (1, -1) + (0, 1)).astype(np.float32)
-            self.uvs[uv < 0] = np.nan
-        if not np.isnan(parsed.colors).all():
-            colors = parsed.colors[place]
-            if ((colors < 0) | (colors > 1)).any():
-                reading.warn("RG332", "colors", "vertex colours outside 0 to 1 are clamped")
-            self.colors = np.ones((len(place), 4), np.float32)
-            self.colors[:, :3] = np.clip(colors, 0, 1)
 
-    def mesh(self, name: str, a: int, b: int, indices: npt.NDArray[np.uint32]) -> Mesh:
-        """The mesh of vertices a to b; corners without texture coordinates have (0, 0), without colour white."""
-        uvs = None if self.uvs is None or np.isnan(self.uvs[a:b]).all() else np.nan_to_num(self.uvs[a:b])
-        colors = (
-            None
-            if self.colors is None or np.isnan(self.colors[a:b, :3]).all()
-            else np.nan_to_num(self.colors[a:b], nan=1.0)
-        )
-        return Mesh(name, self.positions[a:b], indices, self.normals[a:b], None, uvs, colors=colors)
+def _colors(parsed: Statements, position: Ints, reading: Reading) -> Floats | None:
+    if np.isnan(parsed.colors).all():
+        return None
+    colors = np.ones((len(position), 4), np.float32)
+    colors[:, :3] = np.clip(parsed.colors[position], 0, 1)
+    if ((parsed.colors[position] < 0) | (parsed.colors[position] > 1)).any():
+        reading.warn("RG332", "colors", "vertex colours outside 0 to 1 are clamped")
+    return colors
+
+
+def _given(values: Floats | None, a: int, b: int, fill: float) -> Floats | None:
+    """The rows of a part with NaN filled; None if all of it is NaN."""
+    if values is None or np.isnan(values[a:b, :2]).all():
+        return None
+    return np.nan_to_num(values[a:b], nan=fill)
