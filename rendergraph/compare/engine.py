@@ -27,13 +27,11 @@ from rendergraph.errors import InputError, Problem, UsageError
 from rendergraph.farm.bundle import make_bundle
 from rendergraph.metrics import check_sizes
 from rendergraph.session.pipeline import Pipeline, load, loaded
-from rendergraph.session.progress import Progress, shown
+from rendergraph.session.progress import shown
 from rendergraph.stamps import track_reads
 
 if TYPE_CHECKING:
-    from rendergraph.farm.executors import ExecutorChoice
     from rendergraph.link import Graph
-    from rendergraph.session.gpu import Gpu
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,26 +90,19 @@ class Sweep:
 def compare(
     pipelines: Sequence[Pipeline | str | Path] | Pipeline | str | Path,
     reference: Path | Pipeline | str | None = None,
+    options: SweepOptions = SweepOptions(frames=10),
     *,
-    metric: str | None = None,
     names: Sequence[str] = (),
-    frames: int = 10,
-    frame: int = 1,
-    session: Gpu | None = None,
-    device: int | None = None,
-    progress: Progress | bool | None = None,
-    executor: ExecutorChoice = "serial",
-    devices: Sequence[int] = (),
-    timeout: float | None = None,
+    **settings: Any,
 ) -> Comparison:
     """Render pipelines with one scene, one camera and at one size, and compare the pictures.
 
     Args:
         pipelines: the pipelines, also by their names or files; all use the scene and size of the first one.
         reference: a picture file or another pipeline, also by its name; the first of `pipelines` by default.
+        options: how to render and measure; in this process, the default, the pipelines take turns.
         names: of the pipelines; those of their files by default.
-        frames: number of measured frames of each; in this process the pipelines take turns.
-        metric, frame, session, device, progress, executor, devices, timeout: see `SweepOptions`.
+        settings: attributes of `SweepOptions` by name: `frames=20, metric="ao.occlusion"`.
 
     Raises:
         UsageError: there is nothing to compare.
@@ -119,33 +110,21 @@ def compare(
         RenderError: rendering failed.
         DeviceError: there is no usable GL device.
     """
+    options = options.replace(**settings)
+    options = options.replace(executor=options.executor or "serial")
     if isinstance(pipelines, (Pipeline, str, Path)):
         pipelines = [pipelines]
     if not pipelines:
         raise UsageError(Problem("RG500", "there is no pipeline to compare"))
-    options = SweepOptions(
-        metric=metric,
-        frames=frames,
-        frame=frame,
-        session=session,
-        device=device,
-        progress=progress,
-        executor=executor or "serial",
-        devices=devices,
-        timeout=timeout,
-    )
     given, reference = [loaded(each) for each in pipelines], named_reference(reference)
     catalogs = [each.catalog for each in (*given, reference) if isinstance(each, Pipeline)]
     with track_reads() as files:
         if isinstance(reference, Pipeline):
-            reference = measured_at(reference, metric)
-        prepared = prepare_variants([measured_at(each, metric) for each in given], reference, options, names)
+            reference = measured_at(reference, options.metric)
+        prepared = prepare_variants([measured_at(each, options.metric) for each in given], reference, options, names)
     runner = Runner(prepared, options)
     travels = all(catalog is None for catalog in catalogs)
-    with (
-        options.open_executor(len(given), travels=travels) as farm,
-        shown(progress, "steps") as report,
-    ):
+    with options.open_executor(len(given), travels=travels) as farm, shown(options.progress, "steps") as report:
         farm.upload_inputs(lambda: make_bundle(files, given[0].selection.plugins, prepared.modules))
         runner.execute(farm, report)
     runs = [*prepared.runs, *([prepared.other] if prepared.other else [])]

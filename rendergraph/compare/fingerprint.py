@@ -7,24 +7,24 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterator
-from functools import lru_cache, partial
+from functools import partial
 from importlib.util import resolve_name
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rendergraph.errors import InputError
 from rendergraph.program import stage_texts, text_key
-from rendergraph.stamps import FileCache
+from rendergraph.stamps import FileCache, record_read
 from rendergraph.version import __version__
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from rendergraph.link import Graph
     from rendergraph.session.values import Expanded, Planned
 
 _BUILTIN = "rendergraph.nodes"
 _TEXTS: FileCache[str] = FileCache()
+_DIGESTS: FileCache[str] = FileCache(4096)
+_IMPORTS: FileCache[list[str]] = FileCache(4096)
 
 
 def run_key(planned: Planned, frame: int, reference: str) -> str:
@@ -60,17 +60,16 @@ def sources_digest(expanded: Expanded) -> str:
 
 def file_digest(path: Path) -> str:
     """Return the SHA-256 of a file's content, empty if it cannot be read."""
+    return _DIGESTS.get(path, partial(_read_digest, path))
+
+
+def _read_digest(path: Path) -> str:
+    record_read(path)
     try:
-        status = path.stat()
-        return _read_digest(path, status.st_mtime_ns, status.st_size)
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ""
-
-
-@lru_cache(maxsize=4096)
-def _read_digest(path: Path, modified_ns: int, size: int) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _shader_texts(expanded: Expanded) -> Iterator[str]:
@@ -106,30 +105,22 @@ def _module_digests(name: str, seen: set[str]) -> Iterator[str]:
     waiting = [name]
     while waiting:
         module = sys.modules.get(waiting.pop())
-        file = getattr(module, "__file__", None)
-        if module is None or file is None or module.__name__ in seen:
+        if module is None or not module.__file__ or module.__name__ in seen:
             continue
         seen.add(module.__name__)
-        yield file_digest(Path(file))
-        waiting += [other for other in _imports(module) if other == package or other.startswith(f"{package}.")]
+        file = Path(module.__file__)
+        yield file_digest(file)
+        imports = _IMPORTS.get(file, partial(_imported_names, file, module.__package__ or ""))
+        waiting += [other for other in imports if other == package or other.startswith(f"{package}.")]
 
 
-def _imports(module: ModuleType) -> tuple[str, ...]:
-    file = Path(str(module.__file__))
-    try:
-        status = file.stat()
-    except OSError:
-        return ()
-    return _imported_names(file, module.__package__ or "", status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=4096)
-def _imported_names(file: Path, package: str, modified_ns: int, size: int) -> tuple[str, ...]:
+def _imported_names(file: Path, package: str) -> list[str]:
     """Return the absolute names that a module's imports may mean."""
+    record_read(file)
     try:
         tree = ast.parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError):
-        return ()
+        return []
     names: list[str] = []
     for statement in ast.walk(tree):
         if isinstance(statement, ast.Import):
@@ -139,4 +130,4 @@ def _imported_names(file: Path, package: str, modified_ns: int, size: int) -> tu
             if statement.level:
                 base = resolve_name("." * statement.level + base, package)
             names += [base, *(f"{base}.{alias.name}" for alias in statement.names)]
-    return tuple(names)
+    return names

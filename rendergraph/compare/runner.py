@@ -54,13 +54,7 @@ class Runner:
         return [number for number in range(len(self.prepared.runs)) if number not in self.results]
 
     def execute(self, farm: Executor, progress: Callable[[int, int], None]) -> None:
-        """Render and measure all runs that are missing.
-
-        Raises:
-            InputError: what runs are measured against cannot be rendered.
-            RenderError: likewise, or results cannot be written, or the cluster is gone.
-            DeviceError: there is no usable GL device.
-        """
+        """Render and measure all runs that are missing."""
         self._waiting = self._groups(self.missing, farm.workers)
         if self.reference is not None:
             self._distribute(farm, self.reference)
@@ -152,18 +146,7 @@ class Runner:
     def _rendered(self, output: RenderedResult) -> None:
         run = self.prepared.runs[output.number]
         self.device = output.device
-        self.results[output.number] = Result.of(
-            run.name,
-            run.planned,
-            pixels=output.pixels,
-            encoding=self.prepared.encoding,
-            metrics=output.metrics,
-            settings=run.settings,
-            radiance_rmse=output.radiance_rmse,
-            flip_map=output.flip_map,
-            not_finite=output.not_finite,
-            figures=output.figures,
-        )
+        self.results[output.number] = Result.of(run.name, run.planned, settings=run.settings, **output.measured)
 
     def _timed(self, output: TimingResult, worker: str) -> None:
         self.results[output.number] = replace(self.results[output.number], times=output.times)

@@ -37,6 +37,8 @@ _LOCK = ".lock"
 _VALUES = "resolved"
 """The resolved file without the axes; messages describe the other entries of a study."""
 
+_UNTIMED: Mapping[str, Any] = {"frames": 0, "frame_ms": None, "gpu_ms": None, "cpu_ms": None, "passes": []}
+
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 Count = Annotated[int, Meta(ge=0)]
 _Milliseconds = Annotated[
@@ -59,12 +61,12 @@ class RunRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     not_finite: Annotated[Count, Meta(description="Pixels that are NaN or infinite.")]
     figures: Annotated[dict[str, Any], Meta(description="Outputs of one texel: a number, or one a channel.")] = {}
     plugin_metrics: Annotated[dict[str, float | None], Meta(description="Metrics of plugins.")] = {}
-    frames: Annotated[Count, Meta(description="Measured frames.")] = 0
-    frame_ms: _Milliseconds = None
-    gpu_ms: _Milliseconds = None
-    cpu_ms: _Milliseconds = None
+    frames: Annotated[Count, Meta(description="Measured frames.")]
+    frame_ms: _Milliseconds
+    gpu_ms: _Milliseconds
+    cpu_ms: _Milliseconds
     repeats: Annotated[tuple[float, ...], Meta(description="The median of each measurement, in ms.")] = ()
-    passes: Annotated[tuple[PassTime, ...], Meta(description="Each pass, in order of execution.")] = ()
+    passes: Annotated[tuple[PassTime, ...], Meta(description="Each pass, in order of execution.")]
     pass_count: Annotated[Count, Meta(description="Number of passes.")]
     memory: Annotated[
         dict[str, Any], Meta(description="As `plan` prints it.", extra_json_schema={"required": ["allocated_bytes"]})
@@ -97,11 +99,6 @@ class RunRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class _Line(RunRecord, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A measured run."""
 
-    frames: Annotated[int, Meta(ge=1, description="Measured frames.")]
-    frame_ms: _Milliseconds
-    gpu_ms: _Milliseconds
-    cpu_ms: _Milliseconds
-    passes: Annotated[tuple[PassTime, ...], Meta(description="Each pass, in order of execution.")]
     sha256: Annotated[Digest, Meta(description="Of the rest of the line, as JSON with sorted keys and no blanks.")]
 
 
@@ -132,13 +129,7 @@ def line_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Failure:
-    """A run that could not be rendered or compared.
-
-    Attributes:
-        name: of the run.
-        settings: path to value.
-        problems: the reasons.
-    """
+    """A run that could not be rendered or compared, and the reasons."""
 
     name: str
     settings: Mapping[str, str]
@@ -176,11 +167,7 @@ class ResultsLog:
         return {record["key"]: record for record in records if "key" in record}, incomplete
 
     def append(self, record: Mapping[str, Any]) -> None:
-        """Add a record; it is on the disk when this returns.
-
-        Raises:
-            RenderError: it cannot be written.
-        """
+        """Add a record; it is on the disk when this returns."""
         line = json.dumps({**record, CHECKSUM: checksum(record)}, ensure_ascii=False) + "\n"
         try:
             new = not self.path.exists()
@@ -224,11 +211,6 @@ def _write_error(path: Path, text: str, error: OSError) -> RenderError:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder of results, if it does not exist.
-
-    Raises:
-        RenderError: it cannot be made.
-    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -245,13 +227,7 @@ def _write_json(path: Path, document: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """A folder with the results of a sweep.
-
-    Attributes:
-        path: of the folder.
-        lines: the results that it had when it was opened, by key.
-        incomplete: number of lines that were not complete.
-    """
+    """A folder with the lines of the results that it had when it was opened, and the number of incomplete ones."""
 
     path: Path
     lines: Mapping[str, dict[str, Any]]
@@ -259,11 +235,7 @@ class SweepFolder:
 
     @classmethod
     def open(cls, path: Path, study: Mapping[str, Any], *, resume: bool) -> SweepFolder:
-        """Open a locked folder; what a killed sweep was about to write is removed.
-
-        Raises:
-            InputError: it has results already, or those of another study.
-        """
+        """Open a locked folder, and remove what a killed sweep was about to write."""
         check_folder(path, study, resume=resume)
         for part in (*path.glob(".*.part"), *path.glob("*/.*.part")):
             part.unlink(missing_ok=True)
@@ -276,17 +248,13 @@ class SweepFolder:
     def keep(
         self, run: Run, result: Result, picture: bytes, device: Mapping[str, object], machine: Mapping[str, str]
     ) -> RunRecord:
-        """Write a run's picture and its `run.json`, still without times, and return the record.
-
-        Raises:
-            RenderError: they cannot be written.
-        """
+        """Write a run's picture and its `run.json`, still without times, and return the record."""
         make_folder(run.folder)
         write_file(run.picture, picture)
-        figures = {key: value for key, value in result.as_json().items() if key not in Times.__struct_fields__}
         document = {
             "key": run.key,
-            **figures,
+            **result.as_json(),
+            **_UNTIMED,
             "picture": f"{run.folder.name}/{run.picture.name}",
             "picture_sha256": hashlib.sha256(picture).hexdigest(),
             "size": run.planned.linked.graph.size,
@@ -298,11 +266,7 @@ class SweepFolder:
         return record
 
     def write(self, run: Run, record: RunRecord) -> None:
-        """Write a measured run's `run.json` and its line in the results; remove a picture that is not kept.
-
-        Raises:
-            RenderError: they cannot be written.
-        """
+        """Write a measured run's `run.json` and its line in the results; remove a picture that is not kept."""
         _describe(run, record)
         self.append(record.as_json())
         if record.picture is None:
@@ -315,11 +279,7 @@ class SweepFolder:
         ResultsLog(self.path / RESULTS).append(record)
 
     def fail(self, run: Run, problems: Sequence[Problem]) -> Failure:
-        """Write the line of a run that cannot be rendered, unless the last one has the same reason.
-
-        Raises:
-            RenderError: it cannot be written.
-        """
+        """Write the line of a run that cannot be rendered, unless the last one has the same reason."""
         failure = Failure(run.name, run.settings, tuple(problems))
         if self.lines.get(run.key, {}).get("error") != failure.text:
             source = run.planned.linked.selection.source
@@ -336,10 +296,7 @@ def _describe(run: Run, record: RunRecord) -> None:
 def find_record(run: Run, lines: Mapping[str, dict[str, Any]], *, pictures: bool) -> RunRecord | None:
     """Return the record of a run that the folder has, None if it is missing or its picture has changed.
 
-    Args:
-        run: the run.
-        lines: of the results, by key; a run that was rendered and not measured has only its `run.json`.
-        pictures: whether its picture, which may not have been kept, must exist.
+    A run that was rendered and not measured has no line, only its `run.json`. With `pictures`, the picture must exist.
     """
     line = lines.get(run.key)
     document = line if line is not None and "error" not in line else _run_document(run)

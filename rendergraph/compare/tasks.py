@@ -26,7 +26,7 @@ from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.farm import Handle, Task, Worker
 from rendergraph.farm.bundle import map_remote_paths, relocate_selection
 from rendergraph.farm.tasks import is_retryable
-from rendergraph.metrics import Encoding, Metrics
+from rendergraph.metrics import Encoding
 from rendergraph.session import stages
 from rendergraph.session.frame import figures_of
 from rendergraph.session.pipeline import Pipeline
@@ -48,15 +48,11 @@ class RunSpec:
     """A run as a worker needs it.
 
     Attributes:
-        number: of the run.
-        name: of the run.
-        selection: the pipeline.
         digest: of what the picture depends on, as it was when the work began.
-        output: the compared output.
         extension: of the picture's file.
         metadata: of the picture.
-        is_rendered: its picture is there already; only times are needed.
-        planned: the pipeline itself, where the worker is the process that made it.
+        is_rendered: its picture exists already; only times are needed.
+        planned: the pipeline, where the worker is the process that planned it.
     """
 
     number: int
@@ -112,15 +108,10 @@ class ReferenceResult:
 
 @dataclass(frozen=True, eq=False)
 class RenderedResult:
-    """A run has been rendered and compared; the fields are those of a `Result`, and the picture's file."""
+    """A run has been rendered and compared: fields of its `Result`, and the picture's file."""
 
     number: int
-    pixels: Pixels
-    metrics: Metrics
-    flip_map: Pixels | None
-    radiance_rmse: float | None
-    not_finite: int
-    figures: Mapping[str, float | list[float]]
+    measured: Mapping[str, Any]
     picture: bytes
     device: Mapping[str, object]
     machine: Mapping[str, str]
@@ -167,13 +158,7 @@ TaskEvent: TypeAlias = "ReferenceResult | RenderedResult | TimingResult | Differ
 class VariantTask(Task):
     """Runs that are rendered together; passes that they share are executed once.
 
-    Attributes:
-        runs: with the same scene, camera and size.
-        reference: what they are measured against; None if it is the first run.
-        encoding: of the compared output.
-        frame: number of the compared frame.
-        frames, repeats: number of measured frames, and of measurements.
-        most_bytes: memory limit for the textures of a batch.
+    They have the same scene, camera and size. Without a `reference` they are measured against the first one.
     """
 
     runs: tuple[RunSpec, ...]
@@ -194,12 +179,7 @@ class VariantTask(Task):
         return () if self.reference is None else (self.reference,)
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
-        """Yield each run's picture, then its times, batch after batch.
-
-        Raises:
-            InputError: the first run, which others are measured against, cannot be rendered.
-            RenderError: likewise, or the worker lacks memory or its device.
-        """
+        """Yield each run's picture, then its times, batch after batch; a faulty run ends only itself."""
         runs: list[tuple[RunSpec, Planned]] = []
         for run in self.runs:
             try:
@@ -253,21 +233,12 @@ class VariantTask(Task):
 
 @dataclass(frozen=True, eq=False)
 class ComparisonTask(VariantTask):
-    """Runs of any structure, each rendered by itself; they are measured in turns, and compared pass by pass.
-
-    Attributes:
-        base: the run that they are compared with in structure.
-    """
+    """Runs of any structure, each rendered by itself; they take turns in measuring, and are compared with a base."""
 
     base: RunSpec
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
-        """Yield each run's picture, then its times, then its first difference.
-
-        Raises:
-            InputError: a run cannot be rendered or compared.
-            RenderError: likewise, or the worker lacks memory or its device.
-        """
+        """Yield the pictures of all runs, then their times, then their first differences."""
         gpu = worker.gpu
         planned = [run.plan(worker) for run in self.runs]
         reference: Reference | None = worker.value(self.reference) if self.reference is not None else None
@@ -338,20 +309,18 @@ def _rendered(
     warnings: tuple[Problem, ...] = (),
 ) -> RenderedResult:
     graph, pixels = planned.linked.graph, arrays[run.output]
-    figures, flip_map = measure_against(pixels, reference, run.name, planned.linked.catalog.extensions.metrics())
-    return RenderedResult(
-        number=run.number,
-        pixels=pixels,
-        metrics=figures,
-        flip_map=flip_map,
-        radiance_rmse=light_error(arrays.get("radiance"), reference.light),
-        not_finite=not_finite_pixels(graph, arrays),
-        figures=figures_of(arrays),
-        picture=_encoded(run, graph, pixels) if encode else b"",
-        device=device,
-        machine=_machine(worker),
-        warnings=warnings,
-    )
+    errors, flip_map = measure_against(pixels, reference, run.name, planned.linked.catalog.extensions.metrics())
+    measured = {
+        "pixels": pixels,
+        "encoding": reference.encoding,
+        "metrics": errors,
+        "flip_map": flip_map,
+        "radiance_rmse": light_error(arrays.get("radiance"), reference.light),
+        "not_finite": not_finite_pixels(graph, arrays),
+        "figures": figures_of(arrays),
+    }
+    picture = _encoded(run, graph, pixels) if encode else b""
+    return RenderedResult(run.number, measured, picture, device, _machine(worker), warnings)
 
 
 def _encoded(run: RunSpec, graph: Graph, pixels: Pixels) -> bytes:
