@@ -1,9 +1,9 @@
-"""For people who write nodes: starting one from a template, and checking one in a process of its own."""
+"""Tools for plugin authors: start a node from a template, and check one in a process of its own."""
 
 from __future__ import annotations
 
-from rendergraph.authoring.new import KINDS, NewNode, new_node
+from rendergraph.authoring.check_process import CheckLimits, check_node
 from rendergraph.authoring.report import Report
-from rendergraph.authoring.supervise import CheckLimits, check_node
+from rendergraph.authoring.scaffold import KINDS, NewNode, new_node
 
 __all__ = ["KINDS", "CheckLimits", "NewNode", "Report", "check_node", "new_node"]

@@ -1,40 +1,42 @@
-"""Everything `check-node` looks at, one after the other; runs in the child, and in this project's own tests."""
+"""Everything that `check-node` examines: declarations without GL, then every variant with it.
+
+Runs in the child process of a check, and in this project's own tests.
+"""
 
 from __future__ import annotations
 
+import re
+import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
+from types import FunctionType, MethodType
 from typing import Literal
 
-from rendergraph.authoring import declarations
+from msgspec.structs import asdict
+
+from rendergraph.authoring.node_check import SCENE, NodeCheck
 from rendergraph.authoring.report import Report
-from rendergraph.authoring.trial import SCENE, Trial
 from rendergraph.authoring.variants import variants
 from rendergraph.catalog import Catalog, NodeType
+from rendergraph.catalog.types import shared_includes
+from rendergraph.declare import Function, Input, Node, Views, WrittenPort
 from rendergraph.declare.blame import declaration_of
 from rendergraph.errors import InputError, Problem, shown_file
+from rendergraph.glsl import expand, read_text, strip_comments
 
-Tell = Callable[[str, str], None]
-"""Called with the stage, `import` or `pass`, and what is about to be done."""
+LONGEST_DOC = 160
+OnStage = Callable[[str, str], None]
+"""Called with the stage, `import` or `pass`, and the file or variant that comes next."""
 
 
-def examine_file(file: Path, plugins: Sequence[Path], scene: str | None, tell: Tell) -> Report:
-    """Find the node of a file and examine it.
-
-    Raises:
-        InputError: there is none, or it cannot be loaded.
-    """
-    tell("import", shown_file(file))
-    return examine(find_node(file, plugins), scene or SCENE, tell)
+def examine_file(file: Path, plugins: Sequence[Path], scene: str | None, on_stage: OnStage) -> Report:
+    on_stage("import", shown_file(file))
+    return examine(find_node(file, plugins), scene or SCENE, on_stage)
 
 
 def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
-    """The type that a file makes: one of an installed package, of a plugin's folders, or one by itself.
-
-    Raises:
-        InputError: there is none, or it cannot be loaded.
-    """
+    """Return the type that a file defines: of an installed package, of a plugin's folders, or by itself."""
     file = file.resolve()
     catalog = Catalog.discover(plugins)
     if file.stem in catalog:
@@ -50,56 +52,103 @@ def find_node(file: Path, plugins: Sequence[Path] = ()) -> NodeType:
         return Catalog.discover(named, installed=False).get(file.stem)  # the installed one is an older copy of it
 
 
-def examine(node: NodeType, scene: str = SCENE, tell: Tell = lambda stage, what: None) -> Report:
-    """Examine a type in every variant.
-
-    Raises:
-        DeviceError: there is no usable GL device.
-    """
-    problems = _declared(node)
-    with tempfile.TemporaryDirectory() as folder:
-        tell("pass", "default")
-        trial = Trial(node, Path(folder), scene)
-        trial.check_scene()
-        for variant in variants(node.cls):
-            tell("pass", variant.name or "default")
-            trial.run(variant)
-        problems += _drawn(node, trial.close())
-    if trial.tried and not any(
-        problem.severity == "error" for problem in problems
-    ):  # what is not drawn looks at nothing
-        for name in declarations.unused(node, trial.seen, trial.files):
-            text = f"'{name}' is declared, but no program looks at it: none uses it, or it changes nothing"
-            problems.append(Problem("RG455", text, declaration_of(node.cls, node.file, name), severity=_mild(node)))
-    return Report(node.name, tuple(trial.tried), tuple(dict.fromkeys(problems)))
-
-
-def _declared(node: NodeType) -> list[Problem]:
-    """What is wrong with docs and ranges; of a shader file, what it lacks is a warning that its type has already."""
-    found = list(node.warnings)
-    for mistake in declarations.docs(node.cls) if not node.is_shader else ():
-        place = declaration_of(node.cls, node.file, mistake.subject)
-        found.append(mistake.relocate(place, context=f"node type '{node.name}'"))
-    for name in declarations.ranges(node.cls) if not node.is_shader else ():
-        text = f"parameter '{name}' does not say between which values it lies (min, max)"
-        found.append(Problem("RG460", text, declaration_of(node.cls, node.file, name), severity="warning"))
-    return found
-
-
-def _drawn(node: NodeType, found: list[Problem]) -> list[Problem]:
-    """What drawing has shown, without what a warning about discarded fragments says already."""
-    if not any(problem.code == "RG446" for problem in node.warnings):
-        return found
-    return [problem for problem in found if problem.code != "RG454"]
-
-
-def _mild(node: NodeType) -> Literal["error", "warning"]:
-    return "warning" if node.is_shader else "error"
-
-
 def _plugin_of(file: Path) -> Path:
-    """What `--plugin` would name: the folder above `nodes/` and `shaders/` where a file lies in them, else the file."""
+    """Return what `--plugin` would name: the folder above `nodes/` and `shaders/`, else the file."""
     for folder in file.parents:
         if folder.name == "nodes" and (folder.parent / "shaders").is_dir():
             return folder.parent
     return file
+
+
+def examine(node: NodeType, scene: str = SCENE, on_stage: OnStage = lambda stage, what: None) -> Report:
+    """Examine a type in every variant."""
+    severity: Literal["error", "warning"] = "warning" if node.is_shader else "error"
+    problems = [*node.warnings, *_declared(node)]
+    with tempfile.TemporaryDirectory() as folder:
+        on_stage("pass", "default")
+        check = NodeCheck(node, Path(folder), scene)
+        check.check_scene()
+        for variant in variants(node.cls):
+            on_stage("pass", variant.name or "default")
+            check.run(variant)
+        discards = any(problem.code == "RG446" for problem in node.warnings)  # that says the same as RG454
+        problems += [problem for problem in check.close() if not (discards and problem.code == "RG454")]
+    if check.tried and not any(problem.severity == "error" for problem in problems):  # else nothing may have run
+        for name in _unused(node, check.active, check.files):
+            text = f"'{name}' is declared, but no shader program uses it, or it has no effect there"
+            problems.append(Problem("RG455", text, declaration_of(node.cls, node.file, name), severity=severity))
+    return Report(node.name, tuple(check.tried), tuple(dict.fromkeys(problems)))
+
+
+def _declared(node: NodeType) -> Iterator[Problem]:
+    if node.is_shader:
+        return
+    for problem in doc_problems(node.cls):
+        place = declaration_of(node.cls, node.file, problem.subject)
+        yield problem.relocate(place, context=f"node type '{node.name}'")
+    for name, parameter in node.cls.parameters().items():
+        if parameter.type in (int, float) and None in (parameter.limits.low, parameter.limits.high):
+            text = f"parameter '{name}' has no range; declare min and max"
+            yield Problem("RG460", text, declaration_of(node.cls, node.file, name), severity="warning")
+
+
+def doc_problems(cls: type[Node]) -> Iterator[Problem]:
+    """Yield what is wrong with the docs of a class, its ports and parameters: each is one line that ends in a stop."""
+    first = (cls.__doc__ or "").strip().partition("\n")[0]
+    if not first:
+        yield Problem("RG490", "has no docs")
+    elif not first.endswith("."):
+        yield Problem("RG490", "the first line of its docs must be a sentence that ends in '.'")
+    docs = {
+        name: port.doc
+        for name, port in cls.ports().items()
+        if isinstance(port, Input | WrittenPort | Function | Views)
+        and (port.doc or name in {*cls.inputs(), *cls.outputs()})
+    }
+    docs |= {name: parameter.doc for name, parameter in cls.parameters().items()}
+    for name, doc in docs.items():
+        if not doc:
+            yield Problem("RG490", f"'{name}' has no doc", subject=name)
+        elif not doc.endswith("."):
+            yield Problem("RG490", f"the doc of '{name}' must be a sentence that ends in '.'", subject=name)
+        elif len(doc) >= LONGEST_DOC:
+            text = f"the doc of '{name}' has {len(doc)} characters; expected less than {LONGEST_DOC}"
+            yield Problem("RG490", text, subject=name)
+
+
+def _unused(node: NodeType, active: Collection[str], files: Iterable[Path]) -> Iterator[str]:
+    """Yield inputs and parameters that no program (`active`), no shader file and no Python code uses."""
+    text = _python_text(node)
+    shaders = "".join(_shader_text(file, node.inherited) for file in files)
+    cls = node.cls
+    for name, parameter in cls.parameters().items():
+        symbol = name.upper() if parameter.role == "define" else name
+        in_shader = name in active if parameter.role == "param" else bool(re.search(rf"\b{symbol}(_\w+)?\b", shaders))
+        if not in_shader and not re.search(rf"\.{name}\b", text):
+            yield name
+    for name, port in cls.inputs().items():
+        if isinstance(port, Input) and port.kind in ("view", "function"):
+            continue
+        in_program = name in active or any(re.fullmatch(rf"{name}_\d+", other) for other in active)
+        not_sampled = getattr(port, "use", "sample") != "sample" or not isinstance(port, Input)
+        if not in_program and not not_sampled and not re.search(rf"\.{name}\b", text):
+            yield name
+
+
+def _shader_text(file: Path, inherited: tuple[Path, ...]) -> str:
+    if not file.is_file():
+        return ""
+    origins = expand(file, shared_includes(), root=file.parent, versions=True, inherited=inherited).origins
+    files = dict.fromkeys(origin.file for origin in origins if origin.file is not None)
+    return "\n".join(strip_comments(read_text(one)) for one in files)  # `#include <CURVE>` with them
+
+
+def _python_text(node: NodeType) -> str:
+    """Return the modules of the node, of those that it extends, and of the rules of its ports."""
+    if node.is_shader:
+        return ""
+    modules = {cls.__module__ for cls in node.cls.__mro__ if issubclass(cls, Node) and cls is not Node}
+    values = [value for port in node.cls.ports().values() for value in asdict(port).values()]
+    modules |= {rule.__module__ for rule in values if isinstance(rule, FunctionType | MethodType)}
+    files = {Path(sys.modules[module].__file__ or "") for module in modules}
+    return "".join(file.read_text(encoding="utf-8", errors="replace") for file in files)

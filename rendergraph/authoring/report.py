@@ -1,4 +1,4 @@
-"""What a check finds."""
+"""The result of a check, for the process that runs it and for its parent."""
 
 from __future__ import annotations
 
@@ -9,13 +9,7 @@ from rendergraph.errors import Problem
 
 @dataclass(frozen=True)
 class Report:
-    """What was found.
-
-    Attributes:
-        node: the type's name.
-        variants: what was drawn, in order.
-        problems: mistakes and warnings.
-    """
+    """The result of a check: the type's name, the rendered variants in order, mistakes and warnings."""
 
     node: str
     variants: tuple[str, ...]
@@ -23,5 +17,4 @@ class Report:
 
     @property
     def mistakes(self) -> tuple[Problem, ...]:
-        """The problems that are no warnings."""
         return tuple(problem for problem in self.problems if problem.severity == "error")

@@ -1,4 +1,4 @@
-"""The variants of a node that are tried: the default, then one thing changed at a time."""
+"""The variants of a node that a check renders: the default, then one change at a time."""
 
 from __future__ import annotations
 
@@ -8,73 +8,63 @@ from typing import Any
 
 from rendergraph.declare import InOut, Input, Node
 
-MOST = 200
-"""Variants of one node; what has more is tried in the first of them."""
+MOST_VARIANTS = 200
+"""Of one node; further ones are not rendered."""
 
 
 @dataclass(frozen=True)
-class Variant:
-    """One way to use a node.
-
-    Attributes:
-        name: what differs from the default, for messages; empty for the default.
-        params: parameters that differ.
-        left_out: optional inputs that are not connected.
-        outputs: the outputs that somebody reads.
-        multisampled: whether inputs that take one sample a texel or several are given several.
-        end: whether it takes a number to an end of its range, where the node must do all that it does otherwise.
-    """
+class NodeVariant:
+    """One way to use a node; its name says how it differs from the default, and is empty for that."""
 
     name: str
     params: Mapping[str, Any] = field(default_factory=dict)
-    left_out: frozenset[str] = frozenset()
+    unconnected: frozenset[str] = frozenset()
     outputs: tuple[str, ...] = ()
     multisampled: bool = False
-    end: bool = False
+    is_range_end: bool = False
 
-    def without(self, cls: type[Node], inputs: Set[str]) -> Variant:
-        """The same with more inputs left out, and the outputs that need them."""
-        left_out = self.left_out | inputs
-        usable = _usable(cls, left_out)
-        return replace(self, left_out=left_out, outputs=tuple(name for name in self.outputs if name in usable))
+    def without(self, cls: type[Node], inputs: Set[str]) -> NodeVariant:
+        unconnected = self.unconnected | inputs
+        usable = _usable(cls, unconnected)
+        return replace(self, unconnected=unconnected, outputs=tuple(name for name in self.outputs if name in usable))
 
 
-def variants(cls: type[Node]) -> list[Variant]:
-    """All variants of a type: choices, switches and limits of what shapes program or plan, inputs, outputs."""
-    seen: list[Variant] = []
+def variants(cls: type[Node]) -> list[NodeVariant]:
+    seen: list[NodeVariant] = []
     for variant in _all(cls):
-        if variant.outputs and variant not in seen and len(seen) < MOST:
+        if variant.outputs and variant not in seen and len(seen) < MOST_VARIANTS:
             seen.append(variant)
     return seen
 
 
-def _all(cls: type[Node]) -> Iterator[Variant]:
+def _all(cls: type[Node]) -> Iterator[NodeVariant]:
     everything = _usable(cls, frozenset())
-    yield Variant("", outputs=everything)
-    for name, value, end in _values(cls):
+    yield NodeVariant("", outputs=everything)
+    for name, value, is_end in _values(cls):
         text = f"{name}={value}"
-        yield Variant(text.lower() if isinstance(value, bool) else text, {name: value}, outputs=everything, end=end)
+        yield NodeVariant(
+            text.lower() if isinstance(value, bool) else text, {name: value}, outputs=everything, is_range_end=is_end
+        )
     optional = [name for name, port in cls.inputs().items() if isinstance(port, Input | InOut) and port.optional]
     for name in optional:
-        yield Variant(f"without {name}", left_out=frozenset({name}), outputs=_usable(cls, frozenset({name})))
+        yield NodeVariant(f"without {name}", unconnected=frozenset({name}), outputs=_usable(cls, frozenset({name})))
     if len(optional) > 1:
-        yield Variant(
-            "without optional inputs", left_out=frozenset(optional), outputs=_usable(cls, frozenset(optional))
+        yield NodeVariant(
+            "without optional inputs", unconnected=frozenset(optional), outputs=_usable(cls, frozenset(optional))
         )
     if any(isinstance(port, Input) and port.samples == "any" for port in cls.inputs().values()):
-        yield Variant("several samples", outputs=everything, multisampled=True)
+        yield NodeVariant("several samples", outputs=everything, multisampled=True)
     if len(everything) > 1:
         for name in everything:
-            yield Variant(f"{name} alone", outputs=(name,))
+            yield NodeVariant(f"{name} alone", outputs=(name,))
 
 
-def _usable(cls: type[Node], left_out: Set[str]) -> tuple[str, ...]:
-    """The outputs that can be asked for without some inputs."""
-    return tuple(name for name, port in cls.outputs().items() if not left_out & set(getattr(port, "needs", ())))
+def _usable(cls: type[Node], unconnected: Set[str]) -> tuple[str, ...]:
+    return tuple(name for name, port in cls.outputs().items() if not unconnected & set(getattr(port, "needs", ())))
 
 
 def _values(cls: type[Node]) -> Iterator[tuple[str, Any, bool]]:
-    """Parameters that change the program or the plan, with each value to try and whether it is the end of a range."""
+    """Yield parameters that shape the program or plan, each value to try, and whether it is the end of a range."""
     for name, parameter in cls.parameters().items():
         if parameter.role == "param":
             continue

@@ -58,7 +58,7 @@ def command(
     warn(report.problems)
     count = len(report.variants)
     warnings = len(report.problems)
-    found = f"{warnings} warning{'' if warnings == 1 else 's'}, no mistake" if warnings else "all is well"
+    found = f"{warnings} warning{'' if warnings == 1 else 's'}, no mistakes" if warnings else "no problems"
     say(f"{report.node}: {found} in {count} variant{'' if count == 1 else 's'}")
     if as_json:
         emit_json(

@@ -25,18 +25,18 @@ def draw_in_parts(
         RenderError: it failed while drawing or writing.
     """
     from rendergraph import images
-    from rendergraph.farm.frames import Shown, Wanted, chunks, drawn
+    from rendergraph.farm.frames import FrameFile, RenderedFrame, render_chunks, split_frames
     from rendergraph.images.files import write_file
     from rendergraph.images.video import films, is_film
 
     said = expanded.linked.spec.tree.get("warm_up")
-    wanted = [Wanted(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
-    parts = chunks(expanded, wanted, farm.workers, None if said is None else int(said.plain()))
+    wanted = [FrameFile(t.name, "" if is_film(t.path) else t.path.suffix, t.is_tap) for t in targets]
+    chunks = split_frames(expanded, wanted, farm.workers, None if said is None else int(said.plain()))
     frames, written = expanded.options.frames, dict[int, list[str]]()
     progress, lasts, unsound = Progress(len(frames)), list["Frame"](), dict[int, Any]()
     with films([t.path for t in targets if is_film(t.path)], expanded.options.fps, frames[0]) as open_films:
-        for shown in drawn(farm, parts):
-            if not isinstance(shown, Shown):
+        for shown in render_chunks(farm, chunks):
+            if not isinstance(shown, RenderedFrame):
                 lasts.append(shown)
                 continue
             paths = written.setdefault(shown.number, [])

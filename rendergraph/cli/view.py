@@ -1,4 +1,4 @@
-"""`rendergraph view`: the graph alive in a browser."""
+"""`rendergraph view`: the graph live in a browser."""
 
 from __future__ import annotations
 
@@ -15,29 +15,28 @@ from rendergraph.errors import Problem, UsageError
 
 if TYPE_CHECKING:
     from rendergraph.session import Selection
-    from rendergraph.viewer.desk import Desk
 
 
 @click.command("view", no_args_is_help=True)
 @options.pipeline_options
-@click.option("--against", metavar="PIPELINE", help="Compare with this one, under a slider.")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Of the address; any that is free by default.")
+@click.option("--against", metavar="PIPELINE", help="Pipeline to compare with, under a slider.")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port to serve at; any free one by default.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to serve at.")
-@click.option("--allow-remote", is_flag=True, help="Let --host name more than this machine; see below.")
+@click.option("--allow-remote", is_flag=True, help="Allow a --host that other machines can reach; see below.")
 @click.option(
     "--export",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.html",
-    help="Write the page as one still file instead of serving it.",
+    help="Write the page as one static file instead of serving it.",
 )
-@click.option("--no-open", is_flag=True, help="Open no browser, print the address only.")
-@click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames a second.")
+@click.option("--no-open", is_flag=True, help="Print the address without opening a browser.")
+@click.option("--fps", type=options.POSITIVE, default=30.0, show_default=True, help="Frames per second.")
 @click.option(
     "--timeout",
     type=options.POSITIVE,
     default=30.0,
     show_default=True,
-    help="Seconds that a picture may take before its process is ended.",
+    help="Seconds that a picture may take before its process is terminated.",
 )
 @options.json_option
 @options.device_option
@@ -54,13 +53,13 @@ def command(
     as_json: bool,
     device: int | None,
 ) -> None:
-    """Serve a pipeline to a browser, its parameters live.
+    """Show a pipeline in a browser and change its parameters live.
 
-    Prints an address and opens it. Changes are made on the page and saved as a variant beside where this was started;
-    the files themselves are watched. Ctrl-C ends it.
+    Prints an address and opens it. Changes made on the page are saved as a variant in the current folder; input files
+    are watched. Ctrl-C ends it.
 
-    Whoever has the address may use the page. With --host beyond this machine, and --allow-remote, that is everybody who
-    can read what goes over the network, for it is not encrypted: use an SSH tunnel instead where you can.
+    Anyone who has the address can use the page. With --allow-remote and a --host that other machines can reach, that
+    is everyone who can read the network traffic, which is not encrypted: prefer an SSH tunnel.
 
     \b
     Examples:
@@ -73,31 +72,35 @@ def command(
     from rendergraph.viewer import EXTRA
 
     require(*EXTRA)
-    from rendergraph.viewer.child import Child
-    from rendergraph.viewer.desk import Desk
-    from rendergraph.viewer.serve import LOOPBACK, serving
+    from rendergraph.viewer.render_process import RenderProcess
+    from rendergraph.viewer.server import LOOPBACK, Server
+    from rendergraph.viewer.view_state import ViewState
 
     if host not in LOOPBACK and not allow_remote:
-        text = f"'{host}' is more than this machine: everybody who learns the address could use the page unencrypted; "
-        raise UsageError(Problem("RG500", text + "say --allow-remote if that is meant, or use an SSH tunnel"))
-    with contextlib.closing(Child(device, timeout)) as child:
+        text = f"'{host}' is not this machine alone: anyone who learns the address can use the page, unencrypted; "
+        raise UsageError(Problem("RG500", text + "pass --allow-remote if you mean it, or use an SSH tunnel"))
+    with contextlib.closing(RenderProcess(device, timeout)) as process:
         if export is None:
-            child.start()  # meanwhile the files are looked at
-        desk = Desk(selection, Path.cwd(), fps=fps, against=_compared(selection, against))
-        options.linked(selection)  # what is wrong with a file is said here, before there is a page
+            process.start()  # while the files are read
+        state = ViewState(selection, Path.cwd(), fps=fps, against=_other(selection, against))
+        options.linked(selection)  # reports mistakes before there is a page
         if export is not None:
-            _export(desk, export, device, as_json=as_json)
+            from rendergraph.session.gpu import Gpu
+            from rendergraph.viewer.export import export_page
+
+            with Gpu(device) as gpu:
+                options.put(export_page(state, gpu), export, as_json=as_json)
             return
-        made = serving(desk, child, host=host, port=port)
-        emit_json({"url": made.url}) if as_json else emit(made.url)
+        server = Server(state, process, host=host, port=port)
+        emit_json({"url": server.url}) if as_json else emit(server.url)
         if not no_open:
-            _open(made.url)
+            _open(server.url)
         say("serving; Ctrl-C ends")
-        made.run()
+        server.run()
 
 
-def _compared(selection: Selection, against: str | None) -> tuple[str, Selection] | None:
-    """The other pipeline, of the same scene, and what it is called."""
+def _other(selection: Selection, against: str | None) -> tuple[str, Selection] | None:
+    """Return name and selection of the pipeline to compare with, of the same scene."""
     if against is None:
         return None
     other = replace(selection, source=against, sets=(), patches=())
@@ -105,17 +108,8 @@ def _compared(selection: Selection, against: str | None) -> tuple[str, Selection
     return Path(against).stem, other
 
 
-def _export(desk: Desk, path: Path, device: int | None, *, as_json: bool) -> None:
-    """The page as one file."""
-    from rendergraph.session.gpu import Gpu
-    from rendergraph.viewer.export import exported
-
-    with Gpu(device) as gpu:
-        options.put(exported(desk, gpu), path, as_json=as_json)
-
-
 def _open(url: str) -> None:
-    """A browser, where there is a display to show it on."""
+    """Open a browser, where there is a display to show it on."""
     import os
     import sys
     import webbrowser

@@ -1,7 +1,6 @@
-"""Work done beside this process: by several processes, or by a Dask cluster; or in this one, in the same words.
+"""Run tasks in this process, in several processes, or on a Dask cluster.
 
-A `Task` is what is done, a `Worker` where, an `Executor` takes tasks and says in `Event`s what becomes of them. Results
-do not depend on which executor it is.
+A `Worker` runs a `Task`; an `Executor` takes tasks and reports `Event`s. Results do not depend on the executor.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The files that pipelines are drawn from, so that they can be laid out elsewhere as they lie here.
+"""The input files of pipelines, so that workers which share no disk can have them, too.
 
-A file is known by its content, and each worker gets it once. They are laid out beneath a folder as they lie beneath `/`
-here, the current folder included, so that paths lead where they lead here and the same rules about roots hold.
+A file is identified by its content, and each worker gets it once. On a worker the files lie beneath a folder as they
+lie beneath `/` on the client, the current folder included, so that relative paths and the rules about roots still hold.
 """
 
 from __future__ import annotations
@@ -25,22 +25,14 @@ if TYPE_CHECKING:
     from rendergraph.session.selection import Selection
 
 SHIPPED = ("rendergraph", "rendergraph.nodes", "rendergraph.shaders", "rendergraph.pipelines")
-_LEFT_OUT = frozenset({"__pycache__", ".git", ".hg", ".venv", "node_modules"})
 MOST_FILES = 20_000
 MOST_BYTES = 16 << 30
+_SKIPPED_FOLDERS = frozenset({"__pycache__", ".git", ".hg", ".venv", "node_modules"})
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """What travels.
-
-    Attributes:
-        files: path here to SHA-256 of the content.
-        folders: those that have to be there, empty or not.
-        home: the current folder.
-        path: what `RENDERGRAPH_PATH` says.
-        packages: installed distributions that are needed, with their versions and the SHA-256 of their files.
-    """
+    """The files that workers need, by path with the SHA-256 of the content, and where and with what the client runs."""
 
     files: Mapping[str, str]
     folders: tuple[str, ...]
@@ -50,101 +42,85 @@ class Bundle:
 
     @property
     def digest(self) -> str:
-        """Of all that lies where."""
-        told = repr((sorted(self.files.items()), self.folders, self.home, self.path))
-        return hashlib.sha256(told.encode()).hexdigest()
+        content = repr((sorted(self.files.items()), self.folders, self.home, self.path))
+        return hashlib.sha256(content.encode()).hexdigest()
 
-    def lay_out(self, root: Path, stored: Path) -> None:
-        """Put everything beneath a folder; `stored` holds contents by SHA-256."""
+    def write(self, root: Path, stored: Path) -> None:
+        """Put all files beneath a folder; `stored` holds contents by SHA-256."""
         for name in (*self.folders, self.home):
             (root / Path(name).relative_to("/")).mkdir(parents=True, exist_ok=True)
         for name, digest in self.files.items():
-            place = root / Path(name).relative_to("/")
-            place.parent.mkdir(parents=True, exist_ok=True)
-            if not place.exists():
-                os.link(stored / digest, place)
+            path = root / Path(name).relative_to("/")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if not path.exists():
+                os.link(stored / digest, path)
 
     def environment(self, root: Path) -> dict[str, str]:
-        """Variables that name files, as they lie beneath a folder."""
-        parts = [part.strip() for part in self.path.split(os.pathsep) if part.strip()]
-        return {VARIABLE: os.pathsep.join(str(_moved(Path(part), root)) for part in parts)}
+        paths = [part.strip() for part in self.path.split(os.pathsep) if part.strip()]
+        return {VARIABLE: os.pathsep.join(str(_relocate(Path(path), root)) for path in paths)}
 
 
-def make_bundle(looked_at: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
-    """The bundle of work.
+def make_bundle(read: Iterable[str], plugins: Sequence[Path], modules: Iterable[str] = ()) -> Bundle:
+    """Collect what the work needs.
 
     Args:
-        looked_at: files and folders that were looked at when the work was planned, those that are not there included.
+        read: files and folders that planning has looked for, whether they exist or not.
         plugins: files and folders with nodes that were named.
-        modules: what the node classes in use are called; those of installed packages have to be there, too.
-
-    Raises:
-        InputError: these are more files, or larger ones, than anybody means to send.
+        modules: the modules of the node classes in use; those of installed packages must be installed there, too.
     """
     shipped = [folder(name).resolve() for name in SHIPPED]
-    found: set[Path] = set()
-    folders: set[str] = set()
-    for path in map(Path, looked_at):
-        if any(path.resolve().is_relative_to(own) for own in shipped):
-            continue
-        if path.is_dir():
-            folders.add(str(path))
-        elif path.is_file():
-            found.add(path)
+    paths = [path for path in map(Path, read) if not any(path.resolve().is_relative_to(root) for root in shipped)]
+    found = {path for path in paths if path.is_file()}
     for plugin in (*plugins, *(entry.path for entry in configured())):
-        found |= set(_within(Path(os.path.abspath(plugin))))
+        found |= set(_files_of(Path(os.path.abspath(plugin))))
     if len(found) > MOST_FILES or sum(path.stat().st_size for path in found) > MOST_BYTES:
-        text = (
-            f"the work needs {len(found)} files, more than {MOST_FILES} or {MOST_BYTES >> 30} GiB; share a disk instead"
+        limits = f"{MOST_FILES} files or {MOST_BYTES >> 30} GiB"
+        raise InputError(
+            Problem("RG642", f"the work needs {len(found)} files, more than {limits}; share a disk instead")
         )
-        raise InputError(Problem("RG642", text))
-    files = {str(path): file_sha256(path) for path in sorted(found)}
-    needed = _distributions(modules)
+    packages = (OWN, *sorted(_distributions(modules) - {OWN}))
     return Bundle(
-        files,
-        tuple(sorted(folders)),
+        {str(path): file_sha256(path) for path in sorted(found)},
+        tuple(sorted({str(path) for path in paths if path.is_dir()})),
         os.getcwd(),
         os.environ.get(VARIABLE, ""),
-        {name: (version(name) or "", digest_of(name)) for name in (OWN, *sorted(needed - {OWN}))},
+        {name: (version(name) or "", digest_of(name)) for name in packages},
     )
 
 
-def _within(path: Path) -> Iterable[Path]:
-    """The files of a plugin."""
+def _files_of(path: Path) -> Iterable[Path]:
     if path.is_file():
         yield path
-    for where, subfolders, names in os.walk(path):
-        subfolders[:] = [name for name in subfolders if name not in _LEFT_OUT]
-        yield from (Path(where) / name for name in names if (Path(where) / name).is_file())
+    for root, subfolders, names in os.walk(path):
+        subfolders[:] = [name for name in subfolders if name not in _SKIPPED_FOLDERS]
+        yield from (Path(root) / name for name in names if (Path(root) / name).is_file())
 
 
 def file_sha256(path: Path) -> str:
-    """SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _distributions(modules: Iterable[str]) -> set[str]:
-    """The installed distributions that modules belong to."""
     packages = {module.partition(".")[0] for module in modules} - {OWN}
     if not packages:
         return set()
-    known = metadata.packages_distributions()
-    return {name for package in packages for name in known.get(package, ())}
+    distributions = metadata.packages_distributions()
+    return {name for package in packages for name in distributions.get(package, ())}
 
 
 def digest_of(name: str) -> str:
-    """SHA-256 of a distribution's source files, so that two of one version that differ are told apart."""
-    found = hashlib.sha256()
+    """Return the SHA-256 of a distribution's source files, which tells two of one version apart."""
+    digest = hashlib.sha256()
     for path in sorted(_sources(name)):
-        found.update(path.name.encode())
-        found.update(bytes.fromhex(file_sha256(path)))
-    return found.hexdigest()
+        digest.update(path.name.encode())
+        digest.update(bytes.fromhex(file_sha256(path)))
+    return digest.hexdigest()
 
 
 def _sources(name: str) -> Iterable[Path]:
     if name == OWN:
-        yield from (path for own in SHIPPED for path in _within(folder(own)) if path.suffix != ".pyc")
+        yield from (path for package in SHIPPED for path in _files_of(folder(package)) if path.suffix != ".pyc")
         return
     for file in metadata.distribution(name).files or ():
         path = Path(str(file.locate()))
@@ -152,22 +128,17 @@ def _sources(name: str) -> Iterable[Path]:
             yield path
 
 
-def unfit(needed: Mapping[str, tuple[str, str]], worker: str) -> InputError | None:
-    """Why a worker, which this process is, would draw something else than whoever sent the work; None where not.
-
-    Args:
-        needed: `Bundle.packages`.
-        worker: what it is called.
-    """
+def check_packages(needed: Mapping[str, tuple[str, str]], worker: str) -> InputError | None:
+    """Return why this process, on a worker, would render something else than the client, None where it would not."""
     problems = []
-    for name, (there, digest) in needed.items():
-        here, what = version(name), "rendergraph" if name == OWN else f"the plugin '{name}'"
-        if here is None:
-            text = f"worker '{worker}' lacks {what}; install it there: pip install {name}=={there}"
-        elif here != there:
-            text = f"worker '{worker}' has {what} {here}, and here is {there}; install the same on both"
+    for name, (client, digest) in needed.items():
+        own, what = version(name), "rendergraph" if name == OWN else f"the plugin '{name}'"
+        if own is None:
+            text = f"worker '{worker}' lacks {what}; install it there: pip install {name}=={client}"
+        elif own != client:
+            text = f"worker '{worker}' has {what} {own}, but this client has {client}; install the same on both"
         elif digest_of(name) != digest:
-            text = f"worker '{worker}' has other files in {what} {there} than there are here; install the same on both"
+            text = f"worker '{worker}' has other files in {what} {client} than this client; install the same on both"
         else:
             continue
         problems.append(Problem("RG642", text))
@@ -175,34 +146,33 @@ def unfit(needed: Mapping[str, tuple[str, str]], worker: str) -> InputError | No
 
 
 def relocate_selection(selection: Selection, root: Path | None) -> Selection:
-    """A selection whose files lie beneath a folder as they lie beneath `/` where it was made."""
     if root is None:
         return selection
     return replace(
         selection,
-        source=str(_moved(Path(selection.source), root)),
-        scene=None if selection.scene is None else str(_moved(Path(selection.scene), root)),
-        environment=None if selection.environment is None else _moved(selection.environment, root),
-        patches=tuple(_moved(each, root) if isinstance(each, Path) else each for each in selection.patches),
-        asset_roots=tuple(_moved(each, root) for each in selection.asset_roots),
-        plugins=tuple(_moved(each, root) for each in selection.plugins),
+        source=str(_relocate(Path(selection.source), root)),
+        scene=None if selection.scene is None else str(_relocate(Path(selection.scene), root)),
+        environment=None if selection.environment is None else _relocate(selection.environment, root),
+        patches=tuple(_relocate(each, root) if isinstance(each, Path) else each for each in selection.patches),
+        asset_roots=tuple(_relocate(each, root) for each in selection.asset_roots),
+        plugins=tuple(_relocate(each, root) for each in selection.plugins),
     )
 
 
-def _moved(path: Path, root: Path) -> Path:
+def _relocate(path: Path, root: Path) -> Path:
     return root / path.relative_to(path.anchor) if path.is_absolute() else path
 
 
 def map_remote_paths(error: RendergraphError, root: Path | None) -> RendergraphError:
-    """An error whose files are called as where they came from."""
+    """Return the error with the client's names of files instead of those beneath a worker's folder."""
     if root is None:
         return error
 
-    def homed(problem: Problem) -> Problem:
+    def mapped(problem: Problem) -> Problem:
         place = problem.place
         if place is None or not Path(place.file).is_relative_to(root):
             return problem
         home = Place(f"/{Path(place.file).relative_to(root)}", place.line, place.column)
         return problem.relocate(home, problem.line_text)
 
-    return error.relocated(homed)
+    return error.relocated(mapped)

@@ -1,4 +1,4 @@
-"""A Dask cluster as an executor: one that is started here, one at an address, or whatever a `Client` leads to."""
+"""A Dask cluster as an executor: one that is started here, one at an address, or that of a `Client`."""
 
 from __future__ import annotations
 
@@ -33,25 +33,19 @@ Client: TypeAlias = Any  # an extra, of which most is not typed
 Cluster: TypeAlias = Any
 Future: TypeAlias = Any
 
-CONNECT = 10.0
-"""Seconds for a scheduler to answer, and to come back."""
+CONNECT_SECONDS = 10.0
+"""For a scheduler to answer, and to come back."""
 COPIES = 2
-"""Workers that have what was sent before any asks for it: the loss of one loses nothing."""
+"""Workers that hold uploaded content before any task needs it, so that the loss of one loses nothing."""
 _POLL = 0.25
-_KEPT = "what is finished is kept: --resume goes on"
-_GOING = (OSError, KeyError, ValueError)
-"""What Dask's scheduler raises where a worker goes while it is sent something; it has no word for it."""
+_RESUME = "finished runs are saved; continue with --resume"
+_WORKER_LEAVES = (OSError, KeyError, ValueError)
+"""What Dask's scheduler raises where a worker goes while content is sent to it; there is no class for that."""
 
 
-def local(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
-    """A cluster on this machine, which ends with its work.
-
-    Raises:
-        UsageError: Dask is not installed.
-    """
-    require("a Dask cluster", "farm", "distributed")
-    distributed: Any = import_module("distributed")
-    # Its workers are threads of this process, and each works in a process of its own, by its station: Dask's own way of
+def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
+    distributed = _import_distributed()
+    # Its workers are threads of this process, and each has a process of its own by its `WorkerSetup`: Dask's way of
     # starting processes would run the caller's script once more.
     cluster = distributed.LocalCluster(
         n_workers=count, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
@@ -59,23 +53,17 @@ def local(count: int, devices: Sequence[int | None], *, timeout: float) -> Dask:
     return Dask(distributed.Client(cluster, set_as_default=False), devices, timeout=timeout, cluster=cluster)
 
 
-def of(where: Any, device: int | None, *, timeout: float) -> Dask:
-    """The cluster at an address, `dask://host:port`, or of a `Client`, which stays open.
-
-    Raises:
-        UsageError: Dask is not installed, or this is neither.
-        RenderError: nobody answers there.
-    """
-    require("a Dask cluster", "farm", "distributed")
-    distributed: Any = import_module("distributed")
-    if isinstance(where, distributed.Client):
-        return Dask(where, (device,), timeout=timeout)
-    if not isinstance(where, str):
-        text = f"an executor is a word, an Executor, or a Dask Client, not {type(where).__name__}"
+def connect(choice: Any, device: int | None, *, timeout: float) -> Dask:
+    """Connect to the cluster at an address, `dask://host:port`, or to that of a `Client`, which stays open."""
+    distributed = _import_distributed()
+    if isinstance(choice, distributed.Client):
+        return Dask(choice, (device,), timeout=timeout)
+    if not isinstance(choice, str):
+        text = f"expected an executor's name, an Executor or a Dask Client, got {type(choice).__name__}"
         raise UsageError(Problem("RG641", text))
-    address = where.removeprefix("dask://")
+    address = choice.removeprefix("dask://")
     try:
-        client = distributed.Client(f"tcp://{address}", timeout=CONNECT, set_as_default=False)
+        client = distributed.Client(f"tcp://{address}", timeout=CONNECT_SECONDS, set_as_default=False)
     except OSError:
         text = f"no Dask scheduler answers at {address}; start one: dask scheduler"
         raise RenderError(Problem("RG641", text)) from None
@@ -86,13 +74,18 @@ def of(where: Any, device: int | None, *, timeout: float) -> Dask:
     return Dask(client, (device,), timeout=timeout, owned=True)
 
 
+def _import_distributed() -> Any:
+    require("a Dask cluster", "farm", "distributed")
+    return import_module("distributed")
+
+
 def _workers(client: Client) -> dict[str, Any]:
     found: dict[str, Any] = client.scheduler_info(n_workers=-1)["workers"]
     return found
 
 
 class Dask(Executor):
-    """A Dask cluster. A worker does one task at a time; where any has `resources={'GPU': 1}`, only those are used."""
+    """A Dask cluster. A worker runs one task at a time; where any has `resources={'GPU': 1}`, only those are used."""
 
     def __init__(
         self,
@@ -103,114 +96,90 @@ class Dask(Executor):
         cluster: Cluster = None,
         owned: bool = False,
     ) -> None:
-        """Take a client.
-
-        Args:
-            client: of the cluster.
-            devices: GL device numbers that workers named by number share out.
-            timeout: seconds that a worker may say nothing.
-            cluster: that ends with the work.
-            owned: whether the client is closed with it.
-        """
+        """Use a client, which is closed at the end where it is `owned`, like a cluster that was started for it."""
         workers = _workers(client)
         self._resources = {"GPU": 1} if any("GPU" in each["resources"] for each in workers.values()) else None
         self.workers = max(1, sum(self._resources is None or "GPU" in each["resources"] for each in workers.values()))
-        self.described = f"{self.workers} Dask workers"
         self._client, self._cluster, self._owned = client, cluster, owned or cluster is not None
         self._devices, self._timeout = devices, timeout
-        self._station = f"rendergraph-{uuid4().hex[:12]}"
+        self._setup = f"rendergraph-{uuid4().hex[:12]}"
         self._bundle: Bundle | None = None
         self._paths: dict[str, Path] = {}
         self._values: dict[str, bytes] = {}
-        self._sent: dict[str, Future] = {}
-        self._sendings = 0
+        self._uploaded: dict[str, Future] = {}
+        self._uploads = 0
         self._done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self._tasks: dict[str, Task] = {}
         self._futures: dict[str, Future] = {}
         self._tried: dict[Task, int] = {}
-        self._gone_with: dict[Task, int] = {}  # how often what a task was given went with workers
-        self._sent_with: dict[Task, int] = {}  # how often had been sent what a task was given
+        self._inputs_lost: dict[Task, int] = {}  # how often a task's uploaded inputs were lost with workers
+        self._upload_of: dict[Task, int] = {}  # the upload that a task was submitted with
 
     def upload_inputs(self, make: Callable[[], Bundle]) -> None:
-        """Send files, and ask every worker whether it can be used.
-
-        Raises:
-            InputError: one lacks a plugin that is needed, or has another version of something.
-        """
-        from rendergraph.farm.dask_worker import Station, fitness  # needs the extra
+        from rendergraph.farm.dask_worker import WorkerSetup, setup_error  # needs the extra
 
         bundle = make()
         paths = {digest: Path(path) for path, digest in bundle.files.items() if digest not in self._paths}
-        self._send({digest: path.read_bytes() for digest, path in paths.items()})
+        self._upload({digest: path.read_bytes() for digest, path in paths.items()})
         self._paths |= paths
         if self._bundle is None:
-            station = Station(self._station, bundle.packages, tuple(self._devices), self._timeout)
+            setup = WorkerSetup(self._setup, bundle.packages, tuple(self._devices), self._timeout)
             try:
-                self._client.register_plugin(station, name=self._station)
-                told = self._client.run(fitness, self._station, on_error="return")
+                self._client.register_plugin(setup, name=self._setup)
+                errors = self._client.run(setup_error, self._setup, on_error="return")
             except (ImportError, AttributeError, RuntimeError, OSError) as error:
-                raise self._without(str(error)) from error
+                raise self._unusable(str(error)) from error
             problems = []
-            for worker, unfit in told.items():
-                if unfit is not None:
-                    found = unfit if isinstance(unfit, InputError) else self._without(f"{worker}: {unfit}")
-                    problems += list(found.problems)
+            for worker, found in errors.items():
+                if found is not None:
+                    known = found if isinstance(found, InputError) else self._unusable(f"{worker}: {found}")
+                    problems += list(known.problems)
             if problems:
                 raise InputError(problems)
         self._bundle = bundle
 
     @staticmethod
-    def _without(error: str) -> InputError:
-        way = f"install it there: pip install 'rendergraph[farm]=={version('rendergraph')}'"
-        return InputError(Problem("RG642", f"a worker cannot use rendergraph ({' '.join(error.split())[:200]}); {way}"))
+    def _unusable(error: str) -> InputError:
+        fix = f"install it there: pip install 'rendergraph[farm]=={version('rendergraph')}'"
+        return InputError(Problem("RG642", f"a worker cannot use rendergraph ({' '.join(error.split())[:200]}); {fix}"))
 
-    def _send(self, contents: dict[str, bytes]) -> None:
-        """Send contents to workers, by their SHA-256; others get them from those when they need them.
-
-        Raises:
-            RenderError: no worker takes them.
-        """
+    def _upload(self, contents: dict[str, bytes]) -> None:
+        """Send contents to workers, by their SHA-256; other workers get them from those when they need them."""
         begun = time.monotonic()
-        named = {f"{self._station}-{self._sendings}-{digest}": content for digest, content in contents.items()}
+        named = {f"{self._setup}-{self._uploads}-{digest}": content for digest, content in contents.items()}
         while named:
             try:
                 found = self._client.scatter(named, hash=False, broadcast=COPIES)
-            except _GOING as error:
-                self._answers(None)
-                if time.monotonic() - begun > CONNECT:
-                    raise RenderError(Problem("RG641", f"the workers take no files ({error}); {_KEPT}")) from error
+            except _WORKER_LEAVES as error:
+                self._check_scheduler(None)
+                if time.monotonic() - begun > CONNECT_SECONDS:
+                    raise RenderError(Problem("RG641", f"the workers accept no files ({error}); {_RESUME}")) from error
                 time.sleep(_POLL)
             else:
-                self._sent |= {key.rpartition("-")[2]: future for key, future in found.items()}
+                self._uploaded |= {key.rpartition("-")[2]: future for key, future in found.items()}
                 return
 
-    def _send_again(self) -> None:
-        """Send everything once more, as the workers that had something of it are gone.
-
-        Raises:
-            RenderError: a file is another one by now, or no worker takes them.
-        """
+    def _upload_again(self) -> None:
+        """Send everything once more, as the workers that had some of it are gone."""
         contents = dict(self._values)
         for digest, path in self._paths.items():
             contents[digest] = path.read_bytes() if path.is_file() else b""
             if hashlib.sha256(contents[digest]).hexdigest() != digest:
-                text = f"workers are gone with what is drawn from, and '{path}' has changed since; {_KEPT}"
+                text = f"the workers that had the input files are gone, and '{path}' has changed since; {_RESUME}"
                 raise RenderError(Problem("RG641", text))
-        self._sendings += 1
-        self._send(contents)
+        self._uploads += 1
+        self._upload(contents)
 
     def put(self, value: Any) -> Handle:
-        """Sent to the cluster, and from there to workers whose tasks need it."""
         data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         handle = Handle(hashlib.sha256(data).hexdigest())
         if handle.digest not in self._values:
-            self._send({handle.digest: data})
+            self._upload({handle.digest: data})
             self._values[handle.digest] = data
         return handle
 
     def submit(self, task: Task) -> None:
-        """One more task."""
-        from rendergraph.farm.dask_worker import perform  # needs the extra
+        from rendergraph.farm.dask_worker import run_task  # needs the extra
 
         if self._bundle is None:
             self.upload_inputs(lambda: make_bundle((), ()))
@@ -218,81 +187,76 @@ class Dask(Executor):
         digests = sorted(set(self._bundle.files.values()))
         needs = [handle.digest for handle in task.needs]
         future = self._client.submit(
-            perform,
-            self._station,
+            run_task,
+            self._setup,
             pickle.dumps(task, protocol=pickle.HIGHEST_PROTOCOL),
             needs,
             self._bundle,
             digests,
-            *(self._sent[digest] for digest in (*digests, *needs)),
-            key=f"{self._station}-{uuid4().hex}",
+            *(self._uploaded[digest] for digest in (*digests, *needs)),
+            key=f"{self._setup}-{uuid4().hex}",
             pure=False,
             retries=0,
             resources=self._resources,
         )
         self._tasks[future.key], self._futures[future.key] = task, future
-        self._sent_with[task] = self._sendings
+        self._upload_of[task] = self._uploads
         future.add_done_callback(self._done.put)
 
     def events(self) -> Iterator[Event]:
-        """What comes from the workers, when a task is over."""
         gone = None
         while self._tasks:
             try:
                 future = self._done.get(timeout=_POLL)
             except queue.Empty:
-                gone = self._answers(gone)
+                gone = self._check_scheduler(gone)
                 continue
             task = self._tasks.pop(future.key, None)
             self._futures.pop(future.key, None)
             if task is not None:
-                yield from self._told(task, future)
+                yield from self._events_of(task, future)
 
-    def _answers(self, gone: float | None) -> float | None:
-        """Since when the scheduler has not answered, None where it does.
-
-        Raises:
-            RenderError: for too long.
-        """
+    def _check_scheduler(self, gone: float | None) -> float | None:
+        """Return since when the scheduler has not answered, None where it does; refuse to wait too long."""
         if self._client.status == "running":
             return None
         gone = gone or time.monotonic()
-        if self._client.status in ("closed", "closing") or time.monotonic() - gone > CONNECT:
-            raise RenderError(Problem("RG641", f"the Dask scheduler is gone; {_KEPT}"))
+        if self._client.status in ("closed", "closing") or time.monotonic() - gone > CONNECT_SECONDS:
+            raise RenderError(Problem("RG641", f"the Dask scheduler is gone; {_RESUME}"))
         return gone
 
-    def _told(self, task: Task, future: Future) -> Iterator[Event]:
+    def _events_of(self, task: Task, future: Future) -> Iterator[Event]:
         begun = time.monotonic()
         if future.status in ("cancelled", "lost"):
             while self._client.status == "connecting":
                 time.sleep(_POLL)
-                self._answers(begun)
-            self._answers(None)
-            if self._sent_with[task] == self._sendings:  # most likely what it was given is lost, too
-                self._send_again()
+                self._check_scheduler(begun)
+            self._check_scheduler(None)
+            if self._upload_of[task] == self._uploads:  # most likely its inputs are lost, too
+                self._upload_again()
             error = RenderError(Problem("RG640", "the cluster lost the task"))
-            yield from self._lost(task, "scheduler", error, self._gone_with, self.workers + 1)
+            yield from self._retry(task, "scheduler", error, self._inputs_lost, self.workers + 1)
             return
         if future.status == "error":
             error = future.exception()
             text = f"worker lost: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
-            yield from self._lost(task, "cluster", RenderError(Problem("RG640", text)))
+            yield from self._retry(task, "cluster", RenderError(Problem("RG640", text)))
             return
-        worker, told = future.result()
-        for kind, value in told:
+        worker, messages = future.result()
+        for kind, value in messages:
             if kind == "item":
                 yield TaskOutput(task, value, worker)
             elif kind == "finished":
                 yield TaskFinished(task, worker, value)
             elif kind == "lost" or is_retryable(value):
-                yield from self._lost(task, worker, value)
+                yield from self._retry(task, worker, value)
             else:
                 yield TaskFailed(task, worker, value)
 
-    def _lost(
+    def _retry(
         self, task: Task, worker: str, error: Any, tried: dict[Task, int] | None = None, most: int = ATTEMPTS
     ) -> Iterator[Event]:
-        """Begin a task again, unless that was too often; where what it was given is gone, each worker counts."""
+        """Begin a task again, unless that was too often; where its inputs were lost, each worker counts."""
         tried = self._tried if tried is None else tried
         tried[task] = tried.get(task, 0) + 1
         if tried[task] < most:
@@ -302,15 +266,15 @@ class Dask(Executor):
             yield TaskFailed(task, worker, error, lost=True)
 
     def close(self) -> None:
-        """Leave the cluster: what still runs for us there ends, and so does a cluster that was started for it."""
+        """Leave the cluster: our tasks there end, and so does a cluster that was started here."""
         self._tasks.clear()
         with contextlib.suppress(Exception):  # it may be gone, in any way
             if self._client.status == "running":
                 self._client.cancel(list(self._futures.values()), force=True)
                 if self._cluster is None and self._bundle is not None:
-                    self._client.unregister_worker_plugin(self._station)
+                    self._client.unregister_worker_plugin(self._setup)
         self._futures.clear()
-        self._sent.clear()
+        self._uploaded.clear()
         with contextlib.suppress(Exception):
             if self._owned:
                 self._client.close(timeout=1)

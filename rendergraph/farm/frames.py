@@ -1,4 +1,4 @@
-"""Frames of a pipeline, drawn in parts by several workers, and what comes of each."""
+"""Frames of a pipeline, rendered in chunks by several workers."""
 
 from __future__ import annotations
 
@@ -23,30 +23,24 @@ if TYPE_CHECKING:
     from rendergraph.session.selection import RenderOptions, Selection
     from rendergraph.session.values import Expanded
 
-PARTS = 4
-"""For each worker: enough that none waits long for the last, few enough that programs are compiled seldom."""
-MOST = 64
-"""Frames of a part: what is lost with a worker."""
+CHUNKS_PER_WORKER = 4
+"""Enough that none waits long for the last, few enough that programs are seldom compiled."""
+LONGEST_CHUNK = 64
+"""Frames of a chunk: what is lost with a worker."""
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """A file of each frame.
-
-    Attributes:
-        name: the output, or the tap.
-        ending: of the file, which chooses its format; empty for bare pixels, as a film takes them.
-        raw: a tap.
-    """
+class FrameFile:
+    """A file that is made of each frame, of an output or a tap; without a suffix bare pixels, as a video takes them."""
 
     name: str
-    ending: str
+    suffix: str
     raw: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
-    """A frame has been drawn: its files, or pixels 0…255 of shape (height, width, 3 or 4)."""
+class RenderedFrame:
+    """A frame's files: encoded, or as pixels 0…255 of shape (height, width, 3 or 4)."""
 
     number: int
     files: tuple[bytes | npt.NDArray[Any], ...]
@@ -54,88 +48,67 @@ class Shown:
 
 
 @dataclass(frozen=True, eq=False)
-class Chunk(Task):
-    """Frames that follow each other.
-
-    Attributes:
-        selection, options: what is drawn; its frames are the part's.
-        lead: frames that are drawn before the first, where those before matter.
-        wanted: what is made of each.
-    """
+class FrameChunk(Task):
+    """Consecutive frames; `lead` more are rendered before them, where earlier frames matter."""
 
     selection: Selection
     options: RenderOptions
     lead: int
-    wanted: tuple[Wanted, ...]
+    files: tuple[FrameFile, ...]
 
     @property
-    def name(self) -> str:  # type: ignore[override]  # a value, said once
-        """Which frames."""
+    def name(self) -> str:  # type: ignore[override]  # read-only here
         frames = self.options.frames
         return f"frames {frames[0]}-{frames[-1]}"
 
-    def run(self, worker: Worker) -> Iterator[Shown | Frame]:
-        """Each frame; and at last the last one without its pictures, for its times."""
+    def run(self, worker: Worker) -> Iterator[RenderedFrame | Frame]:
+        """Yield each frame, and at last the last one without its pictures, for its times."""
         pipeline = Pipeline(relocate_selection(self.selection, worker.root))
         expanded = stages.expand(pipeline.link(), self.options)
         frame: Frame | None = None
         for frame in stages.draw(expanded, worker.gpu, lead=self.lead):
-            files = tuple(_made(frame, each) for each in self.wanted)
-            yield Shown(frame.number, files, tuple(frame.unsound.items()))
-        assert frame is not None  # a part has one at least
+            files = tuple(_encode(frame, file) for file in self.files)
+            yield RenderedFrame(frame.number, files, tuple(frame.unsound.items()))
+        assert frame is not None  # a chunk has one at least
         figures = {name: array for name, array in frame.arrays.items() if array.shape[:-1] == (1, 1)}
         yield replace(frame, arrays=figures)
 
 
-def _made(frame: Frame, wanted: Wanted) -> bytes | npt.NDArray[Any]:
-    pixels, info = frame[wanted.name], frame.info(wanted.name)
-    if not wanted.ending:
+def _encode(frame: Frame, file: FrameFile) -> bytes | npt.NDArray[Any]:
+    pixels, info = frame[file.name], frame.info(file.name)
+    if not file.suffix:
         return viewable_as(pixels, info)
-    return encoded(Saved(Path(f"frame{wanted.ending}"), pixels, info, raw=wanted.raw), frame.metadata)
+    return encoded(Saved(Path(f"frame{file.suffix}"), pixels, info, raw=file.raw), frame.metadata)
 
 
-def chunks(expanded: Expanded, wanted: Sequence[Wanted], workers: int, warm_up: int | None) -> list[Chunk]:
-    """The frames in parts.
-
-    Args:
-        expanded: what is drawn.
-        wanted: what is made of each frame.
-        workers: who draws.
-        warm_up: how many frames decide the next one, where the file says so.
-
-    Raises:
-        InputError: each frame depends on all before it, and the file does not say that fewer decide it.
-    """
+def split_frames(expanded: Expanded, files: Sequence[FrameFile], workers: int, warm_up: int | None) -> list[FrameChunk]:
+    """Divide the frames into chunks; `warm_up` is how many earlier frames decide a frame, where the file states it."""
     resources = stages.plan(expanded).plan.resources.values()
-    remembers = sorted({resource.id.partition(".")[0] for resource in resources if resource.role == "history"})
-    if remembers and warm_up is None:
-        text = f"a frame depends on those before it, by '{remembers[0]}': it cannot be drawn in parts; say how many "
-        text += "decide it, as in warm_up: 16, or draw with --executor serial"
+    histories = sorted({resource.id.partition(".")[0] for resource in resources if resource.role == "history"})
+    if histories and warm_up is None:
+        text = f"each frame depends on earlier ones through '{histories[0]}', so frames cannot be split among workers; "
+        text += "state how many earlier frames matter (warm_up: 16), or use --executor serial"
         raise InputError(Problem("RG643", text, Place(expanded.linked.graph.name)))
-    lead = warm_up if remembers and warm_up is not None else 1  # without a history one shows where things were
+    lead = warm_up if histories and warm_up is not None else 1  # even without a history, motion needs one
     frames = expanded.options.frames
-    each = max(1, min(MOST, -(-len(frames) // (PARTS * workers))), 2 * lead if remembers else 1)
+    each = max(1, min(LONGEST_CHUNK, -(-len(frames) // (CHUNKS_PER_WORKER * workers))), 2 * lead if histories else 1)
     parts = [frames[at : at + each] for at in range(0, len(frames), each)]
     options = [structs.replace(expanded.options, frames=part) for part in parts]
-    return [Chunk(expanded.linked.selection, own, lead, tuple(wanted)) for own in options]
+    return [FrameChunk(expanded.linked.selection, own, lead, tuple(files)) for own in options]
 
 
-def drawn(farm: Executor, parts: Sequence[Chunk]) -> Iterator[Shown | Frame]:
-    """What comes of the parts: each frame once, in any order; a last word of each part.
-
-    Raises:
-        RendergraphError: a part cannot be drawn, wherever that was tried.
-    """
+def render_chunks(executor: Executor, chunks: Sequence[FrameChunk]) -> Iterator[RenderedFrame | Frame]:
+    """Yield each frame once, in any order, and the last frame of each chunk once more without pictures."""
     seen: set[int] = set()
-    for part in parts:
-        farm.submit(part)
-    for event in farm.events():
+    for chunk in chunks:
+        executor.submit(chunk)
+    for event in executor.events():
         if isinstance(event, TaskFailed):
             error: RendergraphError = event.error
             raise type(error)(error.problems) from error
         if isinstance(event, TaskOutput):
-            if isinstance(event.value, Shown):
-                if event.value.number in seen:  # by a worker that was lost afterwards
+            if isinstance(event.value, RenderedFrame):
+                if event.value.number in seen:  # from a worker that was lost afterwards
                     continue
                 seen.add(event.value.number)
             yield event.value

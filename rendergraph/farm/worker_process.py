@@ -1,4 +1,4 @@
-"""A Python process of our own at the other end of a pipe; and what one does that works on tasks."""
+"""Python processes at the other end of a pipe: any that answers messages, and the worker process that runs tasks."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import json
 import os
+import pickle
 import signal
 import socket
 import subprocess
@@ -14,50 +15,78 @@ import time
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError
+
+if TYPE_CHECKING:
+    from rendergraph.farm.tasks import Task
+
+TIMEOUT = 600.0
+"""Seconds without a message before a worker is taken to hang."""
+STARTUP_TIMEOUT = 120.0
+"""Seconds until the first message, at least: the process starts, imports, opens its device, and compiles."""
 _PR_SET_PDEATHSIG = 1
 
 
-def started(main: str, words: Mapping[str, Any], environment: Mapping[str, str] | None = None) -> Child:
-    """Start a process that calls a function with the file descriptor of its end of a pipe, and with words.
+class ChildProcess:
+    """A Python process that was started here, and this end of its pipe.
 
-    It is not started by `multiprocessing`, which would run the caller's script once more, and it is no part of the
-    terminal's group: Ctrl-C is this process's, which ends the other one.
-
-    Args:
-        main: `package.module:function`.
-        words: keywords of the function, plain values.
-        environment: variables in place of what they are here.
+    It is not started by `multiprocessing`, which would run the caller's script once more, and it is not in the
+    terminal's process group: Ctrl-C reaches this process alone, which ends the other one.
     """
-    ours, theirs = socket.socketpair()
-    module, _, function = main.partition(":")
-    told = json.dumps({"path": sys.path, "words": {**words, "pipe": theirs.fileno()}, "parent": os.getpid()})
-    program = (
-        "import json, sys; told = json.loads(sys.argv[1]); sys.path[:] = told['path']\n"
-        "from rendergraph.farm.worker_process import end_with\n"
-        f"end_with(told['parent'])\nfrom {module} import {function}\n{function}(**told['words'])"
-    )
-    with theirs:
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-c", program, told],
-            pass_fds=(theirs.fileno(),),
-            stdin=subprocess.DEVNULL,
-            stdout=2,  # ours is data; what a plugin prints is none
-            start_new_session=True,
-            env={**os.environ, **(environment or {})},
+
+    def __init__(
+        self,
+        main: str,
+        arguments: Mapping[str, Any],
+        environment: Mapping[str, str] | None = None,
+        output: int = 2,  # what third-party code prints is not data
+    ) -> None:
+        """Start `package.module:function` with JSON arguments and the file descriptor of its end of a pipe."""
+        local, remote = socket.socketpair()
+        module, _, function = main.partition(":")
+        call = {"path": sys.path, "arguments": {**arguments, "pipe": remote.fileno()}, "parent": os.getpid()}
+        program = (
+            "import json, sys; call = json.loads(sys.argv[1]); sys.path[:] = call['path']\n"
+            "from rendergraph.farm.worker_process import end_with\n"
+            f"end_with(call['parent'])\nfrom {module} import {function}\n{function}(**call['arguments'])"
         )
-    return Child(process, Connection(ours.detach()))
+        with remote:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-c", program, json.dumps(call)],
+                pass_fds=(remote.fileno(),),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=None if output == 2 else subprocess.STDOUT,
+                start_new_session=True,
+                env={**os.environ, **(environment or {})},
+            )
+        self.pipe = Connection(local.detach())
+        self._has_answered = False
 
+    def patience(self, timeout: float) -> float:
+        return timeout if self._has_answered else max(timeout, STARTUP_TIMEOUT)
 
-class Child:
-    """A process that was started, and our end of its pipe."""
+    def receive(self, timeout: float) -> Any:
+        """Wait for the next message.
 
-    def __init__(self, process: subprocess.Popen[bytes], pipe: Connection) -> None:
-        self.process, self.pipe = process, pipe
+        Raises:
+            TimeoutError: none came in time.
+            EOFError: the process has ended; the text is the signal's name, or the exit code.
+        """
+        try:
+            if not self.pipe.poll(timeout):
+                raise TimeoutError
+            message = self.pipe.recv()
+        except TimeoutError:
+            raise
+        except (EOFError, OSError):
+            raise EOFError(self.exit_reason()) from None
+        self._has_answered = True
+        return message
 
-    def ended_by(self) -> str:
-        """What ended a process whose pipe has closed: a signal's name, or its exit code."""
+    def exit_reason(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(1.0)
         code = self.process.returncode
@@ -66,36 +95,103 @@ class Child:
                 return signal.Signals(-code).name
         return f"exit code {code}"
 
-    def end(self) -> None:
-        """End it at once."""
-        self.process.kill()
+    def kill(self) -> None:
+        """End it at once, with all processes that it started."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
         self.pipe.close()
 
 
 def end_with(parent: int) -> None:
-    """Let the system end this process when the one that started it ends, however that comes about."""
+    """Let the system end this process when its parent ends, for whatever reason."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 
 
-def work(pipe: int, name: str, device: int | None, root: str | None = None, home: str | None = None) -> None:
-    """What a process does that works on tasks: one after the other, until the pipe ends.
+class WorkerProcess:
+    """A process that runs tasks, one at a time; it is started for a task when there is none."""
 
-    It is told `(give, digest, value)` and `(run, task)`, and tells `ready` or `unable` once, then of each task
-    `(item, value)`s and at last `(finished, seconds)` or `(failed, error)`.
+    def __init__(self, name: str, device: int | None = None, *, timeout: float = TIMEOUT) -> None:
+        self.name = name
+        self.child: ChildProcess | None = None
+        self._device, self._timeout = device, timeout
+        self._stored: set[str] = set()
+        self._heard = 0.0
 
-    Args:
-        pipe: the file descriptor of its end.
-        name: what it is called.
-        device: GL device number.
-        root: the folder beneath which files lie that were sent here.
-        home: the current folder, as it is called where they came from.
+    def send(
+        self,
+        task: Task,
+        values: Mapping[str, bytes],
+        environment: Mapping[str, str] | None = None,
+        **folders: str,
+    ) -> None:
+        """Hand over a task with pickled values by digest; start a process if necessary. A process gets each value once.
+
+        The environment and the folders (`root`, `home` of `run_tasks`) are of a process that is started.
+        """
+        if self.child is None:
+            arguments = {"name": self.name, "device": self._device, **folders}
+            self.child = ChildProcess("rendergraph.farm.worker_process:run_tasks", arguments, environment)
+            self._stored = set()
+        self._heard = time.monotonic()
+        try:
+            for digest in values.keys() - self._stored:
+                self.child.pipe.send(("store", digest, pickle.loads(values[digest])))
+            self._stored |= values.keys()
+            self.child.pipe.send(("run", task))
+        except OSError:
+            raise self._lost(self.child.exit_reason()) from None
+
+    @property
+    def seconds_left(self) -> float:
+        assert self.child is not None
+        return max(0.0, self._heard + self.child.patience(self._timeout) - time.monotonic())
+
+    def receive(self) -> tuple[str, Any]:
+        """Wait for the next message about the task: `(item, value)`, `(finished, seconds)` or `(failed, error)`.
+
+        Raises:
+            RenderError: the process has ended, or has hung and was ended.
+            DeviceError: it has no usable GL device.
+        """
+        assert self.child is not None
+        while True:
+            try:
+                kind, value = self.child.receive(self.seconds_left)
+            except TimeoutError:
+                text = f"timed out after {self._timeout:g} s without progress and was terminated"
+                self.kill()
+                raise RenderError(Problem("RG640", f"worker '{self.name}' {text}; --timeout allows more")) from None
+            except EOFError as error:
+                raise self._lost(str(error)) from None
+            self._heard = time.monotonic()
+            if kind == "unable":
+                self.kill()
+                raise value
+            if kind != "ready":
+                return kind, value
+
+    def _lost(self, reason: str) -> RenderError:
+        self.kill()
+        text = f"worker '{self.name}' ended ({reason}); a driver that crashes or too little memory can cause this"
+        return RenderError(Problem("RG640", text))
+
+    def kill(self) -> None:
+        if self.child is not None:
+            self.child.kill()
+        self.child = None
+
+
+def run_tasks(pipe: int, name: str, device: int | None, root: str | None = None, home: str | None = None) -> None:
+    """Run tasks one after the other until the pipe ends: what a worker process does.
+
+    It takes `(store, digest, value)` and `(run, task)`, and sends `ready` or `unable` once, then what
+    `WorkerProcess.receive` returns. `root` is the folder of uploaded files, `home` the client's current folder.
     """
-    from rendergraph.errors import DeviceError, Problem, RenderError, RendergraphError  # in the process itself alone
-    from rendergraph.farm.bundle import map_remote_paths  # likewise
+    from rendergraph.farm.bundle import map_remote_paths  # in the process itself alone
     from rendergraph.farm.tasks import Handle, Worker  # likewise
 
     worker = Worker(name, device=device)
@@ -109,13 +205,13 @@ def work(pipe: int, name: str, device: int | None, root: str | None = None, home
             end.send(("unable", error))
             return
         while True:
-            kind, *told = end.recv()
-            if kind == "give":
-                worker.store(Handle(told[0]), told[1])
+            kind, *arguments = end.recv()
+            if kind == "store":
+                worker.store(Handle(arguments[0]), arguments[1])
                 continue
             begun = time.monotonic()
             try:
-                for value in told[0].run(worker):
+                for value in arguments[0].run(worker):
                     end.send(("item", value))
             except RendergraphError as error:
                 end.send(("failed", map_remote_paths(error, worker.root)))

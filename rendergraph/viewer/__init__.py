@@ -1,10 +1,10 @@
-"""`rendergraph view`: a pipeline alive in a browser.
+"""`rendergraph view`: a pipeline live in a browser.
 
-    page ⇄ server (`server`, `desk`) ⇄ render process (`child`, `painter`)
+    page ⇄ server (`server`, `view_state`) ⇄ render process (`render_process`, `render_service`)
 
-What somebody has changed is a value of the server's (`edits`), so it outlives a render process that a shader hangs or a
-driver kills. The render process owns the GL context and answers one question after the other; the server asks the next
-one when the last is answered, so the newest state wins and nothing queues up.
+Edits live in the server, so they outlive a render process that a shader hangs or a driver kills. The render process
+owns the GL context and answers one request after the other. The server sends the next request when the last is
+answered, so the newest state wins and nothing queues up.
 """
 
 from __future__ import annotations

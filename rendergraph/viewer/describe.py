@@ -1,4 +1,4 @@
-"""A pipeline as the page shows it: its graph, every parameter with what it may be, the plan, the scene's cameras."""
+"""A pipeline as the page shows it: graph, parameters with their ranges and choices, plan, cameras."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from rendergraph.scene.animate import moves
 from rendergraph.session.values import Linked, Planned
 
 
-def described(planned: Planned) -> dict[str, Any]:
-    """Everything but pictures and times, as plain JSON values."""
+def describe(planned: Planned) -> dict[str, Any]:
+    """Return everything but pictures and times, as plain JSON values."""
     linked = planned.linked
     graph, spec = linked.graph, linked.spec
     families = linked.catalog.families()
@@ -41,8 +41,8 @@ def described(planned: Planned) -> dict[str, Any]:
         for node in graph.nodes
     }
     parameters = {
-        name: {"value": found.value, "doc": found.doc, "min": found.min, "max": found.max, "kind": _kind(found.value)}
-        for name, found in spec.parameters.items()
+        name: {"value": each.value, "doc": each.doc, "min": each.min, "max": each.max, "kind": _kind(each.value)}
+        for name, each in spec.parameters.items()
     }
     return {
         "name": graph.name,
@@ -61,21 +61,20 @@ def described(planned: Planned) -> dict[str, Any]:
 
 
 def _types(linked: Linked, node: GraphNode, read: Set[str], family: Sequence[str]) -> dict[str, list[str]]:
-    """The types of a node's family: those that make what is read of it from what it is given, and the others."""
-    found: dict[str, list[str]] = {"types": [], "other_types": []}
+    """Return the types of a node's family: those that fit its links, and the others."""
+    types: dict[str, list[str]] = {"types": [], "other_types": []}
     for name in family:
         try:
             cls = linked.catalog.get(name).cls
         except InputError:  # a plugin's that cannot be imported
             continue
-        given = {port for port, one in cls.inputs().items() if isinstance(one, Input) and one.takes_scene}
-        needed = {port for port, one in cls.inputs().items() if not one.optional} - given
-        found["types" if read <= cls.outputs().keys() and needed <= node.inputs.keys() else "other_types"].append(name)
-    return found
+        scene = {port for port, one in cls.inputs().items() if isinstance(one, Input) and one.takes_scene}
+        needed = {port for port, one in cls.inputs().items() if not one.optional} - scene
+        types["types" if read <= cls.outputs().keys() and needed <= node.inputs.keys() else "other_types"].append(name)
+    return types
 
 
 def _added(linked: Linked, parameter: Parameter) -> tuple[str, ...]:
-    """The choices that plugins add."""
     if not parameter.open_name:
         return ()
     return tuple(added.name for added in linked.catalog.extensions.choices(parameter.open_name))
@@ -98,7 +97,7 @@ def _parameter(parameter: Parameter, value: Any, added: tuple[str, ...]) -> dict
 
 
 def _kind(value: Any) -> str:
-    """How a value is put in: as a switch, a whole number, a number, a text, or as JSON."""
+    """Return the kind of input field for a value."""
     kinds: tuple[tuple[type, str], ...] = ((bool, "boolean"), (int, "integer"), (float, "number"), (str, "text"))
     return next((name for kind, name in kinds if isinstance(value, kind)), "json")
 

@@ -1,4 +1,4 @@
-"""The page as one file: still, whole, and opened anywhere without a server."""
+"""The page as one static file, which needs no server."""
 
 from __future__ import annotations
 
@@ -6,70 +6,64 @@ import base64
 import json
 import re
 from collections.abc import Mapping
+from contextlib import closing
 from html import escape
 from typing import Any
 
 from rendergraph.errors import InputError, Problem
 from rendergraph.formatting import jsonable
 from rendergraph.session.gpu import Gpu
-from rendergraph.viewer.desk import Desk
-from rendergraph.viewer.painter import Painter
-from rendergraph.viewer.questions import Against, Answer, Question, Thumbnails
+from rendergraph.viewer.messages import CompareRequest, Request, Response, ThumbnailRequest
+from rendergraph.viewer.render_service import RenderService
 from rendergraph.viewer.server import page_files
+from rendergraph.viewer.view_state import ViewState
 
 _IMPORT = re.compile(r'^import (?:(\{[^}]*\}) from )?"\./(\w+)\.js";$', re.MULTILINE)
 _EXPORT = re.compile(r"^export ((?:const|function|async function) ([\w$]+))", re.MULTILINE)
 _LIST = re.compile(r"^export \{ ([\w, ]+) \};$", re.MULTILINE)
 
 
-def exported(desk: Desk, gpu: Gpu) -> str:
-    """The page of what a desk shows, as HTML with everything in it.
-
-    Raises:
-        InputError: the pipeline, or what it is compared with, cannot be drawn; with all mistakes.
-    """
-    painter = Painter(gpu)
-    try:
-        picture = _answer(painter, desk.question())
-        desk.answered(picture)
+def export_page(state: ViewState, gpu: Gpu) -> str:
+    """Return the page with everything in it, as HTML."""
+    with closing(RenderService(gpu)) as service:
+        picture = _ask(service, state.request())
+        state.record(picture)
         facts = dict(picture.facts)
-        kept = [
-            _kept("state", desk.state()),
-            _kept("pipeline", facts.pop("pipeline")),
-            _kept("picture", facts | {"frame": desk.frame}, picture.files),
+        messages = [
+            _message("state", state.as_json()),
+            _message("pipeline", facts.pop("pipeline")),
+            _message("picture", facts | {"frame": state.frame}, picture.files),
         ]
-        if desk.other is not None:
-            against = _answer(painter, Against(desk.other))
-            kept.append(_kept("against", against.facts, against.files))
-        thumbnails = _answer(painter, Thumbnails())
-        kept.append(_kept("thumbnails", thumbnails.facts, thumbnails.files))
-    finally:
-        painter.close()
-    return _html(kept, str(picture.facts["pipeline"]["name"]))
+        if state.other is not None:
+            against = _ask(service, CompareRequest(state.other))
+            messages.append(_message("against", against.facts, against.files))
+        thumbnails = _ask(service, ThumbnailRequest())
+        messages.append(_message("thumbnails", thumbnails.facts, thumbnails.files))
+    return _html(messages, str(picture.facts["pipeline"]["name"]))
 
 
-def _answer(painter: Painter, question: Question) -> Answer:
-    answer = painter.answer(question)
-    if answer.problems:
-        raise InputError([Problem(str(problem["code"]), str(problem["text"])) for problem in answer.problems])
-    return answer
+def _ask(service: RenderService, request: Request) -> Response:
+    response = service.answer(request)
+    if response.problems:
+        raise InputError([Problem(str(problem["code"]), str(problem["text"])) for problem in response.problems])
+    return response
 
 
-def _kept(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> dict[str, Any]:
+def _message(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> dict[str, Any]:
     pictures = {
         name: "data:image/png;base64," + base64.b64encode(data).decode() for name, data in (files or {}).items()
     }
     return {"kind": kind, "facts": dict(facts), "files": pictures}
 
 
-def _html(kept: list[dict[str, Any]], name: str) -> str:
+def _html(messages: list[dict[str, Any]], name: str) -> str:
     files = {file: data.decode() for file, data in page_files().items()}
     html = files["index.html"]
-    data = json.dumps(jsonable(kept), allow_nan=False, default=str).replace("<", "\\u003c")
+    data = json.dumps(jsonable(messages), allow_nan=False, default=str).replace("<", "\\u003c")
     elk = files["vendor/elk.bundled.js"]
     scripts = (
-        f'<script type="application/json" id="kept">{data}</script>\n'
-        f'<script>{_inline(elk)}</script>\n<script type="module">{_inline(bundled(files))}</script>\n'
+        f'<script type="application/json" id="exported">{data}</script>\n'
+        f'<script>{_inline(elk)}</script>\n<script type="module">{_inline(bundle(files))}</script>\n'
     )
     html = html.replace('<link rel="stylesheet" href="style.css">', f"<style>{files['style.css']}</style>")
     html = html.replace('<script type="module" src="app.js"></script>\n', "")
@@ -77,8 +71,8 @@ def _html(kept: list[dict[str, Any]], name: str) -> str:
     return html.replace("</body>", f"{scripts}</body>")
 
 
-def bundled(files: Mapping[str, str], entry: str = "app") -> str:
-    """The page's modules as one: each a function that gives what it exports, those it imports before it."""
+def bundle(files: Mapping[str, str], entry: str = "app") -> str:
+    """Return the page's modules as one script: each becomes a function that returns its exports, imports first."""
     order: list[str] = []
 
     def visit(name: str) -> None:
@@ -92,13 +86,13 @@ def bundled(files: Mapping[str, str], entry: str = "app") -> str:
 
 
 def _as_function(text: str) -> str:
-    given = [found[2] for found in _EXPORT.finditer(text)]
-    given += [name.strip() for found in _LIST.finditer(text) for name in found[1].split(",")]
+    names = [found[2] for found in _EXPORT.finditer(text)]
+    names += [name.strip() for found in _LIST.finditer(text) for name in found[1].split(",")]
     text = _IMPORT.sub(lambda found: f"const {found[1]} = module_{found[2]};" if found[1] else "", text)
     text = _LIST.sub("", _EXPORT.sub(r"\1", text))
-    return f"{text}\nreturn {{ {', '.join(given)} }};"
+    return f"{text}\nreturn {{ {', '.join(names)} }};"
 
 
 def _inline(script: str) -> str:
-    """A script's text inside of HTML, where its end would be taken for the element's."""
+    """Escape a script's text for HTML, where its `</script` would end the element."""
     return script.replace("</script", "<\\/script")

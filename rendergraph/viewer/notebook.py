@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rendergraph.installed import require
 from rendergraph.session.pipeline import Pipeline, loaded
-from rendergraph.viewer.child import Child
-from rendergraph.viewer.desk import Desk
+from rendergraph.viewer.render_process import RenderProcess
+from rendergraph.viewer.view_state import ViewState
 
 EXTRA = ("the viewer", "view", "starlette", "uvicorn", "websockets")
 """Arguments of `require`."""
@@ -18,8 +18,8 @@ EXTRA = ("the viewer", "view", "starlette", "uvicorn", "websockets")
 class Viewer:
     """A page that is served until `close`, or until Python ends.
 
-    In a notebook it shows itself; elsewhere `url` is what a browser opens. It has a render process of its own, so any
-    `Session` of this process stays as it is.
+    In a notebook it shows itself; elsewhere open `url` in a browser. It has a render process of its own, which shares
+    nothing with a `Session` of this process.
 
     Attributes:
         url: of the page; whoever has it may use the page.
@@ -62,21 +62,21 @@ def view(
 
     Args:
         pipeline: what to show: a pipeline, a shipped name, a file.
-        against: what it is compared with.
+        against: the pipeline to compare with.
         port: of the page's address; any that is free by default.
         device: GL device number.
         height: of the frame in a notebook, in pixels.
 
     Raises:
-        UsageError: the extra `view` is not installed, or the port is taken.
+        UsageError: the extra `view` is not installed, or the port is in use.
     """
     require(*EXTRA)
-    from rendergraph.viewer.serve import serving  # an extra: whoever only draws has not installed it
+    from rendergraph.viewer.server import Server  # needs the extra
 
     found = loaded(pipeline)
     other = None
     if against is not None:
         compared = loaded(against)
         other = Path(compared.selection.source).stem, compared.selection
-    made = serving(Desk(found.selection, Path.cwd(), against=other), Child(device), port=port)
-    return Viewer(made.url, made.start(), height)
+    server = Server(ViewState(found.selection, Path.cwd(), against=other), RenderProcess(device), port=port)
+    return Viewer(server.url, server.start(), height)

@@ -1,8 +1,8 @@
-"""The server: one page, one socket, and who may use them.
+"""The server: one page, one WebSocket, and who may use them.
 
-Bound to this machine, with a token in the address; every request and socket must come to the right host, and from a
-page of ours (or from no page), so that no other web page can drive it, by rebinding a name either. What can be fetched
-is a fixed table of our own files: no path that a client sends is ever opened.
+It is bound to this machine, with a token in the address. Every request and socket must name the right host, and come
+from one of our pages (or from no page), so that no other web page can drive it, not even by DNS rebinding. Only a fixed
+table of our own files can be fetched: no path that a client sends is ever opened.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import asyncio
 import contextlib
 import json
 import secrets
+import socket
 import struct
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,27 +22,28 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import msgspec
+import uvicorn
 from starlette.applications import Starlette
-from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.requests import Request as HttpRequest
+from starlette.responses import PlainTextResponse
+from starlette.responses import Response as HttpResponse
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from rendergraph.errors import Place, Problem, RendergraphError
+from rendergraph.errors import Place, Problem, RendergraphError, UsageError
 from rendergraph.formatting import jsonable
 from rendergraph.resources import folder
-from rendergraph.viewer.child import Child
-from rendergraph.viewer.desk import Desk, as_problems
-from rendergraph.viewer.questions import Against, Answer, Ask, Changed, Pixel, Question, Thumbnails, Variant
+from rendergraph.viewer import messages
+from rendergraph.viewer.messages import PageMessage, RenderRequest, Request, Response, parse_message
+from rendergraph.viewer.render_process import RenderProcess
+from rendergraph.viewer.view_state import ViewState
 
-LONGEST_MESSAGE = 65_536
-"""Bytes of a message from a page."""
-FASTEST = 400
-"""Messages a second that a page may send; one that drags sends some sixty."""
-MOST_PAGES = 32
-WATCH_S = 0.25
-"""Seconds between two looks at the files."""
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+WATCH_SECONDS = 0.25
+"""Between two checks of the input files."""
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".md": "text/plain"}
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -54,88 +57,123 @@ _HEADERS = {
 }
 
 
+@dataclass(frozen=True)
+class ServerLimits:
+    """What clients may take; dragging on a page sends some sixty messages per second."""
+
+    message_bytes: int = 65_536
+    messages_per_second: float = 400
+    request_seconds: float = 10.0
+    pages: int = 32
+    connections: int = 256
+
+
 @cache
 def page_files() -> Mapping[str, bytes]:
-    """What the page consists of, by the name it is fetched by."""
     home = folder("rendergraph") / "viewer" / "page"
     return {str(path.relative_to(home)): path.read_bytes() for path in sorted(home.rglob("*")) if path.suffix in _TYPES}
 
 
 @dataclass(eq=False)
 class Page:
-    """One tab: of each kind of message only the newest waits, so a slow one holds up nobody, and no memory."""
+    """One tab. Only the newest message of each kind waits, so a slow page delays no other and fills no memory."""
 
     socket: WebSocket
     waiting: dict[str, bytes | str] = field(default_factory=dict)
-    woken: asyncio.Event = field(default_factory=asyncio.Event)
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
     allowance: float = 0.0
     last: float = 0.0
     holds: bool = False
 
     def put(self, kind: str, message: bytes | str) -> None:
-        """To be sent as soon as it can, in place of an older one of its kind."""
         self.waiting.pop(kind, None)
         self.waiting[kind] = message
-        self.woken.set()
+        self.changed.set()
 
-    async def send(self) -> None:
-        """Send whatever waits, for ever."""
+    async def send_forever(self) -> None:
         while True:
-            await self.woken.wait()
-            self.woken.clear()
+            await self.changed.wait()
+            self.changed.clear()
             while self.waiting:
-                kind = next(iter(self.waiting))
-                message = self.waiting.pop(kind)
+                message = self.waiting.pop(next(iter(self.waiting)))
                 if isinstance(message, bytes):
                     await self.socket.send_bytes(message)
                 else:
                     await self.socket.send_text(message)
 
-    def too_fast(self) -> bool:
-        """Whether it sends more than anybody can mean."""
+    def is_flooding(self, most: float) -> bool:
         now = time.monotonic()
-        self.allowance = min(FASTEST, self.allowance + (now - self.last) * FASTEST) - 1
+        self.allowance = min(most, self.allowance + (now - self.last) * most) - 1
         self.last = now
         return self.allowance < 0
 
 
 class Server:
-    """The pages, the state they share, and the render process.
+    """The pages, the state they share, and the render process."""
 
-    Attributes:
-        desk: the state.
-        child: the render process.
-        token: stands in the address of everything.
-        app: the ASGI application.
-    """
-
-    def __init__(self, desk: Desk, child: Child, hosts: frozenset[str]) -> None:
-        """Make the application.
-
-        Args:
-            desk: the state.
-            child: the render process.
-            hosts: what the `Host` of a request may be; with a port.
-        """
-        self.desk, self.child = desk, child
-        self.token = secrets.token_urlsafe(24)
+    def __init__(
+        self,
+        state: ViewState,
+        process: RenderProcess,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        limits: ServerLimits = ServerLimits(),
+    ) -> None:
+        """Bind the address, where port 0 is any that is free; nothing is served yet."""
+        self._state, self._process, self._limits = state, process, limits
         self._pages: set[Page] = set()
-        self._woken = asyncio.Event()
-        self._due = True  # a picture is wanted
-        self._beside: Ask | None = None  # the picture that stands still, and has not all that is shown beside it
-        self._wrong = False  # the last picture failed, and pages know
-        self._thumbed: Ask | None = None  # what the small pictures were made of
+        self._wake = asyncio.Event()
+        self._needs_picture = True
+        self._details_of: RenderRequest | None = None  # a still picture whose comparison and thumbnails are missing
+        self._has_problems = False  # the last picture failed, and pages know
+        self._thumbnails_of: RenderRequest | None = None
         self._last: dict[str, bytes | str] = {}  # by kind, for pages that come later
-        self._asks: dict[tuple[Page, type], tuple[Question, Callable[[Answer], None]]] = {}
+        self._queries: dict[tuple[Page, type], tuple[Request, Callable[[Response], None]]] = {}
+        self._socket = _bind(host, port)
+        port = self._socket.getsockname()[1]
+        token = secrets.token_urlsafe(24)
+        names = LOOPBACK if host in LOOPBACK else {host, socket.gethostname(), *LOOPBACK}
+        self.url = f"http://{_with_port(host, port)}/{token}/"
         routes = [
-            WebSocketRoute(f"/{self.token}/socket", self._socket),
-            Route(f"/{self.token}/{{name:path}}", self._file),
+            WebSocketRoute(f"/{token}/socket", self._serve_socket),
+            Route(f"/{token}/{{name:path}}", self._serve_file),
         ]
-        self.app: ASGIApp = _Guard(Starlette(routes=routes, lifespan=self._life), hosts)
+        app = Starlette(routes=routes, lifespan=self._lifespan)
+        config = uvicorn.Config(
+            _Guard(app, frozenset(_with_port(name, port) for name in names)),
+            http=type("_Http", (_SlowRequestGuard,), {"request_seconds": limits.request_seconds}),
+            ws="websockets-sansio",
+            lifespan="on",
+            log_level="critical",
+            access_log=False,
+            server_header=False,
+            date_header=False,
+            ws_max_size=limits.message_bytes,
+            ws_per_message_deflate=False,  # pictures are compressed already
+            limit_concurrency=limits.connections,
+            timeout_keep_alive=5,
+            timeout_graceful_shutdown=1,
+        )
+        self._uvicorn = uvicorn.Server(config)
+
+    def run(self) -> None:
+        self._uvicorn.run(sockets=[self._socket])
+
+    def start(self) -> Callable[[], None]:
+        """Serve in a thread of its own, and return a function that stops it."""
+        thread = threading.Thread(target=self.run, name="rendergraph view", daemon=True)
+        thread.start()
+
+        def stop() -> None:
+            self._uvicorn.should_exit = True
+            thread.join(10.0)
+
+        return stop
 
     @contextlib.asynccontextmanager
-    async def _life(self, app: Starlette) -> AsyncIterator[None]:
-        self._woken.set()
+    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        self._wake.set()
         work = asyncio.create_task(self._work())
         try:
             yield
@@ -143,37 +181,36 @@ class Server:
             work.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await work
-            await asyncio.to_thread(self.child.close)
+            await asyncio.to_thread(self._process.close)
 
-    async def _file(self, request: Request) -> Response:
+    async def _serve_file(self, request: HttpRequest) -> HttpResponse:
         name = request.path_params.get("name", "") or "index.html"
         data = page_files().get(name)
         if data is None:
             return PlainTextResponse("not found\n", 404, headers=_HEADERS)
-        ending = name[name.rfind(".") :]
-        return Response(data, headers=_HEADERS, media_type=_TYPES[ending])
+        return HttpResponse(data, headers=_HEADERS, media_type=_TYPES[name[name.rfind(".") :]])
 
     # --- pages -------------------------------------------------------------------------------------------------------
 
-    async def _socket(self, socket: WebSocket) -> None:
-        if len(self._pages) >= MOST_PAGES:
+    async def _serve_socket(self, socket: WebSocket) -> None:
+        if len(self._pages) >= self._limits.pages:
             await socket.close(1013, "too many pages")
             return
         await socket.accept()
         page = Page(socket)
         for kind, message in self._last.items():
             page.put(kind, message)
-        page.put("state", _text("state", self.desk.state()))
+        page.put("state", _text("state", self._state.as_json()))
         self._pages.add(page)
-        sending = asyncio.create_task(page.send())
+        sending = asyncio.create_task(page.send_forever())
         try:
             await self._listen(page)
         except (WebSocketDisconnect, RuntimeError):
-            pass  # it is gone
+            pass  # the page has gone
         finally:
             self._pages.discard(page)
-            if page.holds and self.desk.said({"do": "hold", "on": False}):
-                self._want()
+            if page.holds and self._state.apply(messages.HoldMessage(on=False)):
+                self._request_picture()
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, Exception):
                 await sending
@@ -181,51 +218,48 @@ class Server:
     async def _listen(self, page: Page) -> None:
         while True:
             text = await page.socket.receive_text()
-            if page.too_fast():
+            if page.is_flooding(self._limits.messages_per_second):
                 await page.socket.close(1008, "too many messages")
                 return
             try:
-                message = json.loads(text)
-                if not isinstance(message, dict):
-                    raise TypeError("no object")
-            except (ValueError, TypeError, RecursionError):
+                message = msgspec.json.decode(text, type=dict[str, Any])
+            except (msgspec.DecodeError, RecursionError):
                 await page.socket.close(1007, "not a JSON object")
                 return
             try:
-                self._hear(page, message)
+                self._apply(page, parse_message(message))
             except RendergraphError as error:
-                page.put("refused", _text("refused", {"problems": as_problems(error)}))
+                page.put("refused", _text("refused", {"problems": _problems(error)}))
 
-    def _hear(self, page: Page, message: Mapping[str, Any]) -> None:
-        act = message.get("do")
-        if act == "pixel":
-            place = Pixel(_unit(message.get("x")), _unit(message.get("y")))
-            self._ask(page, place, lambda answer: page.put("pixel", _text("pixel", dict(answer.facts))))
-        elif act == "save":
-            path = self.desk.file(message.get("name"))
-            self._ask(page, Variant(self.desk.opened), lambda answer: page.put("saved", _saved(path, answer)))
-        else:
-            if act == "hold":
-                page.holds = bool(message.get("on"))
-            if self.desk.said(message):
-                self._want()
-            if _text("state", state := self.desk.state()) != self._last.get("state"):
-                self._tell("state", state)
+    def _apply(self, page: Page, message: PageMessage) -> None:
+        match message:
+            case messages.PixelMessage():
+                request = messages.PixelRequest(_clamp(message.x), _clamp(message.y))
+                self._query(page, request, lambda found: page.put("pixel", _text("pixel", dict(found.facts))))
+            case messages.SaveMessage():
+                path = self._state.variant_file(message.name)
+                variant = messages.VariantRequest(self._state.opened)
+                self._query(page, variant, lambda found: page.put("saved", _save(path, found)))
+            case _:
+                if isinstance(message, messages.HoldMessage):
+                    page.holds = message.on
+                if self._state.apply(message):
+                    self._request_picture()
+                if _text("state", state := self._state.as_json()) != self._last.get("state"):
+                    self._broadcast("state", state)
 
-    def _ask(self, page: Page, question: Question, then: Callable[[Answer], None]) -> None:
-        """Ask something beside pictures; of the same page and kind only the last counts."""
-        self._asks.pop((page, type(question)), None)
-        self._asks[page, type(question)] = question, then
-        self._woken.set()
+    def _query(self, page: Page, request: Request, then: Callable[[Response], None]) -> None:
+        """Ask for something beside pictures; of one page and kind only the last request counts."""
+        self._queries.pop((page, type(request)), None)
+        self._queries[page, type(request)] = request, then
+        self._wake.set()
 
-    def _want(self) -> None:
-        """Another picture."""
-        self._due = True
-        self._woken.set()
+    def _request_picture(self) -> None:
+        self._needs_picture = True
+        self._wake.set()
 
-    def _tell(self, kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> None:
-        """Something for every page, and for those that come later."""
-        message: bytes | str = _text(kind, facts) if files is None else _packed(kind, facts, files)
+    def _broadcast(self, kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> None:
+        message: bytes | str = _text(kind, facts) if files is None else _pack(kind, facts, files)
         if kind in ("state", "pipeline", "picture", "thumbnails", "against", "problems"):
             self._last[kind] = message
         for page in self._pages:
@@ -234,108 +268,124 @@ class Server:
     # --- the render process ------------------------------------------------------------------------------------------
 
     async def _work(self) -> None:
-        """Ask for what is wanted, one question at a time; the newest state wins."""
+        """Send one request at a time; the newest state wins."""
         while True:
             try:
-                await asyncio.wait_for(self._woken.wait(), WATCH_S)
+                await asyncio.wait_for(self._wake.wait(), WATCH_SECONDS)
             except TimeoutError:
                 if self._pages and await self._files_changed():
-                    self._thumbed = None
-                    self._want()
+                    self._thumbnails_of = None
+                    self._request_picture()
                 continue
-            self._woken.clear()
-            while self._asks:
-                question, then = self._asks.pop(next(iter(self._asks)))
-                if (answer := await self._answer(question)) is not None:
-                    then(answer)
-            if self._due:
-                self._due, self._beside = False, None
-                await self._draw()
-            if self._beside is not None:
-                await self._more(self._beside)
+            self._wake.clear()
+            while self._queries:
+                request, then = self._queries.pop(next(iter(self._queries)))
+                if (response := await self._ask(request)) is not None:
+                    then(response)
+            if self._needs_picture:
+                self._needs_picture, self._details_of = False, None
+                await self._render()
+            if self._details_of is not None:
+                await self._render_details(self._details_of)
 
-    async def _draw(self) -> None:
-        """The picture that is wanted now; after one that fails nothing is asked until something changes."""
-        begun, asked = time.monotonic(), self.desk.question()
-        answer = await self._answer(asked)
-        if answer is None or answer.problems:
+    async def _render(self) -> None:
+        """Show the current picture; after one that fails nothing is requested until something changes."""
+        begun, request = time.monotonic(), self._state.request()
+        response = await self._ask(request)
+        if response is None or response.problems:
             return
-        self._show(answer, asked.frame)
-        if self.desk.playing:
-            await asyncio.sleep(max(0.0, 1.0 / self.desk.fps - (time.monotonic() - begun)))
-            if self.desk.playing and self.desk.frame == asked.frame:  # nobody stopped it or went elsewhere meanwhile
-                self.desk.frame += 1
-            self._want()
-        elif asked.still:
-            self._beside = asked
+        self._show(response, request.frame)
+        if self._state.playing:
+            await asyncio.sleep(max(0.0, 1.0 / self._state.fps - (time.monotonic() - begun)))
+            if self._state.playing and self._state.frame == request.frame:  # neither stopped nor moved meanwhile
+                self._state.frame += 1
+            self._request_picture()
+        elif request.still:
+            self._details_of = request
 
-    def _show(self, answer: Answer, frame: int) -> None:
-        self.desk.answered(answer)
-        facts = dict(answer.facts)
+    def _show(self, response: Response, frame: int) -> None:
+        self._state.record(response)
+        facts = dict(response.facts)
         if (pipeline := facts.pop("pipeline", None)) is not None:
-            self._tell("pipeline", pipeline | {"revision": self.desk.revision})
-        if self._wrong:
-            self._say_problems([])
-        self._tell("picture", facts | {"frame": frame}, answer.files)
+            self._broadcast("pipeline", pipeline | {"revision": self._state.revision})
+        if self._has_problems:
+            self._show_problems([])
+        self._broadcast("picture", facts | {"frame": frame}, response.files)
 
-    async def _more(self, asked: Ask) -> None:
-        """What is shown beside a picture that stands still; whatever is wanted meanwhile comes first."""
+    async def _render_details(self, request: RenderRequest) -> None:
+        """Show the comparison and thumbnails of a still picture; a new request of a page comes first."""
         await asyncio.sleep(0.05)
-        if self._woken.is_set():
-            return  # it is asked for again
-        other = self.desk.other
-        if other is not None and (answer := await self._answer(Against(other))) is not None:
-            self._tell("against", dict(answer.facts) | {"problems": list(answer.problems)}, answer.files)
+        if self._wake.is_set():
+            return  # the work loop comes back here
+        other = self._state.other
+        if other is not None and (response := await self._ask(messages.CompareRequest(other))) is not None:
+            problems = {"problems": list(response.problems)}
+            self._broadcast("against", dict(response.facts) | problems, response.files)
         elif other is None and self._last.pop("against", None) is not None:
-            self._tell("against", {}, {})
-        if self._woken.is_set():
+            self._broadcast("against", {}, {})
+        if self._wake.is_set():
             return
-        asked = replace(asked, port="", stops=0.0, known=0)
-        if asked != self._thumbed and (answer := await self._answer(Thumbnails())) is not None and answer.files:
-            self._thumbed = asked
-            self._tell("thumbnails", answer.facts, answer.files)
-        self._beside = None
+        request = replace(request, port="", exposure=0.0, known_revision=0)
+        if request != self._thumbnails_of:
+            response = await self._ask(messages.ThumbnailRequest())
+            if response is not None and response.files:
+                self._thumbnails_of = request
+                self._broadcast("thumbnails", response.facts, response.files)
+        self._details_of = None
 
-    def _say_problems(self, problems: Sequence[Mapping[str, Any]]) -> None:
-        self._wrong = bool(problems)
-        self._tell("problems", {"problems": list(problems)})
+    def _show_problems(self, problems: Sequence[Mapping[str, Any]]) -> None:
+        self._has_problems = bool(problems)
+        self._broadcast("problems", {"problems": list(problems)})
 
     async def _files_changed(self) -> bool:
-        try:
-            answer = await asyncio.to_thread(self.child.ask, Changed()) if self.child.pid is not None else Answer()
-        except RendergraphError as error:
-            self._say_problems(as_problems(error))
-            return False
-        return bool(answer.facts.get("changed"))
+        response = await self._ask(messages.ChangedFilesRequest()) if self._process.pid is not None else None
+        return response is not None and bool(response.facts.get("changed"))
 
-    async def _answer(self, question: Question) -> Answer | None:
-        """What the render process says; None where it was lost, which pages are told."""
+    async def _ask(self, request: Request) -> Response | None:
+        """Return the response of the render process; None where it was lost, which pages are told."""
         try:
-            answer = await asyncio.to_thread(self.child.ask, question)
+            response = await asyncio.to_thread(self._process.ask, request)
         except RendergraphError as error:
-            self._say_problems(as_problems(error))
+            self._show_problems(_problems(error))
             return None
-        if answer.problems:
-            self._say_problems(answer.problems)
-        return answer
+        if response.problems:
+            self._show_problems(response.problems)
+        return response
+
+
+class _SlowRequestGuard(H11Protocol):
+    """Closes a connection that sends no request in time: it would hold a place for ever."""
+
+    request_seconds: float
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
+        super().connection_made(transport)
+        self._deadline = self.loop.call_later(self.request_seconds, self._too_slow)
+
+    def _too_slow(self) -> None:
+        if self.cycle is None and self.transport.get_protocol() is self:  # it has not become a WebSocket
+            self.transport.close()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._deadline.cancel()
+        super().connection_lost(exc)
 
 
 class _Guard:
-    """Turns away whatever does not come to this host, or comes from a page of somebody else."""
+    """Refuses requests for another host, and those that come from another web page."""
 
     def __init__(self, app: ASGIApp, hosts: frozenset[str]) -> None:
         self._app, self._hosts = app, hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand on what may be handed on."""
-        if scope["type"] == "lifespan" or self._welcome(scope):
+        if scope["type"] == "lifespan" or self._is_allowed(scope):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
             await PlainTextResponse("refused\n", 403, headers=_HEADERS)(scope, receive, send)
 
-    def _welcome(self, scope: Scope) -> bool:
+    def _is_allowed(self, scope: Scope) -> bool:
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1"), []).append(value.decode("latin-1"))
@@ -343,33 +393,53 @@ class _Guard:
         if len(host) != 1 or host[0] not in self._hosts or len(origin) > 1:
             return False
         if not origin:
-            return bool(scope["type"] != "websocket")  # a browser always says where a socket comes from
-        found = urlsplit(origin[0])
-        return found.scheme in ("http", "https") and found.netloc == host[0]
+            return bool(scope["type"] != "websocket")  # a browser always names the origin of a socket
+        page = urlsplit(origin[0])
+        return page.scheme in ("http", "https") and page.netloc == host[0]
 
 
-def _unit(value: Any) -> float:
-    return min(max(float(value), 0.0), 1.0) if isinstance(value, (int, float)) and value == value else 0.0
+def _bind(host: str, port: int) -> socket.socket:
+    bound = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind((host, port))
+        bound.listen(128)  # a browser may come before the server runs, and waits
+    except OSError as error:
+        bound.close()
+        text = f"'{host}' port {port} is not available: {error.strerror or error}; choose another with --port"
+        raise UsageError(Problem("RG500", text)) from None
+    return bound
 
 
-def _saved(path: Path, answer: Answer) -> str:
-    """Write a variant; what the page is told."""
-    if answer.problems or "yaml" not in answer.facts:
-        return _text("saved", {"problems": list(answer.problems)})
+def _with_port(host: str, port: int) -> str:
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def _clamp(value: float) -> float:
+    return min(max(value, 0.0), 1.0)
+
+
+def _problems(error: RendergraphError) -> list[dict[str, Any]]:
+    return [problem.as_json() | {"node": None} for problem in error.problems]
+
+
+def _save(path: Path, response: Response) -> str:
+    if response.problems or "yaml" not in response.facts:
+        return _text("saved", {"problems": list(response.problems)})
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(answer.facts["yaml"])
+            file.write(response.facts["yaml"])
     except OSError as error:
         problem = Problem("RG504", f"cannot be written: {error.strerror or error}", Place(path.name))
         return _text("saved", {"problems": [problem.as_json()]})
-    return _text("saved", {"path": path.name, "yaml": answer.facts["yaml"], "problems": []})
+    return _text("saved", {"path": path.name, "yaml": response.facts["yaml"], "problems": []})
 
 
 def _text(kind: str, facts: Mapping[str, Any]) -> str:
     return json.dumps(jsonable({"kind": kind} | dict(facts)), allow_nan=False, default=str)
 
 
-def _packed(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
-    """The length of the JSON in four bytes, the JSON with each file's length, then the files."""
+def _pack(kind: str, facts: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
+    """Return the length of the JSON in four bytes, the JSON with each file's length, then the files."""
     head = _text(kind, dict(facts) | {"files": {name: len(data) for name, data in files.items()}}).encode()
     return struct.pack("<I", len(head)) + head + b"".join(files.values())

@@ -17,8 +17,9 @@ from typing import Any
 import pytest
 
 from rendergraph import api
-from rendergraph.authoring import KINDS, new_node
-from rendergraph.authoring.names import class_name
+from rendergraph.authoring import KINDS, NewNode, new_node
+from rendergraph.authoring.examine import examine_file
+from rendergraph.authoring.scaffold import class_name
 from rendergraph.catalog import Catalog
 from rendergraph.cli.app import main
 from rendergraph.errors import InputError, RenderError
@@ -36,35 +37,49 @@ def run(line: str, where: Path) -> subprocess.CompletedProcess[str]:
     return done
 
 
+def commands_of(made: NewNode, where: Path) -> tuple[Path, list[str]]:
+    """The folder that the printed commands lead to, and those that follow; installing needs a place to install to."""
+    folders = [command[3:] for command in made.commands if command.startswith("cd ")]
+    return where.joinpath(*folders), [line for line in made.commands if not line.startswith(("cd ", "pip "))]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("package", [False, True], ids=["in_place", "package"])
-@pytest.mark.parametrize("kind", KINDS)
-def test_everything_works_at_once(kind: Any, package: bool, tmp_path: Path) -> None:
-    """The commands it prints, exactly; installing is left out, which needs a place to install to."""
-    made = new_node("lens_falloff", kind, package=package, where=tmp_path)
-    where = tmp_path
-    for command in made.commands:
-        if command.startswith("cd "):
-            where = where / command[3:]
-        elif command == "pytest":
-            passed = run("pytest -q -p no:cacheprovider", where)
-            assert " passed" in passed.stdout
-            assert "warning" not in passed.stdout
-        elif not command.startswith("pip "):
-            run(command, where)
+@pytest.mark.parametrize("kind", ["fullscreen", pytest.param("compute", marks=pytest.mark.nightly)])
+def test_the_commands_it_prints_work_as_typed(kind: Any, tmp_path: Path) -> None:
+    where, commands = commands_of(new_node("lens_falloff", kind, package=True, where=tmp_path), tmp_path)
+    for command in commands:
+        done = run(command.replace("pytest", "pytest -q -p no:cacheprovider"), where)
+        assert command != "pytest" or " passed" in done.stdout
+        assert "warning" not in done.stdout
     assert (where / "lens_falloff.png").stat().st_size > 1000
-    ruff = ["--isolated", "--line-length", "120", "--target-version", "py311"]
-    run(shlex.join(["ruff", "check", *ruff, "--select", "E,F,W,I,UP,B,C4,SIM,RUF,PT,RET", "."]), where)
-    run(shlex.join(["ruff", "format", "--check", *ruff[:3], "."]), where)
 
 
 @pytest.mark.slow
-def test_templates_pass_the_type_checker(tmp_path: Path) -> None:
+def test_everything_works_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every template, in place and as a package: pictures, checks, tests, lint and types, of all together."""
     for kind in KINDS:
-        new_node(f"a_{kind.replace('-', '_')}", kind, where=tmp_path)
+        for package in (False, True):
+            name = f"{kind[:4]}_{'pack' if package else 'here'}"
+            where, commands = commands_of(new_node(name, kind, package=package, where=tmp_path), tmp_path)
+            monkeypatch.chdir(where)
+            for command in commands:
+                verb, *words = shlex.split(command)[1:] or [""]
+                if verb == "run":
+                    assert main([verb, *words, "--size", "128x72"]) == 0
+                elif verb == "check-node":
+                    assert examine_file(Path(words[0]).resolve(), [], None, lambda stage, what: None).problems == ()
+            assert (where / f"{name}.png").stat().st_size > 1000
+    assert " passed" in run("pytest -q -p no:cacheprovider --import-mode=importlib -W error", tmp_path).stdout
+    ruff = ["--isolated", "--line-length", "120", "--target-version", "py311"]
+    run(shlex.join(["ruff", "check", *ruff, "--select", "E,F,W,I,UP,B,C4,SIM,RUF,PT,RET", "."]), tmp_path)
+    run(shlex.join(["ruff", "format", "--check", *ruff[:3], "."]), tmp_path)
     settings = f"[mypy]\nstrict = true\nmypy_path = {ROOT}\n[mypy-rendergraph.*]\nfollow_imports = silent\n"
     (tmp_path / "mypy.ini").write_text(settings)
-    run("mypy --config-file mypy.ini .", tmp_path)
+    cache = ROOT / ".mypy_cache" / "templates"
+    run(
+        f"mypy --cache-dir {cache} --config-file mypy.ini {' '.join(path.name for path in tmp_path.glob('*.py'))}",
+        tmp_path,
+    )
 
 
 @pytest.mark.slow
@@ -132,7 +147,7 @@ def test_a_second_node_beside_the_first_leaves_the_schema_and_says_how_to_refres
         ("gl_thing", r"reserved by GLSL"),
         ("filter", r"reserved by GLSL or Python; choose another, such as 'my_filter'"),
         ("lambda", r"reserved"),
-        ("tonemap", r"there is a node type of that name; choose another, such as 'my_tonemap'"),
+        ("tonemap", r"a node type of that name exists; choose another, such as 'my_tonemap'"),
         ("random", r"a Python module has that name"),
         ("numpy", r"a Python module has that name"),
         ("test_it", r"pytest would take the module for a test; .* 'it_node'"),
@@ -158,11 +173,11 @@ def test_names_that_would_hide_something_get_another_class_or_id(tmp_path: Path)
 @pytest.mark.parametrize("standing", ["lens_falloff.frag", "test_lens_falloff.py"])
 def test_nothing_is_written_where_one_file_exists(standing: str, tmp_path: Path) -> None:
     (tmp_path / standing).symlink_to("nowhere")  # a broken link counts
-    with pytest.raises(InputError, match=rf"{standing}: RG531 .* exists already and is left as it is"):
+    with pytest.raises(InputError, match=rf"{standing}: RG531 .* already exists and was not changed"):
         new_node("lens_falloff", where=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [standing]
     (tmp_path / "pack").mkdir()
-    with pytest.raises(InputError, match="RG531 'pack' exists already"):
+    with pytest.raises(InputError, match="RG531 'pack' already exists"):
         new_node("pack", package=True, where=tmp_path)
 
 
@@ -189,8 +204,8 @@ def test_a_file_that_appears_meanwhile_is_not_touched(tmp_path: Path, monkeypatc
         (tmp_path / "test_lens_falloff.py").write_text("mine")
         return "{}\n"
 
-    monkeypatch.setattr("rendergraph.authoring.new._schema", late)
-    with pytest.raises(InputError, match=r"RG531 'test_lens_falloff.py' exists already"):
+    monkeypatch.setattr("rendergraph.authoring.scaffold._schema", late)
+    with pytest.raises(InputError, match=r"RG531 'test_lens_falloff.py' already exists"):
         new_node("lens_falloff", where=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["test_lens_falloff.py"]
     assert (tmp_path / "test_lens_falloff.py").read_text() == "mine"

@@ -396,7 +396,7 @@ def test_check_node_takes_it(write: Write, capsys: pytest.CaptureFixture[str]) -
     assert main(["check-node", str(folder / "plain.frag")]) == 0
     printed = capsys.readouterr().err
     assert "warning: RG445 shader node 'plain.frag' lacks doc of the node" in printed
-    assert "plain.frag:2:1: warning: RG455 'unused' is declared, but no program looks at it" in printed
+    assert "plain.frag:2:1: warning: RG455 'unused' is declared, but no shader program uses it" in printed
 
 
 def test_a_link_in_a_folder_leads_nowhere_outside(write: Write) -> None:

@@ -99,7 +99,7 @@ def test_frames_that_depend_on_those_before_say_so_or_begin_as_early_as_is_decla
     words = ("--frames", "3-12", "--executor", "processes:2", "--json", "-o", "there.##.exr")
     told = cli("run", "p.yaml", *words)
     assert told.code == 3
-    assert "RG643 a frame depends on those before it, by 'now': it cannot be drawn in parts" in told.err
+    assert "RG643 each frame depends on earlier ones through 'now', so frames cannot be split among workers" in told.err
     (tmp_path / "w.yaml").write_text(FILE.replace("size:", "warm_up: 1\nsize:"))
     there = cli("run", "w.yaml", *words)
     assert there.code == 0, there.err

@@ -129,10 +129,9 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(base: rg.Pipeline, gl: r
 
     def kill(event: Mapping[str, Any]) -> None:
         told.append(event["event"])
-        busy = [seat.child.process.pid for seat in farm._seats if seat.child is not None and seat.task is not None]
-        if not killed and busy:
-            killed.append(busy[0])
-            os.kill(busy[0], signal.SIGKILL)
+        if not killed and farm.busy_pids:
+            killed.append(farm.busy_pids[0])
+            os.kill(killed[0], signal.SIGKILL)
 
     told: list[str] = []
     with farm:
@@ -247,7 +246,7 @@ def test_node_classes_at_hand_are_drawn_here_alone(make: Any, tmp_path: Path) ->
     pattern = make({"a": {"type": "pattern", "params": {}}}, "a.color")
     axes = {"a.seed": [1.0, 2.0]}
     assert len(sweep(pattern, axes, tmp_path / "a", frames=1).comparison.results) == 2
-    with pytest.raises(UsageError, match="RG641 node classes that are at hand cannot be sent"):
+    with pytest.raises(UsageError, match="RG641 in-memory node classes cannot be sent"):
         sweep(pattern, axes, tmp_path / "b", frames=1, executor="processes:2")
 
 
@@ -355,7 +354,7 @@ def test_what_was_lost_with_all_workers_is_sent_to_the_next(
 
     with cluster.client(2) as client:
         if changed:
-            with pytest.raises(RenderError, match=r"RG641 .*make.frag' has changed since; what is finished is kept"):
+            with pytest.raises(RenderError, match=r"RG641 .*make.frag' has changed since; finished runs are saved"):
                 sweep(base, FEW, tmp_path / "there", frames=1, executor=client, events=meanwhile)
             return
         there = sweep(base, FEW, tmp_path / "there", frames=1, executor=client, events=meanwhile)
@@ -380,7 +379,7 @@ def test_what_a_worker_does_not_get_as_it_goes_is_sent_to_others(
 
     scattered = distributed.Client.scatter
     monkeypatch.setattr(distributed.Client, "scatter", scatter)
-    with dask_cluster.local(1, (), timeout=60.0) as farm:
+    with dask_cluster.start_local_cluster(1, (), timeout=60.0) as farm:
         farm.put("what is needed")
     assert len(sent) == 2
     assert sent[0] == sent[1]
@@ -436,8 +435,8 @@ def test_a_plugin_that_a_worker_lacks_is_told_before_anything_runs_and_a_lost_sc
             cluster.scheduler.kill()
 
     out = tmp_path / "out"
-    monkeypatch.setattr("rendergraph.farm.dask_cluster.CONNECT", 2.0)
-    with pytest.raises(RenderError, match=r"RG641 the Dask scheduler is gone; what is finished is kept"):
+    monkeypatch.setattr("rendergraph.farm.dask_cluster.CONNECT_SECONDS", 2.0)
+    with pytest.raises(RenderError, match=r"RG641 the Dask scheduler is gone; finished runs are saved"):
         sweep(base, AXES, out, frames=1, executor=f"dask://{cluster.address}", events=kill)
     there = len(rows(out))
     assert 1 <= there < 64

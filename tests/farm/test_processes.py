@@ -48,7 +48,7 @@ def test_what_is_lost_is_tried_again_and_given_up_at_last(chore: Chores, tmp_pat
         "lacks memory": True,
     }
     assert "ended (SIGKILL)" in str(failed["dies"].error)
-    assert "said nothing for 2 s" in str(failed["hangs"].error)
+    assert "timed out after 2 s" in str(failed["hangs"].error)
     items = [event for event in events if isinstance(event, TaskOutput)]
     assert all(event.value[2] == [1, 2, 3] for event in items)
     pids = {event.value[1] for event in items}
@@ -105,7 +105,7 @@ def alive(pid: int) -> bool:
 
 @pytest.mark.parametrize("word", ["threads", "processes:0", "processes:x", "dask://", "dask://host"])
 def test_executors_that_there_are_not_are_told(word: str) -> None:
-    with pytest.raises(UsageError, match=r"RG641 there is no executor .*processes:N"), make_executor(word, tasks=2):
+    with pytest.raises(UsageError, match=r"RG641 unknown executor .*processes:N"), make_executor(word, tasks=2):
         pass
 
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 import rendergraph as rg
-from rendergraph.authoring.declarations import docs
-from rendergraph.authoring.examine import examine
+from rendergraph.authoring.examine import doc_problems, examine
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Node, declaration_mistakes
 from rendergraph.glsl import expand
@@ -54,7 +53,7 @@ def test_declaration(name: str) -> None:
 
 @pytest.mark.parametrize("name", BUILTIN)
 def test_docs_are_sentences(name: str) -> None:
-    assert list(docs(CATALOG.get(name).cls)) == []
+    assert list(doc_problems(CATALOG.get(name).cls)) == []
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rendergraph as rg
-from rendergraph.authoring.gl_watch import let_go
+from rendergraph.authoring.gl_state import flush_deleted_programs
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.gl.raw import RawGL
 from rendergraph.resources import shipped_pipelines
@@ -38,14 +38,14 @@ def test_closing_a_session_frees_everything_it_made() -> None:
     ctx = moderngl.create_context(standalone=True, backend="egl", require=450)  # type: ignore[arg-type]  # its stub knows only dicts
     session = rg.Session(ctx=ctx)
     raw = session.device.raw
-    let_go(session.device)
+    flush_deleted_programs(session.device)
     before = living(raw)
     pipeline = rg.load("forward", size=(64, 36))
     for variant in (pipeline, pipeline.set("shadows.taps", 1), pipeline.with_scene("spheres")):
         session.render(variant)
     assert living(raw) != before
     session.close()
-    let_go(session.device)
+    flush_deleted_programs(session.device)
     assert living(raw) == before
     ctx.release()
 

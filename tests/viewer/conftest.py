@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +13,10 @@ from urllib.parse import urlsplit
 import pytest
 
 import rendergraph as rg
+from rendergraph.viewer.messages import Response
+from rendergraph.viewer.render_process import RenderProcess
+
+FORWARD = rg.Selection("forward", size=(64, 36))
 
 
 class Tab:
@@ -46,11 +49,12 @@ def unpacked(data: bytes) -> tuple[dict[str, Any], dict[str, bytes]]:
 
 
 class Served:
-    """A viewer, and ways to it."""
+    """A server, and ways to it."""
 
-    def __init__(self, viewer: Any, folder: Path) -> None:
-        self.viewer, self.url, self.folder = viewer, viewer.url, folder
-        parts = urlsplit(viewer.url)
+    def __init__(self, server: Any, state: Any, process: Any) -> None:
+        self.url, self.state, self.process = server.url, state, process
+        self.folder: Path = state.folder
+        parts = urlsplit(server.url)
         self.host, self.path = parts.netloc, parts.path
         self.port = parts.port
 
@@ -64,17 +68,56 @@ class Served:
         with connect(address, origin=found, max_size=None, proxy=None) as socket:  # type: ignore[arg-type]
             yield Tab(socket)
 
+    def reset(self, opened: rg.Selection | None = None) -> None:
+        """The state as of a server that was started now, with its picture."""
+        self.state.__init__(opened or self.state.opened, self.folder)
+        with self.tab() as tab:
+            for number in (2, 1):  # the first message may be of a picture from before
+                tab.say(do="frame", number=number)
+                tab.hear("picture", still=True, frame=number)
+
+
+@contextmanager
+def serve(folder: Path, process: Any, **options: Any) -> Iterator[Served]:
+    """A server of `forward`."""
+    pytest.importorskip("uvicorn")
+    from rendergraph.viewer.server import Server
+    from rendergraph.viewer.view_state import ViewState
+
+    state = ViewState(FORWARD, folder)
+    server = Server(state, process, **options)
+    stop = server.start()
+    try:
+        yield Served(server, state, process)
+    finally:
+        stop()
+
 
 @pytest.fixture(scope="session")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """One page of `forward` for all tests of a process; a test leaves it as it found it."""
+    with serve(tmp_path_factory.mktemp("page"), RenderProcess()) as found:
+        yield found
+
+
+class NoProcess:
+    """A render process that renders nothing."""
+
+    pid = None
+
+    def ask(self, request: object) -> Response:
+        return Response()
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def limited(tmp_path: Path) -> Iterator[Served]:
+    """A page with low limits, which shows nothing."""
     pytest.importorskip("uvicorn")
-    folder = tmp_path_factory.mktemp("page")
-    before = os.getcwd()
-    os.chdir(folder)
-    try:
-        viewer = rg.view(rg.load("forward", size=(64, 36)))
-    finally:
-        os.chdir(before)
-    with viewer:
-        yield Served(viewer, folder)
+    from rendergraph.viewer.server import ServerLimits
+
+    limits = ServerLimits(messages_per_second=20, request_seconds=1.0, pages=3)
+    with serve(tmp_path, NoProcess(), limits=limits) as found:
+        yield found

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import rendergraph as rg
 
 pytestmark = pytest.mark.slow
 SIZE = (64, 36)
+VIEWPORT: Any = {"width": 1300, "height": 1000}
 STILL = "#picture[data-still=true]"
 
 
@@ -25,8 +28,20 @@ class Hand:
         self.page = page
         self.wrong: list[str] = []
         page.set_default_timeout(60_000)
-        page.on("pageerror", lambda error: self.wrong.append(str(error)))
-        page.on("console", lambda said: self.wrong.append(said.text) if self.is_wrong(said) else None)
+        self.listeners = {"pageerror": self.on_error, "console": self.on_console}
+        for event, listener in self.listeners.items():
+            page.on(event, listener)
+
+    def close(self) -> None:
+        for event, listener in self.listeners.items():
+            self.page.remove_listener(event, listener)
+
+    def on_error(self, error: Any) -> None:
+        self.wrong.append(str(error))
+
+    def on_console(self, message: Any) -> None:
+        if self.is_wrong(message):
+            self.wrong.append(message.text)
 
     @staticmethod
     def is_wrong(said: Any) -> bool:
@@ -65,21 +80,39 @@ class Hand:
         return str(self.page.inner_text(selector))
 
 
-@pytest.fixture
-def hand(browser: Any) -> Iterator[Hand]:
-    context = browser.new_context(viewport={"width": 1300, "height": 1000}, reduced_motion="reduce")
-    found = Hand(context.new_page())
-    yield found
+@pytest.fixture(scope="module")
+def tab(browser: Any) -> Iterator[Any]:
+    """One page of the browser for all tests."""
+    context = browser.new_context(viewport=VIEWPORT, reduced_motion="reduce")
+    yield context.new_page()
     context.close()
+
+
+@pytest.fixture
+def hand(tab: Any) -> Iterator[Hand]:
+    tab.set_viewport_size(VIEWPORT)
+    found = Hand(tab)
+    yield found
+    found.close()
+    tab.goto("about:blank")
     assert found.wrong == []
 
 
 @pytest.fixture
-def page(hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
-    monkeypatch.chdir(tmp_path)
-    with rg.view(rg.load("forward", size=SIZE)) as viewer:
-        hand.open(viewer.url)
-        yield hand
+def show(hand: Hand, served: Any) -> Callable[..., Hand]:
+    """`show(source)`: the page of a pipeline, as if it had just been opened."""
+
+    def open_page(source: object = "forward", size: tuple[int, int] | None = SIZE) -> Hand:
+        served.reset(rg.Selection(str(source), size=size))
+        hand.open(served.url)
+        return hand
+
+    return open_page
+
+
+@pytest.fixture
+def page(show: Callable[..., Hand]) -> Hand:
+    return show()
 
 
 def test_a_slider_changes_the_picture_and_undo_takes_all_of_its_way_back(page: Hand) -> None:
@@ -138,7 +171,7 @@ def test_a_row_is_marked_while_the_hand_is_in_the_next(page: Hand) -> None:
     page.choose("display")
     page.page.fill("[id='p-display.exposure']", "1")
     page.after(lambda: page.page.focus("[id='p-display.white']"))
-    page.page.wait_for_selector(".parameter.set [aria-label='Take back display.exposure']")
+    page.page.wait_for_selector(".parameter.set [aria-label='Revert display.exposure']")
     page.page.keyboard.type("1")
     assert page.page.evaluate("document.activeElement.id") == "p-display.white"
 
@@ -155,9 +188,9 @@ def test_what_was_chosen_stands_until_its_picture_comes_and_undo_is_seen_where_i
     assert page.page.evaluate("[...window.seen]") == ["aces"]
     field = page.page.locator("[id='p-display.exposure']")
     page.after(lambda: field.fill("2") or page.page.keyboard.press("Enter"))
-    page.page.wait_for_selector("[aria-label='Take back display.exposure']")
+    page.page.wait_for_selector("[aria-label='Revert display.exposure']")
     page.after(lambda: page.page.keyboard.press("Control+z"))
-    page.page.wait_for_selector("[aria-label='Take back display.exposure']", state="detached")
+    page.page.wait_for_selector("[aria-label='Revert display.exposure']", state="detached")
     page.until("document.getElementById('p-display.exposure').value === '0'")
     page.after(lambda: page.page.keyboard.type("3") or page.page.keyboard.press("Enter"))  # the field is still at hand
     assert field.input_value() == "3"
@@ -199,7 +232,7 @@ def test_a_port_has_the_values_that_python_reads(page: Hand, gl: rg.Session) -> 
 
 
 def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
-    page: Hand, tmp_path: Path, gl: rg.Session
+    page: Hand, served: Any, gl: rg.Session
 ) -> None:
     page.choose("shadows")
     page.after(lambda: page.page.select_option("[id='p-shadows.type']", "shadow_vsm"))
@@ -216,29 +249,25 @@ def test_a_type_is_swapped_saved_as_a_file_and_that_is_the_same_picture(
     page.page.click("#save")
     page.page.fill("#file", "other.yaml")
     page.page.keyboard.press("Escape")
-    saved = gl.render(rg.load(tmp_path / "soft.yaml"), outputs=("image",))["image"]
+    saved = gl.render(rg.load(served.folder / "soft.yaml"), outputs=("image",))["image"]
     direct = gl.render(rg.load("forward", size=SIZE, sets=["shadows.type=shadow_vsm"]), outputs=("image",))["image"]
     assert (saved == direct).all()
     assert mean(page) == pytest.approx(direct[..., 0].mean(), rel=1e-3)
     page.after(lambda: page.page.click("#undo"))
     assert page.page.is_hidden("#problems"), "what was refused is past"
-    assert not (tmp_path / "other.yaml").exists()
+    assert not (served.folder / "other.yaml").exists()
 
 
-def test_an_input_that_takes_many_takes_another_and_lets_go_of_one(
-    hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_an_input_that_takes_many_takes_another_and_lets_go_of_one(show: Callable[..., Hand], tmp_path: Path) -> None:
     (tmp_path / "two.yaml").write_text(
         "extends: forward\nsize: [32, 24]\nnodes:\n  other: {type: shadow_pcf, inputs: {shadow_map: sun.shadow_map}}\n"
     )
-    with rg.view("two.yaml") as viewer:
-        hand.open(viewer.url)
-        hand.choose("light")
-        hand.after(lambda: hand.page.select_option("[id='p-light.lookup-1']", "other.lookup"))
-        hand.page.wait_for_selector("[id='p-light.lookup-2']")
-        hand.after(lambda: hand.page.select_option("[id='p-light.lookup']", ""))
-        assert hand.page.input_value("[id='p-light.lookup']") == "other.lookup"
+    hand = show(tmp_path / "two.yaml", None)
+    hand.choose("light")
+    hand.after(lambda: hand.page.select_option("[id='p-light.lookup-1']", "other.lookup"))
+    hand.page.wait_for_selector("[id='p-light.lookup-2']")
+    hand.after(lambda: hand.page.select_option("[id='p-light.lookup']", ""))
+    assert hand.page.input_value("[id='p-light.lookup']") == "other.lookup"
 
 
 def test_a_broken_shader_is_said_on_its_node_and_mended(
@@ -270,20 +299,14 @@ def test_a_broken_shader_is_said_on_its_node_and_mended(
         assert mean(hand) == 64
 
 
-def test_names_are_text(hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_are_text(show: Callable[..., Hand], tmp_path: Path) -> None:
     """A file's words are shown, and never become elements of the page."""
-    monkeypatch.chdir(tmp_path)
     name = "<img src=x onerror=document.title=1>"
     (tmp_path / "mine.yaml").write_text(f'extends: forward\nsize: [16, 16]\ndescription: "{name}"\n')
-    with rg.view("mine.yaml") as viewer:
-        hand.open(viewer.url)
-        assert hand.text("#about") == name
-        hand.choose("light")
-        hand.page.fill("[id='p-light.shading']", "x") if hand.page.query_selector(
-            "input[id='p-light.shading']"
-        ) else None
-        assert hand.page.query_selector("img[src=x]") is None
-        assert hand.page.title().startswith("mine")
+    hand = show(tmp_path / "mine.yaml", None)
+    assert hand.text("#about") == name
+    assert hand.page.query_selector("img[src=x]") is None
+    assert hand.page.title().startswith("mine")
 
 
 def test_the_keyboard_alone_is_enough(page: Hand) -> None:
@@ -313,9 +336,9 @@ def test_two_tabs_are_one_view(page: Hand) -> None:
     page.choose("display")
     page.after(lambda: other.page.fill("[id='p-display.exposure']", "1") or other.page.keyboard.press("Enter"))
     assert page.page.input_value("[id='p-display.exposure']") == "1"
-    other.page.locator("#stops").fill("2")
-    page.page.wait_for_selector("#stops-value:has-text('2 EV')")
-    assert page.page.input_value("#stops") == "2"
+    other.page.locator("#exposure").fill("2")
+    page.page.wait_for_selector("#exposure-value:has-text('2 EV')")
+    assert page.page.input_value("#exposure") == "2"
     page.page.click("#tab-changes")
     field = page.page.locator("[id='p-display.exposure']")
     field.fill("9")
@@ -342,14 +365,8 @@ def test_it_is_compared_under_a_slider(page: Hand) -> None:
     page.page.wait_for_selector("#picture:visible")
 
 
-def test_it_comes_back_after_a_lost_render_process(page: Hand) -> None:
-    import os
-    import signal
-    import subprocess
-
-    found = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "viewer.child"], capture_output=True, text=True)
-    for pid in found.stdout.split():
-        os.kill(int(pid), signal.SIGKILL)
+def test_it_comes_back_after_a_lost_render_process(page: Hand, served: Any) -> None:
+    os.kill(served.process.pid, signal.SIGKILL)
     page.page.wait_for_selector("#problems:has-text('RG630')")
     page.choose("display")
     page.after(lambda: page.page.fill("[id='p-display.exposure']", "1") or page.page.keyboard.press("Enter"))
@@ -357,11 +374,11 @@ def test_it_comes_back_after_a_lost_render_process(page: Hand) -> None:
 
 
 def test_an_exported_page_is_whole_and_offline(hand: Hand, tmp_path: Path, gl: rg.Session) -> None:
-    from rendergraph.viewer.desk import Desk
-    from rendergraph.viewer.export import exported
+    from rendergraph.viewer.export import export_page
+    from rendergraph.viewer.view_state import ViewState
 
     file = tmp_path / "page.html"
-    file.write_text(exported(Desk(rg.Selection("deferred", size=SIZE), tmp_path), gl), encoding="utf-8")
+    file.write_text(export_page(ViewState(rg.Selection("deferred", size=SIZE), tmp_path), gl), encoding="utf-8")
     asked: list[str] = []
     hand.page.on("request", lambda request: asked.append(request.url))
     hand.page.context.set_offline(True)
@@ -373,45 +390,42 @@ def test_an_exported_page_is_whole_and_offline(hand: Hand, tmp_path: Path, gl: r
     assert hand.page.is_disabled("[id='p-light.terms']")
     hand.page.click("#tab-memory")
     assert "without reuse" in hand.text("#memory")
+    hand.page.context.set_offline(False)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read_in_both_schemes(browser: Any, served: Any, scheme: str) -> None:
-    context = browser.new_context(color_scheme=scheme)
-    page = context.new_page()
-    page.goto(served.url)
-    page.wait_for_selector(STILL)
+def test_text_can_be_read_in_both_schemes(tab: Any, served: Any, scheme: str) -> None:
+    tab.emulate_media(color_scheme=scheme)
+    tab.goto(served.url)
+    tab.wait_for_selector(STILL)
     ink, ground = (
-        [int(part) for part in re.findall(r"\d+", page.locator("body").evaluate(f"(e) => getComputedStyle(e).{name}"))]
+        [int(part) for part in re.findall(r"\d+", tab.locator("body").evaluate(f"(e) => getComputedStyle(e).{name}"))]
         for name in ("color", "backgroundColor")
     )
-    context.close()
     assert abs(sum(ink[:3]) - sum(ground[:3])) > 450
 
 
-def test_what_fits_an_input_is_offered_and_what_waits_for_the_node_is_not(hand: Hand) -> None:
-    with rg.view(rg.load("deferred", size=SIZE)) as viewer:
-        hand.open(viewer.url)
-        hand.choose("shadows")
-        offered = hand.page.locator("[id='p-shadows.depth'] option").all_inner_texts()
-        assert offered[:2] == ["nothing", "gbuffer.depth"]
-        assert not [end for end in offered if end.startswith(("light.", "shadows.", "display."))]
-        hand.choose("light")
-        assert "gbuffer.albedo" not in hand.page.locator("[id='p-light.normal'] option").all_inner_texts()
+def test_what_fits_an_input_is_offered_and_what_waits_for_the_node_is_not(show: Callable[..., Hand]) -> None:
+    hand = show("deferred")
+    hand.choose("shadows")
+    offered = hand.page.locator("[id='p-shadows.depth'] option").all_inner_texts()
+    assert offered[:2] == ["nothing", "gbuffer.depth"]
+    assert not [end for end in offered if end.startswith(("light.", "shadows.", "display."))]
+    hand.choose("light")
+    assert "gbuffer.albedo" not in hand.page.locator("[id='p-light.normal'] option").all_inner_texts()
 
 
-def test_a_thousand_nodes_are_drawn(hand: Hand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.nightly)])
+def test_many_nodes_are_drawn(show: Callable[..., Hand], tmp_path: Path, count: int) -> None:
     text = io.StringIO()
     text.write(
         "size: [8, 8]\nnodes:\n  light: {type: forward_lighting}\n  n0: {type: tonemap, inputs: {radiance: light.radiance}}\n"
     )
-    for number in range(1, 300):
+    for number in range(1, count):
         text.write(f"  n{number}: {{type: gaussian_blur, inputs: {{source: n{number - 1}.")
         text.write("color}}\n" if number == 1 else "blurred}}\n")
-    text.write("outputs: {image: n299.blurred}\nscene: cornell_box\n")
+    text.write(f"outputs: {{image: n{count - 1}.blurred}}\nscene: cornell_box\n")
     (tmp_path / "many.yaml").write_text(text.getvalue())
-    with rg.view("many.yaml") as viewer:
-        hand.open(viewer.url)
-        assert hand.page.locator("#graph .card").count() == 301
-        hand.after(lambda: hand.page.focus("#stage") or hand.page.keyboard.press("ArrowLeft"))
+    hand = show(tmp_path / "many.yaml", None)
+    assert hand.page.locator("#graph .card").count() == count + 1
+    hand.after(lambda: hand.page.focus("#stage") or hand.page.keyboard.press("ArrowLeft"))

@@ -1,27 +1,27 @@
-// The page: one state that comes from the server, drawn; whatever a hand does goes there as a message.
+// The page: shows the state that comes from the server, and sends every action there as a message.
 import { $, choices, h, short } from "./dom.js";
 import { preview, showGraph, showPreviews } from "./graph.js";
 import { showParameters, startParameters } from "./parameters.js";
-import { address, showAgainst, showPicture, showPixel, showTexture, startPicture } from "./picture.js";
+import { address, showComparison, showPicture, showPixel, showTexture, startPicture } from "./picture.js";
 import { showMemory, showTimes } from "./plan.js";
-import { connect, on, send, tell } from "./socket.js";
+import { connect, dispatch, on, send } from "./socket.js";
 import "./slider.js";
 
 let pipeline = null;
 let state = { edits: {}, flags: [], others: [], pipelines: [] };
 let picture = null;
-let against = null;
+let comparison = null;
 let problems = [];
 let node = "";
-let still = false;  // a page that was exported: nobody draws anything new
-let times = {};       // of the last picture that stood still, by node
+let still = false;  // an exported page renders nothing new
+let times = {};       // of the last still picture, by node
 const history = [];
 const TABS = ["graph", "memory", "times", "changes"];
 
 const act = {
   node(id) { node = id; draw(); },
   port(name) {
-    if (still && preview(name)) $("picture").src = preview(name);  // the small one is all that the file holds
+    if (still && preview(name)) $("picture").src = preview(name);  // an exported page holds only the small one
     send({ do: "look", port: state.port === name ? "" : name });
   },
 };
@@ -36,7 +36,7 @@ function draw() {
     choices($("node"), ["", ...Object.keys(pipeline.nodes)], node, (id) => id || "the pipeline");
     choices($("camera"), ["", ...pipeline.cameras], state.moved ? "" : state.camera ?? pipeline.cameras[0], (name) => name || "moved by hand");
     const ports = pipeline.graph.nodes.flatMap((one) => Object.entries(one.outputs)
-      .filter(([, made]) => made.format).map(([name]) => `${one.id}.${name}`));
+      .filter(([, output]) => output.format).map(([name]) => `${one.id}.${name}`));
     const shown = ["", ...pipeline.outputs.slice(1), ...ports];
     if (state.port && !shown.includes(state.port)) shown.push(state.port);
     choices($("port"), shown, state.port ?? "", (name) => name || (pipeline.outputs[0] ?? "image"));
@@ -45,14 +45,14 @@ function draw() {
     showMemory($("memory"), pipeline);
   }
   choices($("other"), ["", ...new Set([...state.others, ...state.pipelines])], state.other ?? "", (name) => name || "nothing");
-  if (!state.other && against) { against = null; showAgainst({}, {}); }
+  if (!state.other && comparison) { comparison = null; showComparison({}, {}); }
   $("undo").disabled = !state.can_undo;
   $("redo").disabled = !state.can_redo;
   $("save").disabled = $("copy").disabled = !state.flags.length;
   $("play").setAttribute("aria-pressed", state.playing);
   $("play").textContent = state.playing ? "Pause" : "Play";
-  if (document.activeElement !== $("stops")) $("stops").value = state.stops ?? 0;
-  $("stops-value").textContent = `${state.stops ?? 0} EV`;
+  if (document.activeElement !== $("exposure")) $("exposure").value = state.exposure_ev ?? 0;
+  $("exposure-value").textContent = `${state.exposure_ev ?? 0} EV`;
   showTimes($("times"), picture, history);
   showChanges();
   showFigures();
@@ -64,11 +64,11 @@ function showFrame(number) {
 
 function showFigures() {
   if (!picture) return;
-  const parts = [`${picture.size.join("×")}`, `${short(Number(picture.frame_ms.toFixed(2)))} ms a frame on ${picture.device.renderer}`];
-  if (picture.device.software) parts.push("software: no measure of a GPU");
-  if (against?.figures) {
-    const { rmse, psnr, ssim, flip } = against.figures;
-    parts.push(`against ${against.name}: FLIP ${short(Number(flip.toFixed(4)))}, RMSE ${short(Number(rmse.toFixed(4)))}, PSNR ${psnr === null ? "∞" : short(Number(psnr.toFixed(2)))}, SSIM ${short(Number(ssim.toFixed(4)))}`);
+  const parts = [`${picture.size.join("×")}`, `${short(Number(picture.frame_ms.toFixed(2)))} ms per frame on ${picture.device.renderer}`];
+  if (picture.device.software) parts.push("software rasteriser, not a GPU measurement");
+  if (comparison?.figures) {
+    const { rmse, psnr, ssim, flip } = comparison.figures;
+    parts.push(`against ${comparison.name}: FLIP ${short(Number(flip.toFixed(4)))}, RMSE ${short(Number(rmse.toFixed(4)))}, PSNR ${psnr === null ? "∞" : short(Number(psnr.toFixed(2)))}, SSIM ${short(Number(ssim.toFixed(4)))}`);
   }
   $("figures").textContent = parts.join("  ·  ");
 }
@@ -79,21 +79,21 @@ function showProblems(extra = []) {
   $("problems").replaceChildren(...all.map(({ file, line, column, code, text }) => {
     const place = file ? `${file}${line ? `:${line}:${column}` : ""}: ` : "";
     return h("p", { class: "mono" }, `${place}${code} ${text}`);
-  }), problems.length && picture ? h("p", {}, "The last good picture stays.") : "");
+  }), problems.length && picture ? h("p", {}, "Showing the last good picture.") : "");
 }
 
 function showChanges() {
   if ($("changes").hidden) return;
   const rows = Object.entries(state.edits).map(([path, value]) => h("tr", {}, h("td", { class: "mono" }, path), h("td", { class: "mono" }, value),
-    h("td", {}, h("button", { onclick: () => send({ do: "drop", path }) }, "Take back"))));
-  $("changes").replaceChildren(rows.length ? h("table", {}, ...rows) : h("p", { class: "quiet" }, "Nothing is changed."),
+    h("td", {}, h("button", { onclick: () => send({ do: "drop", path }) }, "Revert"))));
+  $("changes").replaceChildren(rows.length ? h("table", {}, ...rows) : h("p", { class: "quiet" }, "No changes."),
     rows.length ? h("pre", {}, flags()) : "");
 }
 
-const quoted = (word) => (/^[\w./=@+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
-const flags = () => state.flags.map((flag) => `-s ${quoted(flag)}`).join(" ");
+const quote = (word) => (/^[\w./=@+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
+const flags = () => state.flags.map((flag) => `-s ${quote(flag)}`).join(" ");
 
-on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); });  // a refusal is past
+on("state", (facts) => { state = facts; showFrame(facts.frame); showProblems(); draw(); });  // clears a refusal
 on("pipeline", (facts) => { pipeline = facts; draw(); });
 on("picture", (facts, files) => {
   picture = facts;
@@ -108,7 +108,7 @@ on("picture", (facts, files) => {
   draw();
 });
 on("thumbnails", (facts, files) => { showPreviews(files, address); draw(); });
-on("against", (facts, files) => { against = files.other ? facts : null; showAgainst(facts, files); showFigures(); });
+on("against", (facts, files) => { comparison = files.other ? facts : null; showComparison(facts, files); showFigures(); });
 on("pixel", showPixel);
 on("problems", (facts) => { problems = facts.problems; showProblems(); draw(); });
 on("refused", (facts) => showProblems(facts.problems));
@@ -136,11 +136,11 @@ function start() {
   $("port").onchange = () => send({ do: "look", port: $("port").value });
   $("other").onchange = () => send({ do: "compare", name: $("other").value || null });
   $("node").onchange = () => act.node($("node").value);
-  $("stops").oninput = () => send({ do: "look", stops: Number($("stops").value) });
+  $("exposure").oninput = () => send({ do: "look", exposure: Number($("exposure").value) });
   $("play").onclick = () => send({ do: "play", on: !state.playing });
   $("frame").onchange = () => { if ($("frame").checkValidity()) send({ do: "frame", number: Number($("frame").value) }); };
   $("scrub").oninput = () => send({ do: "frame", number: Number($("scrub").value) });
-  const byHand = () => chooseTab("changes");  // where a browser lets no page write there: one from another machine, over HTTP
+  const byHand = () => chooseTab("changes");  // browsers deny the clipboard to pages of other machines over HTTP
   $("copy").onclick = () => (navigator.clipboard
     ? navigator.clipboard.writeText(flags()).then(() => { $("link").textContent = "copied"; }, byHand) : byHand());
   $("save").onclick = () => { $("saving").returnValue = ""; $("saving").showModal(); };
@@ -163,11 +163,11 @@ function start() {
   startPicture();
   startParameters($("parameters"));
   chooseTab("graph");
-  const kept = $("kept");  // a page that was exported holds what it shows
-  if (!kept) return connect();
+  const exported = $("exported");  // an exported page holds its messages
+  if (!exported) return connect();
   still = true;
-  for (const { kind, facts, files } of JSON.parse(kept.textContent)) tell(kind, facts, files);
-  $("link").textContent = "a still page: what it shows is in this file";
+  for (const { kind, facts, files } of JSON.parse(exported.textContent)) dispatch(kind, facts, files);
+  $("link").textContent = "a static page: everything is in this file";
   for (const input of document.querySelectorAll("header button, #left .bar :is(button, select, input)")) input.disabled = true;
   $("parameters").disabled = true;
 }

@@ -1,9 +1,9 @@
-// Making elements: text is always text, never markup, whatever a file calls its nodes.
+// Make elements. Text is always text, never markup, whatever a file names its nodes.
 export const $ = (id) => document.getElementById(id);
 
 const SVG = "http://www.w3.org/2000/svg";
 
-function made(element, attributes, children) {
+function fill(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes ?? {})) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? "" : value);
@@ -12,10 +12,10 @@ function made(element, attributes, children) {
   return element;
 }
 
-export const h = (tag, attributes, ...children) => made(document.createElement(tag), attributes, children);
-export const s = (tag, attributes, ...children) => made(document.createElementNS(SVG, tag), attributes, children);
+export const h = (tag, attributes, ...children) => fill(document.createElement(tag), attributes, children);
+export const s = (tag, attributes, ...children) => fill(document.createElementNS(SVG, tag), attributes, children);
 
-// A choice of words; the chosen one stays where it is in the list.
+// Fill a drop-down list, and select an entry.
 export function choices(select, words, chosen, label = (word) => word) {
   const same = select.options.length === words.length && words.every((word, i) => select.options[i].value === word);
   if (!same) select.replaceChildren(...words.map((word) => h("option", { value: word }, label(word))));

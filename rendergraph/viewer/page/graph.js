@@ -1,16 +1,16 @@
-// The graph: nodes as cards, laid out by ELK (loaded when there is something to lay out), drawn as SVG.
+// The graph: nodes as cards in SVG, cached out by ELK, which is loaded at first use.
 import { h, s, short } from "./dom.js";
 
 const WIDE = 190, HEAD = 40, ROW = 18, PICTURE = 88;
 let elk = null;
-let laid = null;     // what was laid out last, and for which pipeline
-let turn = 0;
-let drawn = null;    // what the drawing shows
-let pictures = 0;    // how often small pictures came
+let cached = null;     // the last layout, and its graph
+let latest = 0;
+let shown = null;    // what is shown
+let updates = 0;    // counts updates of the thumbnails
 
-const previews = new Map();  // port to the address of its small picture
+const previews = new Map();  // port to the address of its thumbnail
 
-function loaded() {
+function loadElk() {
   elk ??= new Promise((resolve, reject) => {
     if (globalThis.ELK) return resolve(new globalThis.ELK());
     const script = h("script", { src: new URL("vendor/elk.bundled.js", document.baseURI) });
@@ -28,7 +28,7 @@ function shapeOf(node) {
   return { width: WIDE, height: HEAD + rows * ROW + PICTURE + 8 };
 }
 
-// ELK's own words: ports stay in their order, inputs to the west (listed from the bottom), outputs to the east.
+// The graph as ELK takes it: ports keep their order, inputs in the west (from the bottom), outputs in the east.
 function asElk(graph) {
   const children = graph.nodes.map((node) => {
     const inputs = Object.keys(node.inputs), outputs = Object.keys(node.outputs);
@@ -65,12 +65,12 @@ function edgePath(section) {
   return d;
 }
 
-function carries(made) {
-  if (made.format) {
-    const more = [made.layers > 1 && `${made.layers} layers`, made.mips > 1 && `${made.mips} mips`, made.samples > 1 && `${made.samples} samples`];
-    return [`${made.format} ${made.size.join("×")}`, ...more.filter(Boolean)].join(", ");
+function describeOutput(output) {
+  if (output.format) {
+    const more = [output.layers > 1 && `${output.layers} layers`, output.mips > 1 && `${output.mips} mips`, output.samples > 1 && `${output.samples} samples`];
+    return [`${output.format} ${output.size.join("×")}`, ...more.filter(Boolean)].join(", ");
   }
-  return made.bytes ? `${made.bytes} B` : made.kind;
+  return output.bytes ? `${output.bytes} B` : output.kind;
 }
 
 function card(node, box, facts, act) {
@@ -93,14 +93,14 @@ function card(node, box, facts, act) {
   const clip = (text, most) => (text.length > most ? `${text.slice(0, most - 1)}…` : text);
   group.append(s("text", { x: 8, y: 16, "font-weight": 600 }, clip(node.id, 18)), s("text", { x: 8, y: 31, class: "quiet" }, clip(node.type, 26)));
   inputs.forEach((name, i) => group.append(s("text", { x: 8, y: HEAD + (i + 0.5) * ROW + 4, class: "quiet" }, clip(name, 26))));
-  outputs.forEach(([name, made], i) => {
+  outputs.forEach(([name, output], i) => {
     const y = HEAD + (inputs.length + i + 0.5) * ROW + 4;
     const show = (event) => { event.stopPropagation(); act.port(`${node.id}.${name}`); };
     group.append(s("g", {
       class: "port", tabindex: 0, role: "button", "aria-label": `Show ${node.id}.${name}`, onclick: show,
       onkeydown: (event) => { if (event.key === "Enter") show(event); },
-    }, s("title", {}, `${carries(made)}${made.used ? "" : ", unused"}`),
-    s("text", { x: box.width - 8, y, "text-anchor": "end", class: made.used ? "" : "quiet" }, clip(name, 26))));
+    }, s("title", {}, `${describeOutput(output)}${output.used ? "" : ", unused"}`),
+    s("text", { x: box.width - 8, y, "text-anchor": "end", class: output.used ? "" : "quiet" }, clip(name, 26))));
   });
   const port = mainPort(node);
   if (port) {
@@ -115,42 +115,42 @@ function card(node, box, facts, act) {
 export const preview = (port) => previews.get(port);
 
 export function showPreviews(files, address) {
-  pictures += 1;
+  updates += 1;
   for (const [port, blob] of Object.entries(files)) previews.set(port, address(`thumbnail ${port}`, blob));
 }
 
-// Draws what is known; lays out anew only where the graph is another one.
-export async function showGraph(place, pipeline, facts, act) {
-  if (!pipeline || place.hidden) return;
-  const shows = JSON.stringify([pipeline.revision, pictures, facts.times, facts.chosen, [...facts.wrong]]);
-  if (shows === drawn) return;
-  drawn = shows;
-  const mine = ++turn;
+// Draw the graph; compute a new layout only for another graph.
+export async function showGraph(container, pipeline, facts, act) {
+  if (!pipeline || container.hidden) return;
+  const next = JSON.stringify([pipeline.revision, updates, facts.times, facts.chosen, [...facts.wrong]]);
+  if (next === shown) return;
+  shown = next;
+  const call = ++latest;
   const graph = pipeline.graph;
   const key = JSON.stringify([graph.links, graph.nodes.map((node) => [node.id, Object.keys(node.inputs), Object.keys(node.outputs)])]);
-  if (laid?.key !== key) {
-    const layout = await (await loaded()).layout(asElk(graph));
-    laid = { key, layout };
+  if (cached?.key !== key) {
+    const layout = await (await loadElk()).layout(asElk(graph));
+    cached = { key, layout };
   }
-  if (mine !== turn) return;  // a newer one is on its way
-  const { layout } = laid;
+  if (call !== latest) return;  // a newer call has begun
+  const { layout } = cached;
   const box = new Map(layout.children.map((child) => [child.id, child]));
   const svg = s("svg", { width: layout.width + 4, height: layout.height + 4, role: "group", "aria-label": "The graph" },
     s("defs", {}, s("pattern", { id: "hatched", width: 8, height: 8, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" },
       s("rect", { width: 8, height: 8, fill: "#7d8590", opacity: 0.12 }), s("line", { x1: 0, y1: 0, x2: 0, y2: 8, stroke: "#7d8590", "stroke-width": 3, opacity: 0.5 }))));
   layout.edges.forEach((edge, i) => {
     const link = graph.links[i];
-    const made = graph.nodes.find((node) => node.id === link.source)?.outputs[link.source_port];
-    const kind = made?.kind ?? "";
+    const output = graph.nodes.find((node) => node.id === link.source)?.outputs[link.source_port];
+    const kind = output?.kind ?? "";
     for (const section of edge.sections ?? []) {
       svg.append(s("path", { class: `edge ${kind === "function" || kind === "buffer" ? kind : ""} ${link.previous ? "previous" : ""}`, d: edgePath(section) },
-        s("title", {}, `${link.source}.${link.source_port} → ${link.target}.${link.target_port}${made ? `: ${made.semantic}` : ""}`)));
+        s("title", {}, `${link.source}.${link.source_port} → ${link.target}.${link.target_port}${output ? `: ${output.semantic}` : ""}`)));
     }
   });
   for (const node of graph.nodes) svg.append(card(node, box.get(node.id), facts, act));
   const focused = document.activeElement?.getAttribute?.("aria-label");
-  const { scrollLeft, scrollTop } = place;
-  place.replaceChildren(svg);
-  place.scrollTo(scrollLeft, scrollTop);
-  if (focused) place.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus();
+  const { scrollLeft, scrollTop } = container;
+  container.replaceChildren(svg);
+  container.scrollTo(scrollLeft, scrollTop);
+  if (focused) container.querySelector(`[aria-label="${CSS.escape(focused)}"]`)?.focus();
 }

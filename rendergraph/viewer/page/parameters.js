@@ -1,10 +1,10 @@
-// Inputs for a node: made from what its type declares.
+// Input fields for a node, made from the declaration of its type.
 import { h } from "./dom.js";
 import { send } from "./socket.js";
 
-let held = null;     // the setting that a slider or a colour's window is moving, so that its way is one step of undo
-let writing = null;  // the field that somebody is writing in
-let drawn = { made: [], kept: null, fresh: null };  // what the inputs were made of, the row that stayed, and how it would be
+let held = null;     // the setting that a slider or a colour picker is moving: all of that is one step of undo
+let writing = null;  // the field that is being typed in
+let shown = { values: [], keptRow: null, newRow: null };  // the values that the fields show, the row that was not replaced, and its replacement
 
 const set = (path, value) => {
   send({ do: "set", path, value, again: held === path });
@@ -14,8 +14,8 @@ const set = (path, value) => {
 const hold = () => { held ??= ""; send({ do: "hold", on: true }); };
 const release = () => { if (held !== null) { held = null; send({ do: "hold", on: false }); } };
 
-// What a setting is since it was changed, which the pipeline says after the next picture, or never where it is wrong.
-function since(edits, path, value) {
+// The edited value, which the pipeline has only after the next picture, or never where it is wrong.
+function editedValue(edits, path, value) {
   if (!(path in edits)) return value;
   try {
     return JSON.parse(edits[path]);
@@ -34,8 +34,8 @@ const asColor = (hex) => [1, 3, 5].map((at) => {
   return Number((x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4).toFixed(4));
 });
 
-// One, two or five of a power of ten: steps that meet the round numbers a default is.
-function even(step) {
+// Round a step down to 1, 2 or 5 times a power of ten, so that it meets round defaults.
+function roundStep(step) {
   const power = 10 ** Math.floor(Math.log10(step));
   return (([5, 2].find((many) => many * power <= step) ?? 1) * power).toPrecision(1);
 }
@@ -50,15 +50,15 @@ function numberField(path, id, about) {
   });
   const fields = [number];
   if (about.min !== null || about.kind === "number") {
-    // A range that nobody bounds is shown around its default.
+    // An unbounded range is shown around its default.
     const low = about.min ?? Math.min(0, about.value, about.default ?? 0);
     const wide = Math.max(Math.abs(about.default ?? about.value), Math.abs(about.value), about.kind === "integer" ? 8 : 0.5) * 4;
     const high = about.max !== null && about.max - low <= 128 ? about.max : Math.min(about.max ?? Infinity, low + wide);
-    const grain = about.kind === "integer" ? 1 : even((high - low) / 200);
+    const grain = about.kind === "integer" ? 1 : roundStep((high - low) / 200);
     const range = h("input", {
       type: "range", id: `${id}-slider`, min: low, max: high, step: grain, value: about.value, "aria-label": `${path}, slider`,
     });
-    range.addEventListener("pointerdown", ({ button }) => { if (button === 0) hold(); });  // others move nothing
+    range.addEventListener("pointerdown", ({ button }) => { if (button === 0) hold(); });  // other buttons move nothing
     range.addEventListener("input", () => { number.value = range.value; set(path, Number(range.value)); });
     for (const end of ["pointerup", "pointercancel", "change"]) range.addEventListener(end, release);
     fields.unshift(range);
@@ -122,22 +122,22 @@ function field(path, id, about) {
 function row(path, label, about, changed, fields) {
   const id = `p-${path}`;
   const back = changed
-    ? h("button", { class: "back", title: "Take the change back", "aria-label": `Take back ${path}`, onclick: () => send({ do: "drop", path }) }, "↺")
+    ? h("button", { class: "back", title: "Revert the change", "aria-label": `Revert ${path}`, onclick: () => send({ do: "drop", path }) }, "↺")
     : h("span");
-  const idle = about.idle && `Nothing looks at it while ${about.idle} is connected.`;
-  const tip = [idle, about.doc, about.takes && `Takes ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
+  const idle = about.idle && `Has no effect while ${about.idle} is connected.`;
+  const tip = [idle, about.doc, about.takes && `Expects ${about.takes}.`, about.role && `(${about.role})`].filter(Boolean).join(" ");
   return h("div", { class: `parameter${changed ? " set" : ""}${idle ? " idle" : ""}`, title: tip, "data-path": path },
     h("span", {}, h("label", { for: id }, label)),
     h("span", { class: "field" }, ...fields, about.unit ? h("span", { class: "quiet" }, about.unit) : null), back);
 }
 
 function setting(path, label, about, edits) {
-  const now = { ...about, value: since(edits, path, about.value) };
+  const now = { ...about, value: editedValue(edits, path, about.value) };
   return row(path, label, about, path in edits, field(path, `p-${path}`, now));
 }
 
-// Outputs that an input takes, of nodes that do not wait for its own: first those that mean just that.
-function fitting(graph, node, about) {
+// The outputs that an input accepts, without those that depend on its node: first those of the same semantic.
+function compatibleOutputs(graph, node, about) {
   const readers = new Map();
   for (const { source, target, previous } of graph.links) {
     if (!previous) readers.set(source, [...(readers.get(source) ?? []), target]);
@@ -147,10 +147,10 @@ function fitting(graph, node, about) {
   const exact = [], any = [];
   for (const one of graph.nodes) {
     if (after.has(one.id)) continue;
-    for (const [name, made] of Object.entries(one.outputs)) {
-      if (made.kind !== about.kind) continue;
-      if (made.semantic === about.semantic) exact.push(`${one.id}.${name}`);
-      else if (made.semantic === "any" || about.semantic === "any") any.push(`${one.id}.${name}`);
+    for (const [name, output] of Object.entries(one.outputs)) {
+      if (output.kind !== about.kind) continue;
+      if (output.semantic === about.semantic) exact.push(`${one.id}.${name}`);
+      else if (output.semantic === "any" || about.semantic === "any") any.push(`${one.id}.${name}`);
     }
   }
   return [...exact, ...any];
@@ -158,9 +158,9 @@ function fitting(graph, node, about) {
 
 function linkRow(graph, node, name, about, edits) {
   const path = `${node}.${name}`;
-  const links = [since(edits, path, about.links)].flat().filter(Boolean);
-  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...fitting(graph, node, about)])];
-  // An input that takes many has a list for each, and one more to add to them.
+  const links = [editedValue(edits, path, about.links)].flat().filter(Boolean);
+  const words = [...new Set([...(about.optional || about.many ? [""] : []), ...links, ...compatibleOutputs(graph, node, about)])];
+  // An input for several links has a list for each, and one more to add another.
   const now = about.many ? [...links, ""] : [links[0] ?? ""];
   const lists = now.map((link, at) => {
     const list = h("select", { id: at ? `p-${path}-${at}` : `p-${path}`, "aria-label": at ? `${path}, ${at + 1}` : null, onchange: () => {
@@ -173,15 +173,15 @@ function linkRow(graph, node, name, about, edits) {
   return row(path, name, about, path in edits, lists);
 }
 
-// The pipeline's own parameters, where no node is chosen; else everything that the node can be told.
-export function showParameters(place, pipeline, node, edits) {
-  // What somebody writes in is not taken from under the hand. What is dragged lets go, and a colour's window closes, where
-  // elements around it come and go, so all of that waits.
+// The parameters and inputs of a node, or those of the pipeline where no node is chosen.
+export function showParameters(container, pipeline, node, edits) {
+  // A field that is being typed in stays. A drag ends and a colour picker closes when elements around them change, so
+  // both wait.
   if (held !== null) return;
-  const kept = writing && place.contains(writing) ? writing.closest(".parameter") : null;
-  const made = [pipeline, node, JSON.stringify(edits)];
-  if (made.every((part, i) => part === drawn.made[i]) && (drawn.kept === null || drawn.kept === kept)) return;
-  drawn = { made, kept, fresh: null };
+  const keptRow = writing && container.contains(writing) ? writing.closest(".parameter") : null;
+  const values = [pipeline, node, JSON.stringify(edits)];
+  if (values.every((value, i) => value === shown.values[i]) && (shown.keptRow === null || shown.keptRow === keptRow)) return;
+  shown = { values, keptRow, newRow: null };
   const focused = document.activeElement?.id;
   const parts = [];
   const about = pipeline.nodes[node];
@@ -195,9 +195,9 @@ export function showParameters(place, pipeline, node, edits) {
     const types = h("select", { id: `p-${node}.type`, onchange: () => set(`${node}.type`, types.value) },
       ...options([...new Set([about.type, ...about.types])]),
       others.length ? h("optgroup", { label: "with other links" }, ...options(others)) : null);
-    types.value = since(edits, `${node}.type`, about.type);
+    types.value = editedValue(edits, `${node}.type`, about.type);
     const enabled = h("input", { type: "checkbox", id: `p-${node}.enabled`, onchange: () => set(`${node}.enabled`, enabled.checked) });
-    enabled.checked = since(edits, `${node}.enabled`, true);
+    enabled.checked = editedValue(edits, `${node}.enabled`, true);
     parts.push(h("p", { class: "doc" }, about.doc));
     parts.push(row(`${node}.type`, "type", {}, `${node}.type` in edits, [types]));
     parts.push(row(`${node}.enabled`, "enabled", {}, `${node}.enabled` in edits, [enabled]));
@@ -212,30 +212,30 @@ export function showParameters(place, pipeline, node, edits) {
     const button = h("button", { onclick: () => set(`${name}.enabled`, true) }, "enable");
     parts.push(h("p", {}, `${name} is disabled `, button));
   }
-  const at = kept ? parts.findIndex((part) => part.dataset.path === kept.dataset.path) : -1;
-  if (at < 0) place.replaceChildren(...parts);
-  else {  // a row that is moved loses the focus, so the others go around it
-    drawn.fresh = parts[at];
-    for (const other of [...place.children]) if (other !== kept) other.remove();
-    kept.before(...parts.slice(0, at));
-    kept.after(...parts.slice(at + 1));
+  const at = keptRow ? parts.findIndex((part) => part.dataset.path === keptRow.dataset.path) : -1;
+  if (at < 0) container.replaceChildren(...parts);
+  else {  // moving a row would take the focus from it, so the others are placed around it
+    shown.newRow = parts[at];
+    for (const other of [...container.children]) if (other !== keptRow) other.remove();
+    keptRow.before(...parts.slice(0, at));
+    keptRow.after(...parts.slice(at + 1));
     return;
   }
   if (!focused?.startsWith("p-")) return;
   const again = document.getElementById(focused);
   again?.focus();
-  if (again?.matches("input[type=number], input[type=text]")) again.select();  // as a field is that Tab leads to
+  if (again?.matches("input[type=number], input[type=text]")) again.select();  // as after Tab
 }
 
-// A field is written in from the first letter until it is taken over or left.
-export function startParameters(place) {
-  place.addEventListener("input", ({ target }) => { if (target.matches("input[type=number], input[type=text]")) writing = target; });
-  place.addEventListener("change", () => { writing = drawn.fresh = null; });  // what was written is newer
-  place.addEventListener("focusout", ({ relatedTarget }) => {
+// A field counts as being typed in from the first letter until its change or blur.
+export function startParameters(container) {
+  container.addEventListener("input", ({ target }) => { if (target.matches("input[type=number], input[type=text]")) writing = target; });
+  container.addEventListener("change", () => { writing = shown.newRow = null; });  // the typed value is newer
+  container.addEventListener("focusout", ({ relatedTarget }) => {
     writing = null;
-    const { kept, fresh } = drawn;
-    if (!fresh || kept.contains(relatedTarget)) return;
-    drawn.kept = drawn.fresh = null;
-    kept.replaceWith(fresh);  // and no other row: the hand may be on its way to one
+    const { keptRow, newRow } = shown;
+    if (!newRow || keptRow.contains(relatedTarget)) return;
+    shown.keptRow = shown.newRow = null;
+    keptRow.replaceWith(newRow);  // only this row: the next click may be on another one
   });
 }

@@ -1,13 +1,13 @@
-// The picture: what comes is shown, what a hand does to it moves the camera.
+// The picture, and moving the camera with mouse, wheel and keys.
 import { $, h, short } from "./dom.js";
 import { send } from "./socket.js";
 
 const urls = new Map();
 let size = [1, 1];
-let compared = null;
-let place = null;  // whose values are asked for
+let comparison = null;
+let position = null;  // the position whose values are shown
 
-// A file as an address; the one before it under the same name is given back.
+// Return the address of a file; the earlier one of that name is revoked.
 export function address(name, blob) {
   const before = urls.get(name);
   const url = typeof blob === "string" ? blob : URL.createObjectURL(blob);
@@ -23,12 +23,12 @@ export function showPicture(facts, files) {
   picture.dataset.count = Number(picture.dataset.count ?? 0) + 1;
   picture.dataset.still = facts.still;
   if (facts.still) size = facts.size;
-  if (facts.still && place) send({ do: "pixel", ...place });  // they are others now
+  if (facts.still && position) send({ do: "pixel", ...position });  // the values have changed
   fit();
-  if (compared) showAgainst(compared.facts, compared.files);
+  if (comparison) showComparison(comparison.facts, comparison.files);
 }
 
-// As large as there is room for; texels that become large keep their edges.
+// Fit the picture into the room; large texels keep sharp edges.
 function fit() {
   const [width, height] = size;
   const room = Math.min($("stage").clientWidth, (0.68 * innerHeight * width) / height);
@@ -40,13 +40,13 @@ function fit() {
   }
 }
 
-export function showAgainst(facts, files) {
+export function showComparison(facts, files) {
   const slider = $("slider");
   const on = Boolean(files.other);
   slider.hidden = !on;
   $("picture").hidden = on;
   $("map-label").hidden = !on;
-  compared = on ? { facts, files } : null;
+  comparison = on ? { facts, files } : null;
   if (!on) return;
   const map = $("map").value in files ? $("map").value : "other";
   slider.show(urls.get("picture"), address("other", files[map]), ["this", map === "other" ? facts.name : $("map").selectedOptions[0].text]);
@@ -62,14 +62,14 @@ export function startPicture() {
   const stage = $("stage");
   const picture = $("picture");
   let last = null;
-  let asked = 0;
-  let rest = null;
+  let lastRequest = 0;
+  let pause = null;
 
-  // What comes in many small moves, as from a wheel or a key, is a move until it rests.
-  const moved = (move) => {
-    if (rest === null) send({ do: "hold", on: true });
-    clearTimeout(rest);
-    rest = setTimeout(() => { rest = null; send({ do: "hold", on: false }); }, 250);
+  // Many small moves, as from the wheel or a key, count as one drag until they pause.
+  const moveCamera = (move) => {
+    if (pause === null) send({ do: "hold", on: true });
+    clearTimeout(pause);
+    pause = setTimeout(() => { pause = null; send({ do: "hold", on: false }); }, 250);
     send({ do: "camera", ...move });
   };
 
@@ -86,10 +86,10 @@ export function startPicture() {
     if (!last) {
       const x = (event.clientX - box.left) / box.width;
       const y = (event.clientY - box.top) / box.height;
-      if (x >= 0 && x < 1 && y >= 0 && y < 1 && event.timeStamp - asked > 60) {
-        asked = event.timeStamp;
-        place = { x, y };
-        send({ do: "pixel", ...place });
+      if (x >= 0 && x < 1 && y >= 0 && y < 1 && event.timeStamp - lastRequest > 60) {
+        lastRequest = event.timeStamp;
+        position = { x, y };
+        send({ do: "pixel", ...position });
       }
       return;
     }
@@ -99,16 +99,16 @@ export function startPicture() {
     if (event.shiftKey || event.buttons & 6) send({ do: "camera", pan: [-across, down] });
     else send({ do: "camera", orbit: [across * 3, down * 3] });
   });
-  const released = () => {
+  const release = () => {
     if (last) send({ do: "hold", on: false });
     last = null;
   };
-  stage.addEventListener("pointerup", released);
-  stage.addEventListener("pointercancel", released);
+  stage.addEventListener("pointerup", release);
+  stage.addEventListener("pointercancel", release);
   stage.addEventListener("contextmenu", (event) => event.preventDefault());
   stage.addEventListener("wheel", (event) => {
     event.preventDefault();
-    moved({ zoom: [Math.exp(Math.max(-1, Math.min(1, event.deltaY * 0.002)))] });
+    moveCamera({ zoom: [Math.exp(Math.max(-1, Math.min(1, event.deltaY * 0.002)))] });
   }, { passive: false });
 
   const step = 0.1;
@@ -123,14 +123,14 @@ export function startPicture() {
     const move = keys[event.key];
     if (!move || event.ctrlKey || event.metaKey || event.target.closest("input")) return;
     event.preventDefault();
-    moved(move);
+    moveCamera(move);
   });
-  $("map").addEventListener("change", () => { if (compared) showAgainst(compared.facts, compared.files); });
+  $("map").addEventListener("change", () => { if (comparison) showComparison(comparison.facts, comparison.files); });
 }
 
-// What is in the texture that is looked at.
+// Statistics of the shown texture.
 export function showTexture(texture) {
-  const place = $("texture");
+  const container = $("texture");
   if (!texture) return;
   const names = ["R", "G", "B", "A"];
   const rows = texture.channels.map((channel, i) => {
@@ -147,5 +147,5 @@ export function showTexture(texture) {
   const broken = texture.nan || texture.infinite
     ? h("p", { class: "mono broken" }, `${texture.nan} texels hold NaN, ${texture.infinite} infinity`) : null;
   const about = `${texture.semantic}, ${texture.format}, ${texture.shape.join(" × ")}`;
-  place.replaceChildren(h("h2", {}, "Texture"), h("p", { class: "mono quiet" }, about), ...[broken, ...rows].filter(Boolean));
+  container.replaceChildren(h("h2", {}, "Texture"), h("p", { class: "mono quiet" }, about), ...[broken, ...rows].filter(Boolean));
 }

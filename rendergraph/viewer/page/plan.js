@@ -1,4 +1,4 @@
-// The plan, as a matrix of steps and resources, and the times of each pass.
+// The plan as a matrix of steps and resources, and the times of each pass.
 import { h, s, short } from "./dom.js";
 
 const MOST_STEPS = 200;
@@ -12,13 +12,13 @@ function useOf(step, id) {
   return reads.length ? (reads.every((read) => read.previous) ? "P" : "R") : "";
 }
 
-const MEANS = { R: "reads", W: "writes", B: "reads and writes", P: "reads last frame's value" };
+const MEANS = { R: "reads", W: "writes", B: "reads and writes", P: "reads the last frame's value" };
 
-export function showMemory(place, pipeline) {
-  if (!pipeline || place.hidden) return;
+export function showMemory(container, pipeline) {
+  if (!pipeline || container.hidden) return;
   const { plan } = pipeline;
   const { memory } = plan;
-  const said = h("p", {}, `Allocated ${mebibytes(memory.allocated_bytes)} of ${mebibytes(memory.no_reuse_bytes)} without reuse; `
+  const summary = h("p", {}, `Allocated ${mebibytes(memory.allocated_bytes)} of ${mebibytes(memory.no_reuse_bytes)} without reuse; `
     + `no order needs less than ${mebibytes(memory.lower_bound_bytes)}${memory.proven ? "" : " (not reached)"}; shared by ${memory.tier}`
     + `${memory.peak_node ? `; the peak is at ${memory.peak_node}` : ""}.`);
   const steps = plan.order.slice(0, MOST_STEPS);
@@ -30,15 +30,15 @@ export function showMemory(place, pipeline) {
     return h("td", { class: use || (alive ? "alive" : ""), title: use ? `${step.name} ${MEANS[use]} ${resource.id}` : null }, use);
   }), h("td", { class: "mono" }, resource.physical.join("+")), h("td", { class: "num" }, mebibytes(resource.bytes)), h("td", {}, resource.reason)));
   const culled = Object.entries(plan.culled).map(([node, why]) => h("li", {}, `${node}: ${why}`));
-  const legend = h("p", { class: "quiet" }, "W writes, R reads, B both, P reads last frame's; grey is kept. Rows with the same number share memory.");
-  place.replaceChildren(said, legend, h("table", { class: "matrix" }, head, ...rows),
+  const legend = h("p", { class: "quiet" }, "W writes, R reads, B both, P reads the last frame's; grey: in use. Rows with the same number share memory.");
+  container.replaceChildren(summary, legend, h("table", { class: "matrix" }, head, ...rows),
     culled.length ? h("h2", {}, "Does not run") : "", culled.length ? h("ul", {}, ...culled) : "");
 }
 
 const time = (pass) => pass.gpu_ms ?? pass.cpu_ms;
 const HIGH = 90, WIDE = 6;  // of the frame graph and of a picture in it
 
-// The last pictures, each a column of the passes that were run for it.
+// The last pictures, each a column of the passes that ran for it.
 function frameGraph(history) {
   const nodes = [...new Set(history.flatMap((one) => one.passes.map((pass) => pass.node)))];
   const color = (node) => `hsl(${(nodes.indexOf(node) * 137) % 360} 55% 50%)`;
@@ -54,27 +54,27 @@ function frameGraph(history) {
     });
   });
   const names = nodes.map((node) => s("tspan", { fill: color(node) }, `■ ${node}  `));
-  const said = `Passes of the last ${history.length} pictures; the tallest is ${short(Number(most.toFixed(2)))} ms`;
-  return h("figure", { class: "frames" }, h("figcaption", { class: "quiet" }, `${said}.`),
-    s("svg", { width: Math.max(600, history.length * WIDE), height: HIGH + 22, role: "img", "aria-label": said },
+  const caption = `Passes of the last ${history.length} pictures; the tallest is ${short(Number(most.toFixed(2)))} ms`;
+  return h("figure", { class: "frames" }, h("figcaption", { class: "quiet" }, `${caption}.`),
+    s("svg", { width: Math.max(600, history.length * WIDE), height: HIGH + 22, role: "img", "aria-label": caption },
       ...columns, s("text", { x: 0, y: HIGH + 16 }, ...names)));
 }
 
-export function showTimes(place, picture, history) {
-  if (!picture || place.hidden) return;
+export function showTimes(container, picture, history) {
+  if (!picture || container.hidden) return;
   const most = Math.max(1e-9, ...picture.passes.map(time));
   const rows = picture.passes.map((pass) => {
     const bar = h("div", { class: "meter" });
     bar.style.width = `${(time(pass) / most) * 100}%`;
-    const quiet = pass.ran ? {} : { class: "quiet", title: "Not run for this picture: what it makes was still there." };
+    const quiet = pass.ran ? {} : { class: "quiet", title: "Not run for this picture: its result was still valid." };
     return h("tr", quiet, h("th", { scope: "row" }, pass.node), h("td", {}, pass.type),
       h("td", { class: "num" }, pass.gpu_ms === null ? "–" : short(Number(pass.gpu_ms.toFixed(3)))),
       h("td", { class: "num" }, short(Number(pass.cpu_ms.toFixed(3)))), h("td", { width: "300" }, bar));
   });
   const sorted = history.map((one) => one.ms).sort((a, b) => a - b);
   const middle = sorted[Math.floor(sorted.length / 2)];
-  const software = picture.device.software ? ", a software rasteriser: no measure of a GPU" : "";
-  place.replaceChildren(
+  const software = picture.device.software ? ", a software rasteriser, not a GPU measurement" : "";
+  container.replaceChildren(
     h("p", {}, `${short(picture.frame_ms)} ms for this picture, ${short(middle)} ms in the median of the last ${history.length}, on ${picture.device.renderer}${software}.`),
     frameGraph(history),
     h("table", { class: "times" }, h("tr", {}, h("th", {}, "node"), h("th", {}, "type"), h("th", {}, "GPU ms"), h("th", {}, "CPU ms"), h("th", {}, "")), ...rows));

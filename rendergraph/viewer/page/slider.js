@@ -1,14 +1,14 @@
-// Two pictures, one over the other up to a line; a range input moves it, so a keyboard does, too.
+// Two pictures, divided by a line that a range input moves.
 import { h } from "./dom.js";
 
 class PictureSlider extends HTMLElement {
   connectedCallback() {
     if (this.firstChild) return;
     this.under = h("img", { alt: "The picture", draggable: "false" });
-    this.over = h("img", { alt: "What it is compared with", class: "over", draggable: "false" });
+    this.over = h("img", { alt: "The picture it is compared with", class: "over", draggable: "false" });
     this.left = h("span", { class: "tag a" });
     this.right = h("span", { class: "tag b" });
-    this.range = h("input", { type: "range", min: 0, max: 1000, value: 500, "aria-label": "Where the pictures meet" });
+    this.range = h("input", { type: "range", min: 0, max: 1000, value: 500, "aria-label": "Position of the dividing line" });
     this.range.addEventListener("input", () => this.cut());
     this.append(h("div", { class: "pile" }, this.under, this.over, this.left, this.right), this.range);
     this.range.addEventListener("pointerdown", (event) => event.stopPropagation());

@@ -1,21 +1,21 @@
-// The one connection: JSON both ways, pictures with a JSON head; it comes back by itself.
+// The connection to the server: JSON both ways, pictures with a JSON header. It reconnects by itself.
 import { $ } from "./dom.js";
 
-const heard = new Map();
+const handlers = new Map();
 let socket = null;
-let pause = 250;
+let delay = 250;
 
-export const on = (kind, act) => heard.set(kind, act);
+export const on = (kind, act) => handlers.set(kind, act);
 
 export function send(message) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
 }
 
-export function tell(kind, facts, files) {
-  heard.get(kind)?.(facts, files ?? {});
+export function dispatch(kind, facts, files) {
+  handlers.get(kind)?.(facts, files ?? {});
 }
 
-function unpacked(buffer) {
+function unpack(buffer) {
   const size = new DataView(buffer).getUint32(0, true);
   const facts = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));
   const files = {};
@@ -32,14 +32,14 @@ export function connect() {
   place.protocol = place.protocol === "https:" ? "wss:" : "ws:";
   socket = new WebSocket(place);
   socket.binaryType = "arraybuffer";
-  socket.onopen = () => { pause = 250; $("link").textContent = "live"; };
+  socket.onopen = () => { delay = 250; $("link").textContent = "live"; };
   socket.onmessage = ({ data }) => {
-    const [facts, files] = typeof data === "string" ? [JSON.parse(data), {}] : unpacked(data);
-    tell(facts.kind, facts, files);
+    const [facts, files] = typeof data === "string" ? [JSON.parse(data), {}] : unpack(data);
+    dispatch(facts.kind, facts, files);
   };
   socket.onclose = () => {
-    $("link").textContent = "connection lost, trying again …";
-    setTimeout(connect, pause);
-    pause = Math.min(pause * 2, 5000);
+    $("link").textContent = "connection lost, reconnecting …";
+    setTimeout(connect, delay);
+    delay = Math.min(delay * 2, 5000);
   };
 }

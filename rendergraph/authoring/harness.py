@@ -1,8 +1,8 @@
-"""What stands around a node that is checked: sources for its inputs, and readers for what no file can show.
+"""The harness of a node that is checked: sources for its inputs, and readers for outputs that no picture file holds.
 
-Each source is a node of its own whose class and shader are made from the port it feeds. Its texture holds a smooth
-pattern of values that the port's semantic allows, and carries the camera's view and the scene's first light, so that
-whatever a reader may be given is there.
+Each source is a node whose class and shader are made from the port that it feeds. Its texture holds a smooth pattern of
+values that the port's semantic allows, and carries the camera's view and the scene's first light, so that it has all
+that a reader may need.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from rendergraph.api import (
     View,
     Views,
 )
-from rendergraph.authoring.variants import Variant
+from rendergraph.authoring.variants import NodeVariant
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.ports import Samples
 from rendergraph.textures import FORMATS, TEXTURE_KINDS, TextureDesc
 
 SIZE = (37, 23)
-"""Of the picture: small, and no multiple of what work groups have."""
+"""Of the picture: small, and not a multiple of the size of work groups."""
 
 _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 1
     "radiance": "vec4(4.0 * wave * at, 2.0 * wave, 1.0)",
@@ -48,20 +48,12 @@ _VALUES = {  # by semantic, of `vec2 at` from 0 to 1 and `float wave` from 0 to 
 _ANY_VALUE = "vec4(at, wave, 1.0)"
 _DEPTHS = ("depth", "shadow_map")
 _BUFFER_BYTES = 1 << 20
-_FROM = "from-"  # before the name of what feeds an input; no port has it
+_FROM = "from-"  # prefix of outputs that show a source; no port begins like this
 
 
 @dataclass
-class Surrounded:
-    """A node type among sources and readers.
-
-    Attributes:
-        checked: what is checked.
-        folder: where shaders and pipelines of the surroundings are written.
-        sources: input to the type that feeds it.
-        multisampled: input that takes one sample a texel or several, to the type that feeds it several.
-        readers: output to the type that reads it.
-    """
+class HarnessGraph:
+    """A node type with sources for its inputs and readers for its outputs, whose files are in `folder`."""
 
     checked: NodeType
     folder: Path
@@ -72,42 +64,38 @@ class Surrounded:
     def __post_init__(self) -> None:
         for name, port in self.checked.cls.inputs().items():
             if isinstance(port, Input) and port.takes_scene:
-                continue  # the scene has one
+                continue  # the scene is its source
             samples = _samples(port)
             single: Samples = 4 if samples == "multi" else 1
-            self.sources[name] = self._added("feed", name, _source(name, port, self.folder, single))
+            self.sources[name] = self._type("feed", name, _source(name, port, self.folder, single))
             if samples == "any" and port.kind in TEXTURE_KINDS:
-                self.multisampled[name] = self._added("feed_samples", name, _source(name, port, self.folder, 4))
+                self.multisampled[name] = self._type("feed_samples", name, _source(name, port, self.folder, 4))
         for name, output in self.checked.cls.outputs().items():
             reader = _reader(name, output, self.folder)
             if reader is not None:
-                self.readers[name] = self._added("use", name, reader)
+                self.readers[name] = self._type("use", name, reader)
 
     @property
     def fed(self) -> list[str]:
-        """The inputs that are fed a texture which can be read back."""
+        """The inputs whose source is a texture that can be read back."""
         ports = self.checked.cls.inputs()
         return [name for name in self.sources if ports[name].kind in TEXTURE_KINDS and _samples(ports[name]) != "multi"]
 
-    def _added(self, word: str, name: str, cls: type[Node]) -> NodeType:
+    def _type(self, word: str, name: str, cls: type[Node]) -> NodeType:
         return NodeType(f"check_{word}_{name}", "", cls, Path(__file__), self.folder, "check-node")
 
     def catalog(self) -> Catalog:
-        """The node's type and those around it."""
-        around = (*self.sources.values(), *self.multisampled.values(), *self.readers.values())
-        return Catalog({}, {entry.name: entry for entry in (self.checked, *around)})
+        harness = (*self.sources.values(), *self.multisampled.values(), *self.readers.values())
+        return Catalog({}, {entry.name: entry for entry in (self.checked, *harness)})
 
-    def pipeline(self, variant: Variant, scene: str) -> dict[str, Any]:
-        """A pipeline file of one variant, as plain values; outputs are what feeds the node, then the node's.
-
-        A variant without outputs is the sources alone.
-        """
+    def _pipeline(self, variant: NodeVariant, scene: str) -> dict[str, Any]:
+        """Return the pipeline of a variant; its outputs are the sources', then the node's, if the variant has any."""
         cls, node = self.checked.cls, self.checked.name
         nodes: dict[str, Any] = {}
         inputs: dict[str, Any] = {}
         outputs: dict[str, str] = {}
         for name, source in self.sources.items():
-            if name in variant.left_out:
+            if name in variant.unconnected:
                 continue
             port = cls.inputs()[name]
             several = variant.multisampled and name in self.multisampled
@@ -129,13 +117,12 @@ class Surrounded:
         return {"rendergraph": 1, "size": list(SIZE), "scene": scene, "nodes": nodes, "outputs": outputs}
 
     def input_of(self, output: str) -> str:
-        """The input that an output of the pipeline feeds; empty for an output of the node."""
+        """Return the input whose source an output of the pipeline shows; empty for an output of the node."""
         return output.removeprefix(_FROM) if output.startswith(_FROM) else ""
 
-    def write(self, variant: Variant, scene: str) -> Path:
-        """The pipeline of a variant as a file; JSON is YAML."""
+    def write(self, variant: NodeVariant, scene: str) -> Path:
         file = self.folder / "check.yaml"
-        file.write_text(json.dumps(self.pipeline(variant, scene)), encoding="utf-8")
+        file.write_text(json.dumps(self._pipeline(variant, scene)), encoding="utf-8")
         return file
 
 
@@ -143,12 +130,10 @@ class Surrounded:
 
 
 def _samples(port: Input | InOut) -> str:
-    """Which numbers of samples a port takes: `single`, `multi`, `any`."""
     return port.samples if isinstance(port, Input) else "single"
 
 
 def _source(name: str, port: Input | InOut, folder: Path, samples: Samples) -> type[Node]:
-    """The class of a node that feeds a port."""
     semantic = port.semantic
     if isinstance(semantic, Signature):
         return _function_source(semantic, folder)
@@ -208,8 +193,6 @@ def _pattern(semantic: Semantic, format: str) -> str:
 
 
 def _camera(port: str, count: int = 1) -> Any:
-    """An `update` that sets a table to the camera's view."""
-
     def update(self: Any, frame: Frame) -> None:
         frame.set_views(getattr(self, port), [frame.camera] * count)
 
@@ -217,13 +200,13 @@ def _camera(port: str, count: int = 1) -> Any:
 
 
 def _function_source(signature: Signature, folder: Path) -> type[Node]:
-    """A function that is neutral where a texture may stand for it, and else differs with each of its arguments."""
+    """Return a node whose function is neutral where a texture can replace it, and else varies with each argument."""
     shader = f"{signature.name}_fed.glsl"
     kind, value = signature.declaration.split()[0], signature.neutral
     if signature.texture is None and kind.startswith("vec"):
-        takes = re.findall(r"(\w+)\s+(\w+)\s*[,)]", signature.declaration)
-        parts = [f"dot({name}, {of}(0.3))" for of, name in takes if of in ("vec2", "vec3", "vec4")]
-        parts += [f"0.3 * float({name})" for of, name in takes if of in ("float", "int", "uint", "bool")]
+        arguments = re.findall(r"(\w+)\s+(\w+)\s*[,)]", signature.declaration)
+        parts = [f"dot({name}, {of}(0.3))" for of, name in arguments if of in ("vec2", "vec3", "vec4")]
+        parts += [f"0.3 * float({name})" for of, name in arguments if of in ("float", "int", "uint", "bool")]
         value = f"{value} + 0.5 + 0.5 * sin({' + '.join(parts) or '0.3'})"
     (folder / shader).write_text(f"{signature.declaration} {{ return {value}; }}\n", encoding="utf-8")
     return _node("Called", made=Function(signature, shader=shader, doc="A pattern."))
@@ -233,19 +216,19 @@ def _function_source(signature: Signature, folder: Path) -> type[Node]:
 
 
 def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
-    """The class of a node that makes a texture of what is none itself; None where a file can show the port."""
-    value = Output(AnyTexel, format="rgba32f", doc="What was read.")
+    """Return the class of a node that turns an output into a texture; None where it is one."""
+    value = Output(AnyTexel, format="rgba32f", doc="The values.")
     if isinstance(port, Function):
         shader = f"use_{name}.frag"
         (folder / shader).write_text(_call(port.signature), encoding="utf-8")
-        read = Input(port.signature, kind="function", many=True, doc="What is called.")
+        read = Input(port.signature, kind="function", many=True, doc="The function.")
         return _node("Caller", read=read, made=value, shader=shader)
     if isinstance(port, Views):
-        seen = Input(View, kind="view", doc="What is drawn with.")
+        seen = Input(View, kind="view", doc="The view.")
         depth = Output(Depth, format="depth32f", clear=0.0, doc="The scene's depth.")
         return _node("Drawer", read=seen, made=depth, record=_draw)
     if getattr(port, "samples", None) not in (None, 1):
-        read = Input(AnyTexel, samples="any", doc="What is read.")
+        read = Input(AnyTexel, samples="any", doc="The texture.")
         text = "uniform SAMPLER read;\nout vec4 made;\n"
         text += "void main() { made = vec4(texelFetch(read, ivec2(gl_FragCoord.xy), 0)); }\n"
         (folder / "use_samples.frag").write_text(text, encoding="utf-8")
@@ -257,7 +240,7 @@ def _reader(name: str, port: Port, folder: Path) -> type[Node] | None:
             encoding="utf-8",
         )
         semantic = getattr(port, "semantic", None) or AnyTexel
-        read = Input(semantic, kind="buffer", doc="What is read.")
+        read = Input(semantic, kind="buffer", doc="The texture.")
         return _node("Words", read=read, made=value, shader="use_buffer.frag")
     return None
 
@@ -274,7 +257,6 @@ def _draw(self: Any, steps: Steps) -> None:
 
 
 def _call(signature: Signature) -> str:
-    """A shader that calls a function with zeros."""
     arguments = signature.declaration.partition("(")[2].rpartition(")")[0]
     kinds = [argument.split()[-2] for argument in arguments.split(",") if argument.strip()]
     zeros = ", ".join(f"{kind}(0)" for kind in kinds)
@@ -285,6 +267,5 @@ def _call(signature: Signature) -> str:
 
 
 def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[Node]:
-    """A node class made of ports and functions."""
-    body = {"__module__": __name__, "__doc__": "Made for a check.", "shader": shader, **attributes}
+    body = {"__module__": __name__, "__doc__": "Part of a check.", "shader": shader, **attributes}
     return types.new_class(name, (Node,), exec_body=lambda space: space.update(body))

@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import contextlib
 import json
+import keyword
 import re
+import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal, get_args
 
-from rendergraph.authoring.names import check_name, class_name
+from rendergraph import api
 from rendergraph.catalog import Catalog
+from rendergraph.declare import RESERVED_NAMES
 from rendergraph.errors import InputError, Place, Problem, RenderError
 from rendergraph.resources import folder
 from rendergraph.schema import schema
@@ -38,18 +42,14 @@ _IN_PACKAGE = {
     "pipeline": 'ROOT / "pipelines" / "@name@.yaml"',
     "plugins": ", plugins=PLUGINS",
 }
+_ROOTS = ("nodes", "shaders")
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
+_LONGEST_NAME = 40
 
 
 @dataclass(frozen=True)
 class NewNode:
-    """What has been written.
-
-    Attributes:
-        name: the node's type.
-        kind: which template.
-        files: the paths, relative to the folder they were asked for in.
-        commands: what to type next, in that folder.
-    """
+    """The files that were written, relative to the given folder, and the commands to type there next."""
 
     name: str
     kind: Kind
@@ -58,99 +58,118 @@ class NewNode:
 
 
 def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, where: Path = Path()) -> NewNode:
-    """Write a working node.
-
-    Args:
-        name: its type: lower-case letters, digits and underscores.
-        kind: which template.
-        package: a folder that can be installed, instead of files in place.
-        where: the folder to write into.
+    """Write a working node into a folder; with `package`, as a folder that can be installed.
 
     Raises:
         InputError: the name cannot be used, or a file of it exists already; nothing has been written then.
         RenderError: writing failed; nothing is left behind.
     """
-    check_name(name, Catalog.discover().names())
-    files = _package(name, kind) if package else _in_place(name, kind)
+    mistake = _name_mistake(name, set(Catalog.discover().names()))
+    if mistake:
+        raise InputError(Problem("RG530", f"a node cannot be called '{name}': {mistake}"))
+    files = _files(name, kind, package=package)
     _refuse_existing(where, [name] if package else files)
     pipeline = next(file for file in files if file.endswith(".yaml"))
     schema_file = (Path(pipeline).parent / SCHEMA_FILE).as_posix()
-    fresh = not (where / schema_file).exists()
-    if fresh:
+    has_schema = (where / schema_file).exists()
+    if not has_schema:
         files[schema_file] = _schema(files, by_path=kind == "shader-only" and not package)
     _write(where, files)
-    plugin = "--plugin . " if package else "" if kind == "shader-only" else f"--plugin {name}.py "
-    commands = [f"cd {name}"] if package else []
+    plugin = "--plugin ." if package else "" if kind == "shader-only" else f"--plugin {name}.py"
     inside = [path.removeprefix(f"{name}/") if package else path for path in files]
     source = next(p for p in inside if Path(p).name == (f"{name}.frag" if kind == "shader-only" else f"{name}.py"))
     run = pipeline.removeprefix(f"{name}/") if package else pipeline
-    commands += [f"rendergraph run {run} {plugin}".rstrip(), f"rendergraph check-node {source}", "pytest"]
-    if not fresh:
+    commands = [f"rendergraph run {run} {plugin}".rstrip(), f"rendergraph check-node {source}", "pytest"]
+    if has_schema:
         commands.append(f"rendergraph schema --plugin . -o {SCHEMA_FILE}")
     if package:
-        commands.append("pip install -e .")
+        commands = [f"cd {name}", *commands, "pip install -e ."]
     return NewNode(name, kind, tuple(Path(path) for path in files), tuple(commands))
 
 
-# --- what is written -------------------------------------------------------------------------------------------------
+# --- names ------------------------------------------------------------------------------------------------------------
 
 
-def _in_place(name: str, kind: Kind) -> dict[str, str]:
-    """Path to text of a node whose files stand beside each other."""
-    words = _words(name, kind, f"./{name}.frag" if kind == "shader-only" else name) | _IN_PLACE
-    if kind == "shader-only":
-        words["plugins"] = ""
-    found = {}
-    for file in _templates(kind):
-        stem, suffix = file.name.removesuffix(".in").split(".")
-        target = {"node": f"{name}.{suffix}", "pipeline": f"{name}.yaml", "test": f"test_{name}.py"}[stem]
-        found[target] = _filled(file, words)
-    return found
+def class_name(name: str) -> str:
+    """Return `LensFalloff` for `lens_falloff`, or a longer name where plugin authors import that one."""
+    camel = "".join(part.capitalize() for part in name.split("_"))
+    return f"{camel}Node" if camel in api.__all__ else camel
 
 
-def _package(name: str, kind: Kind) -> dict[str, str]:
-    """Path to text of a folder that can be installed."""
-    words = _words(name, kind, name) | _IN_PACKAGE
-    found = {f"{name}/{file.name.removesuffix('.in')}": _filled(file, words) for file in _templates("package")}
-    for file in _templates(kind):
-        stem, suffix = file.name.removesuffix(".in").split(".")
-        shaders = "nodes" if kind == "shader-only" else "shaders"  # a shader that is a node lies where nodes do
-        home = {"pipeline": "pipelines", "test": "tests"}.get(stem, "nodes" if suffix == "py" else shaders)
-        target = f"test_{name}.py" if stem == "test" else f"{name}.{suffix}"
-        found[f"{name}/{home}/{target}"] = _filled(file, words)
-    for home in ("nodes", "shaders"):
-        found[f"{name}/{home}/__init__.py"] = f'"""{home.capitalize()} of `{words["package"]}`."""\n'
-    return found
+def _name_mistake(name: str, existing: Set[str]) -> str:
+    """Return why a name cannot be a node type, a module and a GLSL file at once; empty where it can."""
+    if not _NAME.match(name) or len(name) > _LONGEST_NAME:
+        better = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+        better = re.sub(r"[^a-z0-9]+", "_", better).strip("_0123456789")[:_LONGEST_NAME].strip("_")
+        hint = f", such as '{better}'" if better and not _name_mistake(better, existing) else ""
+        return f"a name is up to {_LONGEST_NAME} lower-case letters, digits and single underscores{hint}"
+    other = f"; choose another, such as 'my_{name}'"
+    if name in existing:
+        return f"a node type of that name exists{other}"
+    if name in RESERVED_NAMES or keyword.iskeyword(name) or name.startswith("gl_"):
+        return f"the word is reserved by GLSL or Python{other}"
+    if name.startswith("test_") or name == "conftest":
+        return f"pytest would take the module for a test; choose another, such as '{name.removeprefix('test_')}_node'"
+    if name in sys.stdlib_module_names or _is_installed(name):
+        return f"a Python module has that name, and one would hide the other{other}"
+    return ""
 
 
-def _words(name: str, kind: Kind, node_type: str) -> dict[str, str]:
-    return {
+def _is_installed(name: str) -> bool:
+    try:
+        spec = find_spec(name)
+    except (ImportError, ValueError):
+        return False
+    return spec is not None and spec.origin is not None and Path(spec.origin).parent != Path.cwd()
+
+
+# --- what is written --------------------------------------------------------------------------------------------------
+
+
+def _files(name: str, kind: Kind, *, package: bool) -> dict[str, str]:
+    words = {
         "name": name,
         "Class": class_name(name),
         "id": f"my_{name}" if name in _IDS_OF_FORWARD else name,
-        "type": node_type,
+        "type": f"./{name}.frag" if kind == "shader-only" and not package else name,
         "package": f"rendergraph_{name}",
         "dashed": name.replace("_", "-"),
         "schema": f"./{SCHEMA_FILE}",
         "summary": _summary(kind),
-    }
+    } | (_IN_PACKAGE if package else _IN_PLACE)
+    if kind == "shader-only" and not package:
+        words["plugins"] = ""
+    files = {}
+    if package:
+        files = {f"{name}/{file.name.removesuffix('.in')}": _fill(file, words) for file in _templates("package")}
+        files |= {
+            f"{name}/{home}/__init__.py": f'"""{home.capitalize()} of `{words["package"]}`."""\n' for home in _ROOTS
+        }
+    for file in _templates(kind):
+        stem, suffix = file.name.removesuffix(".in").split(".")
+        target = f"test_{name}.py" if stem == "test" else f"{name}.{suffix}"
+        if package:
+            is_module = suffix == "py" or kind == "shader-only"  # a shader that is a node is among the nodes
+            home = {"pipeline": "pipelines", "test": "tests"}.get(stem, "nodes" if is_module else "shaders")
+            target = f"{name}/{home}/{target}"
+        files[target] = _fill(file, words)
+    return files
 
 
 def _summary(kind: Kind) -> str:
-    """The first line of what a template says of its node."""
     for file in _templates(kind):
         text = file.read_text(encoding="utf-8")
         found = re.search(r'class @Class@\(Node\):\n    """(.*?)(?:"""|\n)', text) or re.search(r"doc: (.*)", text)
         if found:
             return found[1]
-    raise AssertionError(f"the templates of '{kind}' do not say what they make")
+    raise AssertionError(f"the templates of '{kind}' have no docs")
 
 
 def _templates(kind: str) -> list[Path]:
     return sorted((folder("rendergraph.authoring") / "templates" / kind).glob("*.in"))
 
 
-def _filled(file: Path, words: Mapping[str, str]) -> str:
+def _fill(file: Path, words: Mapping[str, str]) -> str:
     text = file.read_text(encoding="utf-8")
     for _ in range(2):  # words may hold words
         text = re.sub(r"@(\w+)@", lambda found: words[found[1]], text)
@@ -158,7 +177,7 @@ def _filled(file: Path, words: Mapping[str, str]) -> str:
 
 
 def _schema(files: Mapping[str, str], *, by_path: bool) -> str:
-    """The schema of everything installed and of this node, which is not written yet; one by path needs no entry."""
+    """Return the schema of everything installed and of this node, unless the pipeline names that by its path."""
     with tempfile.TemporaryDirectory() as place:
         node = Path(place) / "nodes"
         node.mkdir()
@@ -168,23 +187,15 @@ def _schema(files: Mapping[str, str], *, by_path: bool) -> str:
         return json.dumps(schema(Catalog.discover([] if by_path else [node])), indent=2, ensure_ascii=False) + "\n"
 
 
-# --- writing ---------------------------------------------------------------------------------------------------------
-
-
-def _refuse_existing(where: Path, paths: list[str] | Mapping[str, str]) -> None:
-    problems = [
-        Problem(
-            "RG531", f"'{path}' exists already and is left as it is; move it away or choose another name", Place(path)
-        )
-        for path in paths
-        if (where / path).exists() or (where / path).is_symlink()
-    ]
-    if problems:
-        raise InputError(problems)
+def _refuse_existing(where: Path, paths: Iterable[str]) -> None:
+    existing = [path for path in paths if (where / path).exists() or (where / path).is_symlink()]
+    text = "'{}' already exists and was not changed; move it or choose another name"
+    if existing:
+        raise InputError([Problem("RG531", text.format(path), Place(path)) for path in existing])
 
 
 def _write(where: Path, files: Mapping[str, str]) -> None:
-    """All files or none; what appears meanwhile under one of the names is not touched."""
+    """Write all files or none; a file that appears meanwhile under one of the names is not touched."""
     made: list[Path] = []
     try:
         for path, text in files.items():

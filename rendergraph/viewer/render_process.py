@@ -1,0 +1,93 @@
+"""The render process, as the server sees it: started, asked, ended when it does not answer, and started again.
+
+A shader that hangs, a driver that crashes or a size that memory does not hold ends this process and nothing else: the
+server reports what happened and keeps the edits, and the next request starts another process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from multiprocessing.connection import Connection
+
+from rendergraph.errors import Problem, RenderError, RendergraphError
+from rendergraph.farm.worker_process import ChildProcess
+from rendergraph.viewer.messages import Request, Response
+
+TIMEOUT = 30.0
+"""Seconds that a request may take; the first one of a process may take longer."""
+
+
+class RenderProcess:
+    """A process that answers requests, one at a time. Any one thread at a time may use it."""
+
+    def __init__(self, device: int | None = None, timeout: float = TIMEOUT) -> None:
+        self._device, self._timeout = device, timeout
+        self._lock = threading.Lock()
+        self._child: ChildProcess | None = None
+
+    @property
+    def pid(self) -> int | None:
+        return self._child.process.pid if self._child is not None else None
+
+    def start(self) -> None:
+        with self._lock:
+            self._running()
+
+    def ask(self, request: Request) -> Response:
+        """Return the response to a request.
+
+        Raises:
+            RenderError: the process took too long, or died; the next request starts another.
+        """
+        with self._lock:
+            child = self._running()
+            try:
+                with contextlib.suppress(OSError):  # receiving finds out why
+                    child.pipe.send(request)
+                response = child.receive(patience := child.patience(self._timeout))
+            except TimeoutError:
+                text = f"the render process did not answer within {patience:.0f} s and was terminated"
+                raise self._lost(f"{text}; undo the last change, or allow more by --timeout") from None
+            except EOFError as error:
+                text = f"the render process ended ({error}); a driver that crashes or too little memory can cause this"
+                raise self._lost(text) from None
+            if isinstance(response, BaseException):
+                self._end()
+                raise response
+            assert isinstance(response, Response)
+            return response
+
+    def close(self) -> None:
+        with self._lock:
+            self._end()
+
+    def _running(self) -> ChildProcess:
+        if self._child is None:
+            self._child = ChildProcess("rendergraph.viewer.render_process:main", {"device": self._device})
+        return self._child
+
+    def _lost(self, text: str) -> RenderError:
+        self._end()
+        return RenderError(Problem("RG630", text))
+
+    def _end(self) -> None:
+        child, self._child = self._child, None
+        if child is not None:
+            child.kill()
+
+
+def main(pipe: int, device: int | None) -> None:
+    from rendergraph.session.gpu import Gpu  # the server, which shares this module, never renders
+    from rendergraph.viewer.render_service import RenderService  # likewise
+
+    with Connection(pipe) as end, contextlib.suppress(EOFError, OSError):
+        try:
+            gpu = Gpu(device)
+        except RendergraphError as error:
+            end.recv()
+            end.send(error)
+            return
+        with gpu, contextlib.closing(RenderService(gpu)) as service:
+            while True:
+                end.send(service.answer(end.recv()))

@@ -1,0 +1,376 @@
+"""What runs in the render process: pictures, and facts about them."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import singledispatchmethod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from msgspec.structs import replace
+
+from rendergraph import images, stamps
+from rendergraph.compile import Executable
+from rendergraph.document import Source, from_plain
+from rendergraph.errors import Place, Problem, RendergraphError, shown_file
+from rendergraph.metrics import measure
+from rendergraph.resolve import diff, to_yaml
+from rendergraph.scene.cameras import bounding_sphere
+from rendergraph.session import stages
+from rendergraph.session.drawing import Drawing
+from rendergraph.session.frame import Frame, OutputInfo
+from rendergraph.session.gpu import Gpu
+from rendergraph.session.selection import RenderOptions, Selection
+from rendergraph.session.values import Expanded, Linked, Planned
+from rendergraph.session.wanted import every_port
+from rendergraph.stamps import Stamps
+from rendergraph.viewer import messages
+from rendergraph.viewer.describe import describe
+from rendergraph.viewer.messages import RenderRequest, Request, Response
+
+Pixels = npt.NDArray[Any]
+
+NO_ALIAS_BYTES = 256 << 20
+"""Textures up to this size do not share memory, so that more of the last frame is left when something changes."""
+INTERACTIVE_MS = 40.0
+"""A moving picture that takes longer is rendered smaller."""
+MOST_REDUCTION = 4
+"""It is rendered at a quarter of its size at the least."""
+THUMBNAIL = 176
+"""Pixels along the longer side of a small picture."""
+BINS = 64
+_MOST_CACHED = 4
+_LIGHT = frozenset({"radiance", "emissive", "luminance"})
+
+
+@dataclass(frozen=True)
+class _Rendered:
+    """The last picture, and which output or tap of it is shown."""
+
+    request: RenderRequest
+    frame: Frame
+    name: str
+    drawing: Drawing
+
+    @property
+    def pixels(self) -> Pixels:
+        return self.frame[self.name]
+
+    @property
+    def info(self) -> OutputInfo:
+        return self.frame.info(self.name)
+
+    def display(self) -> npt.NDArray[np.uint8]:
+        return images.viewable_as(_expose(self.pixels, self.info, self.request.exposure), self.info)
+
+
+class RenderService:
+    """Answers requests in the render process; one that cannot be answered is answered with its problems.
+
+    It owns the GL context, and keeps what the next picture can use: linked pipelines, their steps, the last picture.
+    """
+
+    def __init__(self, gpu: Gpu, interactive_ms: float = INTERACTIVE_MS) -> None:
+        self._gpu, self._interactive_ms = gpu, interactive_ms
+        self._files: Stamps = {}
+        self._linked: dict[Selection, Linked] = {}
+        self._expanded: dict[tuple[Selection, str], Expanded] = {}
+        self._planned: Planned | None = None
+        self._revision = 0
+        self._node_of_file: Mapping[str, str] = {}
+        self._full_ms = 0.0  # the time of a whole frame, from the last time that each node ran
+        self._timed: Executable | None = None
+        self._pass_times: dict[str, dict[str, Any]] = {}
+        self._rendered: _Rendered | None = None
+        self._folder = tempfile.TemporaryDirectory(prefix="rendergraph-view-")
+
+    def close(self) -> None:
+        self._folder.cleanup()
+
+    def answer(self, request: Request) -> Response:
+        """Return the response; mistakes of the user are in it, not raised."""
+        try:
+            return self._answer(request)
+        except RendergraphError as error:
+            return Response(problems=tuple(self._as_json(problem) for problem in error.problems))
+
+    @singledispatchmethod
+    def _answer(self, request: Request) -> Response:
+        raise NotImplementedError(request)
+
+    # --- a picture ---------------------------------------------------------------------------------------------------
+
+    @_answer.register
+    def _picture(self, request: RenderRequest) -> Response:
+        if stamps.modified(self._files):
+            self._files, self._linked, self._expanded = {}, {}, {}
+        with stamps.track_reads() as files:
+            try:
+                rendered = self._render(request)
+            finally:
+                self._files = {**self._files, **files}
+        self._rendered, frame = rendered, rendered.frame
+        picture = rendered.display()
+        facts: dict[str, Any] = {
+            "size": [picture.shape[1], picture.shape[0]],
+            "number": frame.number,
+            "port": request.port,
+            "passes": self._passes(rendered),
+            "frame_ms": frame.frame_ms["median"],
+            "device": dict(frame.device),
+            "still": request.still,
+            "warnings": [problem.as_json() for problem in frame.warnings],
+        }
+        if request.still:
+            facts["texture"] = texture_statistics(rendered.pixels, rendered.info)
+        if request.known_revision != self._revision:
+            assert self._planned is not None  # the picture is of it
+            facts["pipeline"] = describe(self._planned)
+        facts["revision"] = self._revision
+        return Response(
+            facts,
+            {"picture": self._encode(picture, ".png" if request.still else ".jpg")},
+            camera=rendered.drawing.camera,
+            sphere=bounding_sphere(rendered.drawing.expanded.linked.scene),
+        )
+
+    def _passes(self, rendered: _Rendered) -> list[dict[str, Any]]:
+        """Return each node's last times, and whether it ran for this picture."""
+        if self._timed is not rendered.drawing.executable:
+            self._timed, self._pass_times = rendered.drawing.executable, {}
+        ran = {step.node for step in rendered.frame.times[-1].steps if step.index >= 0}
+        for entry in rendered.frame.passes:
+            node = str(entry["node"])
+            if node in ran or node not in self._pass_times:
+                self._pass_times[node] = dict(entry)
+        if rendered.request.still:
+            self._full_ms = sum(entry["gpu_ms"] or entry["cpu_ms"] for entry in self._pass_times.values())
+        return [entry | {"ran": node in ran} for node, entry in self._pass_times.items()]
+
+    def _render(self, request: RenderRequest) -> _Rendered:
+        selection = request.selection
+        if request.still or self._planned is None:
+            linked = self._link(selection)
+            if self._planned is None or self._planned.linked is not linked:
+                self._planned = stages.plan(stages.expand(linked))
+                self._node_of_file = _nodes_by_file(self._planned)
+                self._revision += 1
+        if not request.still:  # its description waits until it is still
+            selection = self._reduce_size(selection, self._planned.linked.graph.size)
+        return self._draw(self._expand(selection, request), request)
+
+    def _draw(self, expanded: Expanded, request: RenderRequest) -> _Rendered:
+        with self._gpu.current():
+            drawing = self._gpu.cache.drawing
+            if isinstance(drawing, Drawing) and drawing.expanded is expanded:
+                drawing.times = []
+            else:
+                drawing = stages.compile(expanded, self._gpu)
+                drawing.begin()
+            drawing.draw(request.frame, request.camera)
+            return _Rendered(request, drawing.read(), list(expanded.wanted)[-1], drawing)
+
+    def _link(self, selection: Selection) -> Linked:
+        if selection not in self._linked:
+            _store(self._linked, selection, stages.link(stages.resolve(selection)))
+        return self._linked[selection]
+
+    def _expand(self, selection: Selection, request: RenderRequest) -> Expanded:
+        port = request.port
+        key = selection, port
+        if key not in self._expanded:
+            linked = self._link(selection)
+            outputs = linked.graph.outputs
+            main = "image" if "image" in outputs else next(iter(outputs))
+            assert self._planned is not None  # the first picture is still, and that is planned
+            alias = self._planned.plan.memory.no_reuse_bytes > NO_ALIAS_BYTES
+            shown = port if port in outputs else main
+            options = RenderOptions(
+                outputs=(shown,), fps=request.fps, warm_up=False, timed=True, reuse=True, alias=alias
+            )
+            if port and port not in outputs:
+                options = replace(options, taps=(port,))
+            _store(self._expanded, key, stages.expand(linked, options))
+        return self._expanded[key]
+
+    def _reduce_size(self, selection: Selection, size: tuple[int, int]) -> Selection:
+        factor = 1
+        while self._full_ms > self._interactive_ms * factor * factor and factor < MOST_REDUCTION:
+            factor *= 2
+        return (
+            selection
+            if factor == 1
+            else replace(selection, size=(max(size[0] // factor, 1), max(size[1] // factor, 1)))
+        )
+
+    # --- more about the picture --------------------------------------------------------------------------------------
+
+    @_answer.register
+    def _changed_files(self, request: messages.ChangedFilesRequest) -> Response:
+        return Response({"changed": [path.name for path in stamps.modified(self._files)]})
+
+    @_answer.register
+    def _pixel(self, request: messages.PixelRequest) -> Response:
+        if self._rendered is None:
+            return Response()
+        return Response({"pixel": texel(self._rendered.pixels, request.x, request.y)})
+
+    @_answer.register
+    def _thumbnails(self, request: messages.ThumbnailRequest) -> Response:
+        if self._rendered is None or self._planned is None:
+            return Response()
+        last, (width, height) = self._rendered.request, self._planned.linked.graph.size
+        scale = min(1.0, THUMBNAIL / max(width, height))
+        small = replace(last.selection, size=(max(1, round(width * scale)), max(1, round(height * scale))))
+        ports = every_port(self._planned)
+        key = small, "*"
+        if key not in self._expanded:
+            options = RenderOptions(fps=last.fps, taps=ports, warm_up=False)
+            self._expanded[key] = stages.expand(self._link(small), options)
+        frame = self._draw(self._expanded[key], last).frame
+        textures = {port: frame.info(port) for port in ports if frame.info(port).kind != "buffer"}
+        files = {
+            port: self._encode(_subsample(images.viewable_as(frame[port], info)), ".png")
+            for port, info in textures.items()
+        }
+        return Response({"revision": self._revision}, files)
+
+    @_answer.register
+    def _compare(self, request: messages.CompareRequest) -> Response:
+        if self._rendered is None or self._planned is None:
+            return Response()
+        last, linked = self._rendered, self._planned.linked
+        # As in `compare`: the same scene, camera and size.
+        scene, camera = linked.spec.scene or request.selection.scene, last.request.selection.camera
+        selection = replace(request.selection, size=linked.graph.size, scene=scene, camera=camera)
+        other = self._draw(self._expand(selection, last.request), last.request)
+        facts: dict[str, Any] = {
+            "name": other.drawing.expanded.linked.graph.name,
+            "frame_ms": other.frame.frame_ms["median"],
+            "passes": [dict(entry) for entry in other.frame.passes],
+        }
+        a, b = last.display(), other.display()
+        files = {"other": self._encode(b, ".png")}
+        if a.shape == b.shape and a.shape[-1] == 3:
+            metrics, flip = measure(a, b)
+            facts["figures"] = metrics.as_json()
+            difference = np.abs(a.astype(np.int16) - b.astype(np.int16)).max(axis=-1).astype(np.float32) / 255
+            files["difference"] = self._encode(images.heat_map(np.clip(difference * 8, 0, 1)), ".png")
+            files["flip"] = self._encode(images.heat_map(flip), ".png")
+        return Response(facts, files)
+
+    @_answer.register
+    def _variant(self, request: messages.VariantRequest) -> Response:
+        if self._rendered is None:
+            return Response()
+        opened = replace(request.opened, sets=(), patches=(), scene=None, size=None)
+        before, after = (stages.resolve(one).spec.plain() for one in (opened, self._rendered.request.selection))
+        variant = {"extends": opened.source} | diff(before, after)
+        return Response({"yaml": to_yaml(from_plain(variant, Source("variant")), origins=False)})
+
+    # --- encoding, and errors ----------------------------------------------------------------------------------------
+
+    def _encode(self, picture: npt.NDArray[np.uint8], ending: str) -> bytes:
+        path = Path(self._folder.name) / f"picture{ending}"
+        images.write(path, picture)
+        return path.read_bytes()
+
+    def _as_json(self, problem: Problem) -> dict[str, Any]:
+        return problem.as_json() | {"node": self._node_at(problem.place) if problem.place else None}
+
+    def _node_at(self, place: Place) -> str | None:
+        """Return the node that is declared or set at a place, or whose type comes from that file."""
+        if (setting := place.option("--set")) is not None:
+            return setting.path.partition(".")[0]
+        if self._planned is None:
+            return None
+        if (id := self._node_of_file.get(place.file)) is not None:
+            return id
+        nodes = self._planned.linked.graph.nodes
+        above = [
+            (n.place.line, n.id) for n in nodes if n.place and n.place.file == place.file and n.place.line <= place.line
+        ]
+        return max(above)[1] if above else None
+
+
+def _nodes_by_file(planned: Planned) -> dict[str, str]:
+    """Return the files of node types, as messages name them, with the first node that has the type."""
+    found: dict[str, str] = {}
+    for step in planned.plan.schedule.steps:
+        kind = planned.linked.graph[step.node].type
+        for _, shader in step.shaders:
+            found.setdefault(shown_file(kind.shader_file(shader)[0]), step.node)
+        found.setdefault(shown_file(kind.file), step.node)
+    return found
+
+
+def _store(cache: dict[Any, Any], key: Any, value: Any) -> None:
+    if len(cache) >= _MOST_CACHED:
+        del cache[next(iter(cache))]
+    cache[key] = value
+
+
+def _expose(pixels: Pixels, info: OutputInfo, exposure: float) -> Pixels:
+    """Return light at an exposure in EV; anything else as it is."""
+    return pixels * np.float32(2.0**exposure) if exposure and info.semantic in _LIGHT else pixels
+
+
+def _subsample(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Return every n-th pixel of what is larger than a thumbnail: shadow maps, cubes."""
+    step = math.ceil(max(picture.shape[:2]) / THUMBNAIL)
+    return np.ascontiguousarray(picture[::step, ::step])
+
+
+def texel(pixels: Pixels, x: float, y: float) -> dict[str, Any]:
+    """Return the values at a position, 0…1 from the left and from the top; layers are arranged in a grid, as shown."""
+    array = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+    if array.ndim == 3:
+        array = array[np.newaxis]
+    count, height, width, _ = array.shape
+    columns = math.ceil(math.sqrt(count))
+    rows = math.ceil(count / columns)
+    column, row = min(int(x * columns * width), columns * width - 1), min(int(y * rows * height), rows * height - 1)
+    layer = row // height * columns + column // width
+    if layer >= count:
+        return {}
+    position = [column % width, row % height]
+    return {
+        "at": position,
+        "layer": layer if count > 1 else None,
+        "values": _numbers(array[layer, position[1], position[0]]),
+    }
+
+
+def texture_statistics(pixels: Pixels, info: OutputInfo) -> dict[str, Any]:
+    """Return a texture's format, shape, count of NaN and infinite texels, and per channel range, mean and histogram."""
+    array = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
+    flat = array.reshape(-1, array.shape[-1])
+    statistics: dict[str, Any] = {
+        "format": info.format,
+        "semantic": info.semantic,
+        "kind": info.kind,
+        "shape": list(array.shape),
+        "nan": int(np.isnan(flat).any(axis=-1).sum()),
+        "infinite": int(np.isinf(flat).any(axis=-1).sum()),
+        "channels": [],
+    }
+    for channel in range(flat.shape[-1]):
+        values = flat[:, channel].astype(np.float64)
+        values = values[np.isfinite(values)]
+        if not values.size:
+            statistics["channels"].append({"min": None, "max": None, "mean": None, "histogram": [0] * BINS})
+            continue
+        counts, _ = np.histogram(values, bins=BINS)
+        low, high, mean = _numbers((values.min(), values.max(), values.mean()))
+        statistics["channels"].append({"min": low, "max": high, "mean": mean, "histogram": counts.tolist()})
+    return statistics
+
+
+def _numbers(values: Iterable[Any]) -> list[Any]:
+    """Return values that JSON can hold: NaN and infinity become words."""
+    return [float(f"{v:.7g}") if math.isfinite(v) else str(float(v)) for v in values]

@@ -1,0 +1,211 @@
+"""The render service, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+import rendergraph as rg
+from rendergraph.images import read
+from rendergraph.viewer import camera as cameras
+from rendergraph.viewer.messages import (
+    ChangedFilesRequest,
+    CompareRequest,
+    PixelRequest,
+    RenderRequest,
+    Response,
+    ThumbnailRequest,
+    VariantRequest,
+)
+from rendergraph.viewer.render_service import RenderService, texel, texture_statistics
+
+SIZE = (64, 36)
+FORWARD = rg.Selection("forward", size=SIZE)
+
+
+@pytest.fixture
+def service(gl: rg.Session) -> Iterator[RenderService]:
+    with closing(RenderService(gl)) as found:
+        yield found
+
+
+def picture(answer: Response, folder: Path, name: str = "picture") -> np.ndarray:
+    assert not answer.problems
+    file = folder / f"{name}.png"
+    file.write_bytes(answer.files[name])
+    return read(file)
+
+
+def test_the_picture_is_the_one_that_python_renders(service: RenderService, gl: rg.Session, tmp_path: Path) -> None:
+    answer = service.answer(RenderRequest(FORWARD))
+    expected = gl.render(rg.load("forward", size=SIZE), outputs=("image",))["image"][..., :3]
+    np.testing.assert_array_equal(picture(answer, tmp_path)[..., :3], expected)
+    assert answer.facts["size"] == list(SIZE)
+    assert [entry["node"] for entry in answer.facts["passes"]][-1] == "display"
+
+
+def test_a_camera_by_hand_is_what_the_scene_says_with_that_camera(service: RenderService, tmp_path: Path) -> None:
+    first = service.answer(RenderRequest(FORWARD))
+    assert first.camera is not None
+    assert first.sphere is not None
+    moved = cameras.orbit(first.camera, first.sphere, 0.5, 0.1)
+    turned = picture(service.answer(RenderRequest(FORWARD, camera=moved)), tmp_path)
+    assert np.abs(turned.astype(int) - picture(first, tmp_path)).max() > 30
+    again = service.answer(RenderRequest(FORWARD, camera=first.camera))
+    np.testing.assert_array_equal(picture(again, tmp_path), picture(first, tmp_path))
+
+
+def test_the_description_comes_once_a_change(service: RenderService) -> None:
+    first = service.answer(RenderRequest(FORWARD))
+    assert "pipeline" in first.facts
+    known = first.facts["revision"]
+    assert "pipeline" not in service.answer(RenderRequest(FORWARD, frame=2, known_revision=known)).facts
+    changed = service.answer(RenderRequest(replace(FORWARD, sets=("light.ambient=0.5",)), known_revision=known))
+    assert changed.facts["pipeline"]["nodes"]["light"]["parameters"]["ambient"]["value"] == 0.5
+
+
+def test_a_slider_runs_nothing_before_what_it_changes(service: RenderService) -> None:
+    selection = rg.Selection("ssao-hemisphere", size=SIZE)
+    service.answer(RenderRequest(selection))
+    passes = service.answer(RenderRequest(replace(selection, sets=("ao.radius=0.3",)))).facts["passes"]
+    ran = {entry["node"]: entry["ran"] for entry in passes}
+    assert {node for node in ran if ran[node]} == {"ao", "light", "display"}
+    assert {"gbuffer", "sun", "shadows"} < ran.keys()  # with the times that they took
+
+
+def test_parameters_say_what_they_may_be(service: RenderService) -> None:
+    nodes = service.answer(RenderRequest(FORWARD)).facts["pipeline"]["nodes"]
+    assert nodes["display"]["parameters"]["exposure"] | {"takes": ""} == {
+        "value": 0.0,
+        "default": 0.0,
+        "role": "param",
+        "doc": nodes["display"]["parameters"]["exposure"]["doc"],
+        "unit": "EV",
+        "min": -32,
+        "max": 32,
+        "choices": [],
+        "kind": "number",
+        "takes": "",
+        "idle": "",
+    }
+    assert nodes["light"]["parameters"]["ambient"]["idle"] == "environment"
+    assert "phong" in nodes["light"]["parameters"]["shading"]["choices"]
+    assert nodes["light"]["parameters"]["ambient"]["kind"] == "color"
+    assert nodes["sun"]["parameters"]["resolution"]["kind"] == "integer"
+    assert "shadow_vsm" in nodes["shadows"]["types"]
+
+
+def test_a_pixel_has_the_textures_own_values(service: RenderService, gl: rg.Session) -> None:
+    service.answer(RenderRequest(FORWARD, port="light.radiance"))
+    expected = gl.render(rg.load("forward", size=SIZE), outputs=(), taps=("light.radiance",))["light.radiance"]
+    at = service.answer(PixelRequest(40.5 / 64, 30.5 / 36)).facts["pixel"]
+    assert at["at"] == [40, 30]
+    np.testing.assert_allclose(at["values"], expected[30, 40], rtol=1e-6)
+
+
+def test_layers_lie_in_a_grid_and_a_pixel_says_which() -> None:
+    layers = np.arange(3 * 2 * 4, dtype=np.float32).reshape(3, 2, 4, 1)
+    assert texel(layers, 0.0, 0.0) == {"at": [0, 0], "layer": 0, "values": [0.0]}
+    assert texel(layers, 0.99, 0.01) == {"at": [3, 0], "layer": 1, "values": [11.0]}
+    assert texel(layers, 0.01, 0.99) == {"at": [0, 1], "layer": 2, "values": [20.0]}
+    assert texel(layers, 0.99, 0.99) == {}
+
+
+def test_figures_of_a_texture(gl: rg.Session) -> None:
+    pixels = np.array([[1.0, 3.0], [np.nan, np.inf]], np.float32)
+    found = texture_statistics(pixels, rg.session.OutputInfo("a", "a.b", "depth", "r32f", "texture2d", None, ("Z",)))
+    assert (found["nan"], found["infinite"]) == (1, 1)
+    channel = found["channels"][0]
+    assert (channel["min"], channel["max"], channel["mean"]) == (1.0, 3.0, 2.0)
+    assert sum(channel["histogram"]) == 2
+    assert channel["histogram"][0] == channel["histogram"][-1] == 1
+
+
+def test_thumbnails_are_of_every_port_that_is_drawn(service: RenderService, tmp_path: Path) -> None:
+    service.answer(RenderRequest(FORWARD))
+    answer = service.answer(ThumbnailRequest())
+    assert {"light.radiance", "display.color", "sun.shadow_map"} <= answer.files.keys()
+    assert max(picture(answer, tmp_path, "sun.shadow_map").shape[:2]) <= 176
+
+
+def test_against_itself_nothing_differs_and_against_another_something(service: RenderService) -> None:
+    service.answer(RenderRequest(FORWARD))
+    same = service.answer(CompareRequest(FORWARD))
+    assert same.facts["figures"]["rmse"] == 0
+    other = service.answer(CompareRequest(replace(FORWARD, sets=("display.exposure=1",))))
+    assert other.facts["figures"]["flip"] > 0.05
+    assert other.files.keys() == {"other", "difference", "flip"}
+
+
+def test_what_it_is_compared_with_is_drawn_on_its_scene_by_its_camera(service: RenderService, tmp_path: Path) -> None:
+    (tmp_path / "ball.yaml").write_text(
+        "scene: 1\nobjects: {ball: {shape: sphere, radius: 0.5}}\n"
+        "cameras: {main: {eye: [0, 0, 3], target: [0, 0, 0]}, side: {eye: [9, 0, 0], target: [0, 0, 0]}}\n"
+    )
+    service.answer(RenderRequest(replace(FORWARD, scene=str(tmp_path / "ball.yaml"), camera="side")))
+    assert service.answer(CompareRequest(FORWARD)).facts["figures"]["rmse"] == 0
+
+
+def test_types_that_fit_the_links_come_before_those_that_want_others(service: RenderService) -> None:
+    sun = service.answer(RenderRequest(FORWARD)).facts["pipeline"]["nodes"]["sun"]
+    assert {"shadow_map", "shadow_cascaded", "shadow_cube"} <= set(sun["types"])
+    assert {"shadow_pcf", "shadow_planar", "show_shadow_map"} <= set(sun["other_types"])
+    for name in sun["types"]:
+        rg.load("forward", size=SIZE, sets=[f"sun.type={name}"]).expand()
+    assert not set(sun["types"]) & set(sun["other_types"])
+
+
+def test_a_variant_reads_back_to_what_was_on_the_page(service: RenderService, tmp_path: Path) -> None:
+    changed = replace(FORWARD, sets=("display.exposure=1.5", "shadows.type=shadow_vsm", "light.smith=fast"))
+    service.answer(RenderRequest(changed))
+    text = service.answer(VariantRequest(FORWARD)).facts["yaml"]
+    assert text.startswith("extends: forward\n")
+    file = tmp_path / "variant.yaml"
+    file.write_text(text)
+    assert rg.load(file).resolve().spec.plain() == rg.load("forward", **_kept(changed)).resolve().spec.plain()
+
+
+def _kept(selection: rg.Selection) -> dict[str, Any]:
+    return {"sets": selection.sets, "size": selection.size}
+
+
+def test_a_mistake_names_its_node_and_the_next_picture_is_drawn(service: RenderService) -> None:
+    service.answer(RenderRequest(FORWARD))
+    wrong = service.answer(RenderRequest(replace(FORWARD, sets=("display.exposure=bright",))))
+    assert wrong.problems[0]["node"] == "display"
+    assert not wrong.files
+    assert service.answer(RenderRequest(FORWARD)).files
+
+
+def test_a_changed_file_is_noticed_and_drawn(service: RenderService, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("extends: forward\nsize: [32, 18]\n")
+    selection = rg.Selection(str(file))
+    service.answer(RenderRequest(selection))
+    assert service.answer(ChangedFilesRequest()).facts["changed"] == []
+    file.write_text("extends: forward\nsize: [48, 18]\n")
+    assert service.answer(ChangedFilesRequest()).facts["changed"] == ["mine.yaml"]
+    assert service.answer(RenderRequest(selection)).facts["size"] == [48, 18]
+
+
+def test_a_moving_picture_is_rendered_smaller_where_that_takes_long(gl: rg.Session) -> None:
+    with closing(RenderService(gl, interactive_ms=1e9)) as service:
+        service.answer(RenderRequest(FORWARD))
+        assert service.answer(RenderRequest(FORWARD, still=False)).facts["size"] == list(SIZE)
+    with closing(RenderService(gl, interactive_ms=0.0)) as slow:
+        slow.answer(RenderRequest(FORWARD))
+        assert slow.answer(RenderRequest(FORWARD, still=False)).facts["size"] == [16, 9]
+
+
+def test_exposure_is_of_light_alone(service: RenderService, tmp_path: Path) -> None:
+    plain = picture(service.answer(RenderRequest(FORWARD, port="light.radiance")), tmp_path).astype(float)
+    brighter = picture(service.answer(RenderRequest(FORWARD, port="light.radiance", exposure=2.0)), tmp_path)
+    assert brighter.mean() > 1.3 * plain.mean()
+    image = picture(service.answer(RenderRequest(FORWARD)), tmp_path)
+    np.testing.assert_array_equal(picture(service.answer(RenderRequest(FORWARD, exposure=2.0)), tmp_path), image)
