@@ -27,7 +27,7 @@ from msgspec import ValidationError, convert, to_builtins
 
 from rendergraph.authoring.report import Report
 from rendergraph.catalog.types import SHADERS
-from rendergraph.declare.blame import cause_chain, source_location, describe_error
+from rendergraph.declare.blame import cause_chain, describe_error, source_location
 from rendergraph.errors import DeviceError, InputError, Place, Problem, RenderError, RendergraphError, shown_file
 from rendergraph.farm.worker_process import ChildProcess
 

@@ -17,7 +17,7 @@ from rendergraph.authoring.variants import NodeVariant
 from rendergraph.catalog import NodeType
 from rendergraph.compile.executable import Draw
 from rendergraph.declare import Node
-from rendergraph.declare.blame import cause_chain, declaration_of, declaration_in, source_location
+from rendergraph.declare.blame import cause_chain, declaration_in, declaration_of, source_location
 from rendergraph.errors import InputError, Place, Problem, RendergraphError, shown_file
 from rendergraph.expand import Expansion
 from rendergraph.gl.device import Device, open_device
