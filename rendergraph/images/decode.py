@@ -1,4 +1,4 @@
-"""Reading images: a scene's textures and environments, and pictures written earlier."""
+"""Reading images: textures and environments of a scene, and pictures written earlier. Mistakes are InputErrors."""
 
 from __future__ import annotations
 
@@ -38,9 +38,6 @@ def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits:
 
     Returns:
         (height, width, 4), top row first, uint8 or float16.
-
-    Raises:
-        InputError: missing, of another kind, broken, or beyond a limit.
     """
     if source.loader is not None:
         return _decode_by_plugin(source, source.loader, warn, limits)
@@ -59,9 +56,6 @@ def decode_light(
 
     Returns:
         (height, width, 4), top row first, float16.
-
-    Raises:
-        InputError: missing, of another kind, broken, or beyond a limit.
     """
     if isinstance(source, MadeImage):
         return source.make()
@@ -85,9 +79,6 @@ def read(path: Path | str) -> Pixels:
     Returns:
         (height, width, channels) in the order `R,G,B,A`, or (layers, height, width, channels) where channels are named
         `000.Y`, `001.Y` and so on.
-
-    Raises:
-        InputError: missing, of another kind, broken, or beyond a limit.
     """
     limits = SceneLimits()
     with _opened(ImageSource(Path(path)), limits) as image:
@@ -103,11 +94,7 @@ def read(path: Path | str) -> Pixels:
 
 
 def read_metadata(path: Path | str) -> dict[str, str]:
-    """Read the texts `write` put into an EXR or PNG file; empty if there are none.
-
-    Raises:
-        InputError: missing, not an image, or broken.
-    """
+    """Read the texts `write` put into an EXR or PNG file; empty if there are none."""
     with _opened(ImageSource(Path(path)), SceneLimits()) as image:
         attributes = [(entry.name, entry.value) for entry in image.spec.extra_attribs]
     return {name[len(PREFIX) :]: text for name, text in attributes if name.startswith(PREFIX) and isinstance(text, str)}

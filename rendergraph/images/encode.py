@@ -60,10 +60,6 @@ def write(
         encoding: what the values are.
         metadata: texts kept in EXR and PNG files; `read_metadata` gives them back.
         half: 16-bit floats in EXR; values beyond ±65504 become that.
-
-    Raises:
-        InputError: the format cannot store these pixels.
-        RenderError: writing failed.
     """
     write_all([(Path(path), pixels, channels, encoding, half)], metadata or {})
 

@@ -27,9 +27,6 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
 
     Yields:
         One path for each, in the same folder, to be written by the caller.
-
-    Raises:
-        RenderError: writing, flushing or renaming failed.
     """
     targets = [Path(os.path.realpath(path)) for path in paths]
     temporary = [target.with_name(f".{target.name[:100]}.{os.urandom(4).hex()}.part") for target in targets]
@@ -51,11 +48,7 @@ def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file that appears whole or not at all.
-
-    Raises:
-        RenderError: writing failed.
-    """
+    """Write a file that appears whole or not at all."""
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     with staged([path]) as (part,):
         part.write_bytes(data)

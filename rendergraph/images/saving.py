@@ -81,11 +81,6 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
 
     PNG and JPEG are made viewable. EXR and HDR hold linear light, so display colours are decoded; a tap's values are
     kept as they are.
-
-    Raises:
-        UsageError: an unknown extension.
-        InputError: a format cannot hold the texture.
-        RenderError: the disk or the folder does not take it.
     """
     jobs: list[Job] = []
     for path, pixels, info, raw in files:

@@ -1,4 +1,4 @@
-"""A scene at a moment, and what a scene lacks to be looked at: a camera that frames it, a light."""
+"""A scene at a moment, and the camera and light of a scene without them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from rendergraph.projection import unit
 from rendergraph.scene import scene_values
 from rendergraph.scene.cameras import WIDE, bounding_sphere, framing_camera
 from rendergraph.scene.environments import shipped
-from rendergraph.scene.geometry import rigid, vec3
-from rendergraph.scene.model import Camera, Light, Matrix, Scene
+from rendergraph.scene.geometry import rigid, translation, vec3
+from rendergraph.scene.model import Camera, Light, Scene
 
 KEY_LUX = 3.0
 STUDIO_FILL = 0.6
-"""Of the studio beside the key light: both at their full strength are more than a white surface can show."""
+"""Intensity of the studio beside the key light: at full strength, both together overexpose a white surface."""
 
 
 def key_light(scene: Scene, camera: Camera) -> Light:
-    """The light of a scene without one: 3 lux over the viewer's left shoulder."""
+    """Return the light of a scene without one: 3 lux over the viewer's left shoulder."""
     taken = {light.name for light in scene.lights}
     direction = unit(camera.transform[:3, :3] @ np.array([1.0, -1.0, -1.0]))
     return Light(
@@ -32,19 +32,10 @@ def key_light(scene: Scene, camera: Camera) -> Light:
 
 
 def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE) -> Scene:
-    """The scene with a camera, and with light, added where it has none; the chosen camera comes first.
+    """Return the scene with a camera and with light; the chosen camera comes first.
 
-    What has neither lights nor an environment gets a key light and the `studio`.
-
-    Call it once, before `at`: the added light stays where it is while the camera moves.
-
-    Args:
-        scene: as it was read.
-        camera_name: the camera that is asked for.
-        aspect: width over height of the picture that an added camera is for.
-
-    Raises:
-        InputError: there is no camera of that name.
+    A scene with neither lights nor an environment gets a key light and the `studio`. Call it once, before `at`: the
+    added light stays in place while the camera moves. `aspect` is width over height of the picture for an added camera.
     """
     cameras = dict(scene.cameras)
     if not cameras:
@@ -78,8 +69,7 @@ def at(scene: Scene, time_s: float) -> Scene:
         name, key = ("", rest) if section == "environment" else rest.rpartition(".")[::2]
         changed.setdefault((section, name), {})[key] = interpolated(frames, time_s)
     for (section, name), values in changed.items():
-        merged = {**scene.recipe.get((section, name), {}), **values}
-        scene = _CHANGE[section](scene, name, merged)
+        scene = _changed(scene, section, name, {**scene.recipe.get((section, name), {}), **values})
     return scene if scene.orbit is None else _orbited(scene, time_s, first if first.objects is scene.objects else scene)
 
 
@@ -93,7 +83,7 @@ def interpolated(frames: tuple[tuple[float, Any], ...], time_s: float) -> Any:
 
 
 def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
-    """The scene with its camera turned; `placed` has the same objects, and their bounds where they were asked for."""
+    """The scene with its camera turned; `placed` has the same objects, and perhaps their bounds already."""
     assert scene.orbit is not None  # the caller asked
     name = scene.orbit.camera or next(iter(scene.cameras), "")
     if name not in scene.cameras:
@@ -103,66 +93,44 @@ def _orbited(scene: Scene, time_s: float, placed: Scene) -> Scene:
     angle = math.radians(scene.orbit.degrees_per_second * time_s)
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
-    here, back = np.eye(4), np.eye(4)
-    here[:3, 3], back[:3, 3] = target, [-value for value in target]
-    return _with_camera(scene, replace(camera, transform=here @ turn @ back @ camera.transform))
+    transform = translation(target) @ turn @ translation([-value for value in target]) @ camera.transform
+    return replace(scene, cameras={**scene.cameras, camera.name: replace(camera, transform=transform)})
 
 
-def _with_camera(scene: Scene, camera: Camera) -> Scene:
-    return replace(scene, cameras={**scene.cameras, camera.name: camera})
-
-
-def _change_camera(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    return _with_camera(scene, _mended(scene, "cameras", name, scene_values.camera, values))
-
-
-def _change_light(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    light = _mended(scene, "lights", name, scene_values.light, values)
-    return replace(scene, lights=tuple(light if entry.name == name else entry for entry in scene.lights))
-
-
-def _mended(scene: Scene, section: str, name: str, make: Any, values: Mapping[str, Any]) -> Any:
+def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -> Scene:
+    """The scene with other values of one entry of a section."""
+    if section == "objects":
+        return _placed_again(scene, name, values)
+    if section == "environment":
+        turn, intensity = math.radians(values.get("rotate_degrees", 0.0)), values.get("intensity", 1.0)
+        environment = scene.environment and replace(scene.environment, intensity=intensity, rotate=turn)
+        return replace(scene, environment=environment)
     try:
-        return make(name, values)
+        if section == "cameras":
+            return replace(scene, cameras={**scene.cameras, name: scene_values.camera(name, values)})
+        if section == "lights":
+            light = scene_values.light(name, values)
+            return replace(scene, lights=tuple(light if entry.name == name else entry for entry in scene.lights))
     except ValueError as problem:  # two moving values can meet in between: eye and target, near and far
-        text = f"keyframes bring {section}.{name} to a state it cannot have: {problem}"
+        text = f"keyframes bring {section}.{name} to an impossible state: {problem}"
         raise InputError(Problem("RG323", text, Place(str(scene.source)) if scene.source else None)) from None
+    materials = list(scene.materials)
+    for number, entry in enumerate(materials):
+        if entry.name == name:
+            materials[number] = scene_values.material(name, values, entry.textures)
+    return replace(scene, materials=tuple(materials))
 
 
-def _change_material(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    materials = tuple(
-        scene_values.material(name, values, entry.textures) if entry.name == name else entry
-        for entry in scene.materials
-    )
-    return replace(scene, materials=materials)
-
-
-def _change_environment(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    if scene.environment is None:
-        return scene
-    turn = math.radians(values.get("rotate_degrees", 0.0))
-    return replace(scene, environment=replace(scene.environment, intensity=values.get("intensity", 1.0), rotate=turn))
-
-
-def _change_object(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+def _placed_again(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
+    """The scene with the parts of one object moved."""
     if name not in scene.placements:
         return scene
-    world: Matrix = scene_values.placed(values)
-    placed = scene.placements[name]
+    world, placement = scene_values.placed(values), scene.placements[name]
     objects, lights, cameras = list(scene.objects), list(scene.lights), dict(scene.cameras)
-    for index, local in placed.objects:
+    for index, local in placement.objects:
         objects[index] = replace(objects[index], transform=world @ local)
-    for index, local in placed.lights:
+    for index, local in placement.lights:
         lights[index] = scene_values.moved_light(lights[index], world @ local)
-    for word, local in placed.cameras:
-        cameras[word] = replace(cameras[word], transform=rigid(world @ local))
+    for camera, local in placement.cameras:
+        cameras[camera] = replace(cameras[camera], transform=rigid(world @ local))
     return replace(scene, objects=tuple(objects), lights=tuple(lights), cameras=cameras)
-
-
-_CHANGE = {
-    "objects": _change_object,
-    "materials": _change_material,
-    "lights": _change_light,
-    "cameras": _change_camera,
-    "environment": _change_environment,
-}

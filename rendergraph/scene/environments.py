@@ -51,9 +51,6 @@ def named(name: str, lights: Sequence[Light] = (), values: Mapping[str, Any] = {
     Args:
         name: what a scene file or the command line says.
         lights, values: as `shipped` takes them.
-
-    Raises:
-        InputError: there is none of that name.
     """
     if "." in name or "/" in name:
         return None

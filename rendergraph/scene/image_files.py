@@ -1,7 +1,7 @@
 """Image files: their format, size and channels, found by OpenImageIO before anything is decoded.
 
 Images are untrusted. Only regular files of six formats, recognised by their first bytes, are opened, and the header is
-checked against the limits. A scene needs no more; `images.decode` continues with the opened file.
+checked against the limits; mistakes are ImageErrors. `images.decode` continues with the opened file.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import re
 import stat
 import struct
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,11 +62,7 @@ class ImageFile(Struct):
         return self.spec.full_width, self.spec.full_height
 
     def read(self, channels: range, kind: str | None, limits: SceneLimits) -> Any:
-        """Pixels of these channels, as `kind` or as the file stores them.
-
-        Raises:
-            ImageError: the file is broken, or the pixels exceed a limit.
-        """
+        """Pixels of these channels, as `kind` or as the file stores them."""
         import OpenImageIO as oiio  # loaded with the first picture read
 
         texel = oiio.TypeDesc(kind) if kind else self.spec.format
@@ -79,11 +75,7 @@ class ImageFile(Struct):
         return pixels
 
     def check(self, limits: SceneLimits) -> None:
-        """Check what the header says.
-
-        Raises:
-            ImageError: it is not of its format, has no usable channels, or exceeds a limit.
-        """
+        """Check what the header says."""
         if self.handle.format_name() != _FORMATS[self.kind]:
             raise ImageError("RG351", f"is not what it claims to be; {READ}")
         if self.spec.deep:
@@ -98,39 +90,25 @@ class ImageFile(Struct):
         return max(self.spec.width, self.spec.full_width), max(self.spec.height, self.spec.full_height)
 
     def color_channels(self) -> range:
-        """The channels that are the colour, next to each other as OpenImageIO sorts them.
-
-        Raises:
-            ImageError: there are none.
-        """
+        """The channels that are the colour, next to each other as OpenImageIO sorts them."""
         names = [name.upper() for name in self.spec.channelnames]
         if self.kind != ".exr":
             return range(min(len(names), 4))
-        color = _color_names(self.spec.channelnames)
+        if "RY" in names or "BY" in names:
+            raise ImageError("RG354", "contains luminance and chroma; convert it to R, G, B")
+        color = ["R", "G", "B"] if "R" in names else ["Y"]
+        if not set(color) <= set(names):
+            listed = ", ".join(self.spec.channelnames[:8])
+            raise ImageError("RG354", f"has the channels {listed}; R, G, B (and A) or Y are needed")
+        color += ["A"] if "R" in names and "A" in names else []
         first = names.index(color[0])
-        if tuple(names[first : first + len(color)]) != color:
+        if names[first : first + len(color)] != color:
             raise ImageError("RG354", "has channels R, G, B, A that are not next to each other")
         return range(first, first + len(color))
 
 
-def _color_names(names: Sequence[str]) -> tuple[str, ...]:
-    """`R`, `G`, `B` and perhaps `A`, or `Y`."""
-    upper = [name.upper() for name in names]
-    if "RY" in upper or "BY" in upper:
-        raise ImageError("RG354", "contains luminance and chroma; convert it to R, G, B")
-    needed = ("R", "G", "B") if "R" in upper else ("Y",)
-    if not all(name in upper for name in needed):
-        text = f"has the channels {', '.join(names[:8])}; R, G, B (and A) or Y are needed"
-        raise ImageError("RG354", text)
-    return (*needed, "A") if "R" in upper and "A" in upper else needed
-
-
 def read_header(source: ImageSource, limits: SceneLimits) -> tuple[tuple[int, int], int]:
-    """Return the size of the decoded image, width and height, and the number of its channels.
-
-    Raises:
-        ImageError: it is missing, of another format, broken, or exceeds a limit.
-    """
+    """Return the size of the decoded image, width and height, and the number of its channels."""
     head, size = _first_bytes(source)
     if _kind_of(head, source) == ".jpg":  # OpenImageIO decodes a progressive one while it opens it
         width, height, channels = _jpeg_frame(source)
@@ -154,11 +132,7 @@ def _jpeg_frame(source: ImageSource) -> tuple[int, int, int]:
 
 @contextlib.contextmanager
 def open_image(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
-    """Open an image whose header is within the limits.
-
-    Raises:
-        ImageError: it is missing, of another format, broken, or exceeds a limit.
-    """
+    """Open an image whose header is within the limits."""
     head, size = _first_bytes(source)
     kind = _kind_of(head, source)
     try:
@@ -195,10 +169,7 @@ def _readable_path(source: ImageSource, kind: str) -> Iterator[str]:
 
     with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:
         other = Path(folder, f"image{kind}")
-        if source.data is not None:
-            other.write_bytes(source.data)
-        else:
-            other.symlink_to(path)
+        other.symlink_to(path) if source.data is None else other.write_bytes(source.data)
         yield str(other)
 
 

@@ -126,10 +126,10 @@ def pack(scene: Scene) -> PackedScene:
 
 
 def with_adjacency(packed: PackedScene) -> tuple[npt.NDArray[np.uint32], Records]:
-    """Indices of triangles with adjacency, six a triangle, and the `MESH` records that say where they lie.
+    """Return indices of triangles with adjacency, six for each triangle, and the `MESH` records that locate them.
 
-    Every second index is a corner, and the one behind it the vertex across the edge from there to the next corner.
-    Meshes that are not closed have none.
+    Every second index is a corner, and the next one the vertex across the edge from there to the next corner. Meshes
+    that are not closed have none.
     """
     records = packed.meshes.copy()
     parts = [np.zeros(0, np.uint32)]
@@ -145,13 +145,13 @@ def with_adjacency(packed: PackedScene) -> tuple[npt.NDArray[np.uint32], Records
 
 
 def blocks(packed: PackedScene) -> dict[str, Records | Floats]:
-    """The tables that shaders read, by the names of their blocks."""
-    found: dict[str, Records | Floats] = {
+    """Return the tables that shaders read, by the names of their blocks."""
+    tables = {
         "light_block": packed.lights,
         "material_block": packed.materials,
         "environment_block": packed.environment,
     }
-    return found | ({"material_uv_block": packed.material_uvs} if packed.material_moved.any() else {})
+    return {**tables, "material_uv_block": packed.material_uvs} if packed.material_moved.any() else {**tables}
 
 
 def update(packed: PackedScene, before: Scene, scene: Scene) -> PackedScene:

@@ -122,11 +122,7 @@ class Reading(Struct):
     # Paths and bytes --------------------------------------------------------------------------------------------------
 
     def resolve(self, name: str, *, line: int = 0, file: Path | None = None) -> Path:
-        """Resolve a name in this file to a path inside the roots; the path need not exist.
-
-        Raises:
-            InputError: it is a URL, contains a NUL, or leaves the roots.
-        """
+        """Resolve a name in this file to a path inside the roots; the path need not exist."""
         if re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name) or "\0" in name:
             text = f"'{shown(name)}' is not a file path; only local files can be loaded"
             raise self.error("RG302", text, line=line, file=file)
@@ -147,11 +143,7 @@ class Reading(Struct):
         return path if file_kind(path) == "file" else None
 
     def read(self, path: Path, what: str) -> bytes:
-        """Return the bytes of a regular file within `file_bytes`.
-
-        Raises:
-            InputError: it is missing, unreadable, not a regular file, or too large.
-        """
+        """Return the bytes of a regular file within `file_bytes`."""
         self.check_file(path, what)
         try:
             self.check_bytes(path, what)
@@ -175,11 +167,7 @@ class Reading(Struct):
     # Images -----------------------------------------------------------------------------------------------------------
 
     def image(self, path: Path, what: str, *, line: int = 0) -> ImageSource:
-        """Return an image file whose header is valid; a file is opened once.
-
-        Raises:
-            InputError: it is missing, not an image, or exceeds a limit.
-        """
+        """Return an image file whose header is valid; a file is opened once."""
         if path not in self._images:
             record_read(path)
             source = ImageSource(path, None, shown(path.name))
@@ -195,11 +183,7 @@ class Reading(Struct):
         return self._images[path]
 
     def embedded_image(self, data: bytes, what: str) -> ImageSource:
-        """Return an image inside this file whose header is valid.
-
-        Raises:
-            InputError: it is not an image, or exceeds a limit.
-        """
+        """Return an image inside this file whose header is valid."""
         return self._checked(ImageSource(self.path, data, f"{what} in {shown(self.path.name)}"), what, 0)
 
     def _checked(self, source: ImageSource, what: str, line: int) -> ImageSource:

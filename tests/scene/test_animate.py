@@ -75,7 +75,7 @@ def test_orbit_turns_counter_clockwise_about_the_target(tmp_path: Path) -> None:
 def test_an_impossible_moment_is_an_error(tmp_path: Path) -> None:
     scene = read(tmp_path, "cameras: {m: {}}\nkeyframes: {cameras.m.eye: {0: [0, 0, 1], 2: [0, 0, -1]}}\n")
     animate.at(scene, 0.5)
-    with pytest.raises(InputError, match=r"RG323 keyframes bring cameras\.m to a state"):
+    with pytest.raises(InputError, match=r"RG323 keyframes bring cameras\.m to an impossible state"):
         animate.at(scene, 1.0)
 
 

@@ -134,15 +134,8 @@ class _Reader:
         if light.type == "spot" and not 0 <= inner < outer <= math.pi / 2 + 1e-6:
             raise self._error(f"{where} needs 0 <= innerConeAngle < outerConeAngle <= pi/2")
         r, g, b = (max(0.0, value) for value in light.color)
-        return Light(
-            light.name,
-            light.type,
-            color=(r, g, b),
-            intensity=light.intensity,
-            range=light.range,
-            inner=inner,
-            outer=outer,
-        )
+        result = Light(light.name, light.type, color=(r, g, b), intensity=light.intensity, range=light.range)
+        return replace(result, inner=inner, outer=outer)
 
     def _node(self, node: schema.Node, number: int, names: UniqueNames) -> _Node:
         where, light = f"nodes[{number}]", node.extensions.light.light
@@ -212,7 +205,11 @@ class _Reader:
     def scene(self) -> Scene:
         """Build the default scene with world transforms."""
         roots = self._roots()
-        count = sum(self._object_count(node) for node in self._nodes)
+        count = sum(
+            len(self._meshes[node.json.mesh]) * (1 if node.instances is None else len(node.instances))
+            for node in self._nodes
+            if node.json.mesh >= 0
+        )
         if count > self._reading.limits.objects:
             raise self._reading.over(f"its nodes place {count:,} objects", "objects")
         objects: list[Object] = []
@@ -236,7 +233,9 @@ class _Reader:
             if node.json.mesh >= 0:
                 self._place(node, world, objects, names, materials)
             if (light := node.json.extensions.light.light) >= 0:
-                lights.append(_placed_light(self._lights[light], node.name, world))
+                axis, position = unit(-world[:3, 2]), vec3(world[:3, 3])
+                direction = vec3(axis) if axis.any() else (0.0, 0.0, -1.0)
+                lights.append(replace(self._lights[light], name=node.name, position=position, direction=direction))
             if node.json.camera >= 0:
                 camera = self._cameras[node.json.camera]
                 cameras[node.name] = replace(camera, name=node.name, transform=rigid(world))
@@ -249,11 +248,6 @@ class _Reader:
             tuple(lights),
             cameras,
         )
-
-    def _object_count(self, node: _Node) -> int:
-        if node.json.mesh < 0:
-            return 0
-        return len(self._meshes[node.json.mesh]) * (1 if node.instances is None else len(node.instances))
 
     def _place(
         self, node: _Node, world: Matrix, objects: list[Object], names: UniqueNames, materials: list[Material]
@@ -307,10 +301,3 @@ class _Reader:
                     break
                 at = parent[at]
             rooted.update(trail)
-
-
-def _placed_light(light: Light, name: str, world: Matrix) -> Light:
-    direction = unit(-world[:3, 2])
-    if not direction.any():
-        direction = np.array([0.0, 0.0, -1.0])
-    return replace(light, name=name, position=vec3(world[:3, 3]), direction=vec3(direction))

@@ -45,15 +45,13 @@ class BufferView(_Struct, frozen=True):
     byte_stride: Annotated[int, Meta(ge=4, le=252, multiple_of=4)] = 0
 
 
-class SparseIndices(_Struct, frozen=True):
-    buffer_view: Index
-    component_type: Literal[5121, 5123, 5125]
-    byte_offset: Index = 0
-
-
 class SparseValues(_Struct, frozen=True):
     buffer_view: Index
     byte_offset: Index = 0
+
+
+class SparseIndices(SparseValues, frozen=True, kw_only=True):
+    component_type: Literal[5121, 5123, 5125]
 
 
 class Sparse(_Struct, frozen=True):
@@ -119,11 +117,10 @@ class MetallicRoughness(_Struct, frozen=True):
     metallic_roughness_texture: TextureInfo | None = None
 
 
-class EmissiveStrength(_Struct, frozen=True):
+class MaterialFactor(_Struct, frozen=True):
+    """Either of the extensions that have a single number."""
+
     emissive_strength: float = 1.0
-
-
-class Ior(_Struct, frozen=True):
     ior: float = 1.5
 
 
@@ -142,8 +139,8 @@ class Anisotropy(_Struct, frozen=True):
 
 class MaterialExtensions(_Struct, frozen=True):
     unlit: dict[str, Any] | None = field(name="KHR_materials_unlit", default=None)
-    emissive: EmissiveStrength = field(name="KHR_materials_emissive_strength", default=EmissiveStrength())
-    ior: Ior = field(name="KHR_materials_ior", default=Ior())
+    emissive: MaterialFactor = field(name="KHR_materials_emissive_strength", default=MaterialFactor())
+    ior: MaterialFactor = field(name="KHR_materials_ior", default=MaterialFactor())
     specular: Specular = field(name="KHR_materials_specular", default=Specular())
     anisotropy: Anisotropy = field(name="KHR_materials_anisotropy", default=Anisotropy())
 
@@ -267,11 +264,7 @@ class Gltf(_Struct, frozen=True):
 
 
 def decode(text: bytes, reading: Reading) -> Gltf:
-    """Decode and check the JSON of a file. It may have no duplicate keys, NaN or numbers beyond double precision.
-
-    Raises:
-        InputError: it is not JSON, or does not follow the schema.
-    """
+    """Decode and check the JSON of a file. It may have no duplicate keys, NaN or numbers beyond double precision."""
     try:
         value = json.loads(
             text.decode("utf-8"), object_pairs_hook=_unique, parse_float=_finite, parse_constant=_constant

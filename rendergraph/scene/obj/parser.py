@@ -84,11 +84,7 @@ class _Parsed(Struct):
 
 
 def parse(data: bytes, reading: Reading, block_bytes: int = _BLOCK_BYTES) -> Statements:
-    """Parse a whole file.
-
-    Raises:
-        InputError: a statement is malformed, a number not finite, or a limit exceeded.
-    """
+    """Parse a whole file."""
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     if b"\0" in data[:4096]:
