@@ -28,8 +28,8 @@ from rendergraph.projection import shifted
 from rendergraph.scene.facts import FrameScene
 from rendergraph.scene.model import Scene
 from rendergraph.steps import Step, ViewMatrices
-from rendergraph.steps.checks import argument, own_port
 from rendergraph.steps.checks import buffer as buffer_of
+from rendergraph.steps.checks import check_argument, declared_port
 from rendergraph.steps.state import DepthBounds
 from rendergraph.textures import BufferDesc
 from rendergraph.typecheck import Range
@@ -75,17 +75,17 @@ class FrameContext(Struct, eq=False):
 
     def connected(self, port: Port) -> bool:
         """Whether anything is linked to an input."""
-        return bool(self.node.inputs.get(own_port(self.node.node.ports(), port, "connected's argument").name))
+        return bool(self.node.inputs.get(declared_port(self.node.node.ports(), port, "connected's argument").name))
 
     def views(self, port: Port) -> Sequence[ViewMatrices]:
         """The views that what is linked to an input was drawn with."""
-        links = self.node.inputs.get(own_port(self.node.node.ports(), port, "views' argument").name, ())
+        links = self.node.inputs.get(declared_port(self.node.node.ports(), port, "views' argument").name, ())
         tables = [self.graph.textures[end.now].view or CAMERA for end in links]
         return [view for table in tables for view in self.executable.views.current[table]]
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
-        if not isinstance(own_port(self.node.node.ports(), port, "set_views"), Views):
+        if not isinstance(declared_port(self.node.node.ports(), port, "set_views"), Views):
             raise Misuse(f"set_views is given '{port.name}', which is no Views port", "RG433")
         for view in views:
             if not isinstance(view, ViewMatrices):
@@ -104,14 +104,14 @@ class FrameContext(Struct, eq=False):
             ("scissor", scissor, Optional[_Scissor]),  # noqa: UP045  # pyright knows no `|` of Annotated
             ("depth_bounds", depth_bounds, Optional[DepthBounds]),  # noqa: UP045  # nor of this
         ):
-            argument(name, value, annotation)
+            check_argument(name, value, annotation)
         region = self.executable.memory.regions.get((self.node.id, number))
         if region is not None:  # else nobody reads what its steps make
             region.set(scissor, depth_bounds)
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload into a declared buffer."""
-        buffer_of(own_port(self.node.node.ports(), port, "write"), "write")
+        buffer_of(declared_port(self.node.node.ports(), port, "write"), "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline
@@ -304,7 +304,7 @@ class Runner(Struct, eq=False):
             return camera
         with _blamed(node, "camera_jitter"):
             moved = node.node.camera_jitter(self.drawn)
-            argument("what camera_jitter returns", moved, _Offset)
+            check_argument("what camera_jitter returns", moved, _Offset)
         x, y = (value / side for value, side in zip(moved, camera.size, strict=True))
         return replace(camera, projection=shifted(camera.projection, 2 * x, 2 * y), jitter=(x, y))
 

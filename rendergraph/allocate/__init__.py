@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from rendergraph.allocate.heap import Item, share_blocks
+from rendergraph.allocate.heap import HeapItem, share_blocks
 from rendergraph.schedule import Schedule, step_names
 from rendergraph.schedule.dependencies import touched_ids
 from rendergraph.schedule.model import storage_class
@@ -266,7 +266,7 @@ def _blocks(
 ) -> Groups:
     """Return textures in blocks of memory, and buffers unchanged."""
     textures = [id for id in ids if not isinstance(classes[id], BufferDesc)]
-    items = tuple([Item(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])
+    items = tuple([HeapItem(sizes[id], lifetimes[id].first, lifetimes[id].last, classes[id]) for id in textures])
     buffers = [group for group in by_desc if isinstance(classes[group[0]], BufferDesc)]
     blocks = [[textures[number] for number in block] for block in share_blocks(items)]
     order = {id: place for place, id in enumerate(ids)}

@@ -17,7 +17,7 @@ WORK = 10_000
 RESTARTS = 100
 
 
-class Item(Struct, frozen=True, gc=False):
+class HeapItem(Struct, frozen=True, gc=False):
     """A texture to place: bytes, first and last position in the schedule, and its kind."""
 
     bytes: int
@@ -27,7 +27,7 @@ class Item(Struct, frozen=True, gc=False):
 
 
 @lru_cache(64)  # most changes of a pipeline leave what is placed what it was
-def share_blocks(items: tuple[Item, ...], *, seed: int = 0) -> tuple[tuple[int, ...], ...]:
+def share_blocks(items: tuple[HeapItem, ...], *, seed: int = 0) -> tuple[tuple[int, ...], ...]:
     """Return the numbers of the items in each block, in time order, so that the blocks have few bytes.
 
     Largest first, each where the block grows least; of equal blocks one with its kind, then the tightest. Then seeded
@@ -51,7 +51,7 @@ def share_blocks(items: tuple[Item, ...], *, seed: int = 0) -> tuple[tuple[int, 
     return tuple([tuple(sorted(block, key=lambda n: items[n].first)) for block in best])
 
 
-def least_bytes(items: Sequence[Item]) -> int:
+def least_bytes(items: Sequence[HeapItem]) -> int:
     """Return bytes that no blocks are below: the n-th largest block holds the n-th largest item of every moment."""
     most = [0] * len(items)
     ordered = sorted([(item.bytes, item.first, item.last) for item in items], reverse=True)
@@ -61,7 +61,7 @@ def least_bytes(items: Sequence[Item]) -> int:
     return sum(most)
 
 
-def _placed(items: Sequence[Item], alive: Sequence[int], order: Sequence[int]) -> tuple[list[list[int]], int]:
+def _placed(items: Sequence[HeapItem], alive: Sequence[int], order: Sequence[int]) -> tuple[list[list[int]], int]:
     """Return the blocks of items placed in that order, and their bytes."""
     blocks: list[list[int]] = []
     sizes: list[int] = []

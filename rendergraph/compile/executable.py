@@ -18,7 +18,7 @@ from rendergraph.compile.reuse import Reuse
 from rendergraph.expand import CAMERA
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
-from rendergraph.program import looked_at, prefix
+from rendergraph.program import prefix, used_blocks
 from rendergraph.schedule.dependencies import StepKey, touched_ids
 from rendergraph.steps import Read, Step
 
@@ -283,7 +283,9 @@ class Executable(Struct, eq=False, dict=True):
         resources, found = self.plan.resources, []
         for compiled in self.steps[0]:
             step = compiled.step
-            blocks = {b for draw in compiled.all_draws for text in draw.program.texts.values() for b in looked_at(text)}
+            blocks = {
+                b for draw in compiled.all_draws for text in draw.program.texts.values() for b in used_blocks(text)
+            }
             views = {"camera_block": source_of_view(CAMERA)}
             if step.view is not None:
                 views["pass_view_block"] = source_of_view(step.view)

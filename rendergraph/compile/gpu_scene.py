@@ -260,10 +260,7 @@ class GpuScene(Struct, eq=False, dict=True):
             format_name = "rgba32f" if pixels.dtype == np.float32 else "rgba16f"
         desc = TextureDesc("texture2d", format_name, width, height, mips=full_mip_count(width, height))
         made = textures.create(self.device, desc, "a material texture")
-        if format_name == "srgb8_a8":
-            textures.upload_bytes(self.device, made, pixels)
-        else:
-            textures.upload(self.device, made, pixels)
+        textures.upload(self.device, made, pixels)
         if pixels.dtype == np.uint8:
             self.device.raw.glGenerateTextureMipmap(made.glo)
         else:

@@ -15,7 +15,7 @@ from rendergraph.allocate import Physical, ResourcePlan
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl import textures
 from rendergraph.gl.device import Device
-from rendergraph.gl.memory_objects import Block, make_blocks
+from rendergraph.gl.memory_objects import MemoryBlock, make_blocks
 from rendergraph.gl.raw import RawGL
 from rendergraph.gl.textures import GpuTexture, texel
 from rendergraph.steps import Read, Write
@@ -118,7 +118,7 @@ class Memory(Struct, eq=False, dict=True):
     plan: ResourcePlan
     environment: Callable[[], GpuTexture]
     pool: TexturePool
-    physicals: list[GpuTexture | moderngl.Buffer | Block] = field(default_factory=list)
+    physicals: list[GpuTexture | moderngl.Buffer | MemoryBlock] = field(default_factory=list)
     regions: dict[tuple[str, int], Region] = field(default_factory=dict)
     _views: dict[tuple[object, ...], GpuTexture] = field(default_factory=dict)
     _samplers: dict[Sampler, int] = field(default_factory=dict)
@@ -173,7 +173,7 @@ class Memory(Struct, eq=False, dict=True):
         place = places[(parity + previous) % 2] if len(places) == 2 else places[0]
         base = self.physicals[place]
         desc = self._desc(resource)
-        if isinstance(base, Block):
+        if isinstance(base, MemoryBlock):
             return base.textures[desc]
         assert isinstance(base, GpuTexture), f"{resource} is a buffer"
         if desc.format == base.desc.format:

@@ -27,7 +27,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 _DEVICE_UUID, _HANDLE_TYPE_OPAQUE_FD = 0x9597, 0x9586
 
 
-class Block(Struct, eq=False):
+class MemoryBlock(Struct, eq=False):
     """A memory object with its textures, by description."""
 
     device: Device
@@ -41,13 +41,13 @@ class Block(Struct, eq=False):
         self.device.raw.delete("glDeleteMemoryObjectsEXT", self.glo)
 
 
-def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list[Block]:
+def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list[MemoryBlock]:
     """Return a block for each list of descriptions, as large as its largest texture is on this device.
 
     Raises:
         RenderError: the driver has no memory objects, there is no Vulkan for the device, or too little memory.
     """
-    blocks: list[Block] = []
+    blocks: list[MemoryBlock] = []
     if not groups:
         return blocks
     try:
@@ -68,12 +68,12 @@ def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list
     return blocks
 
 
-def _block(device: Device, vulkan: Vulkan, descs: Sequence[TextureDesc]) -> Block:
+def _block(device: Device, vulkan: Vulkan, descs: Sequence[TextureDesc]) -> MemoryBlock:
     sizes, masks = zip(*map(vulkan.requirements, descs), strict=True)
     types = reduce(and_, masks)
     if not types:
         raise NoMemoryObjects("no memory type fits all textures of a block")
-    block = Block(device, device.raw.make("glCreateMemoryObjectsEXT"))
+    block = MemoryBlock(device, device.raw.make("glCreateMemoryObjectsEXT"))
     try:  # the driver owns the descriptor from then on
         device.raw.glImportMemoryFdEXT(block.glo, max(sizes), _HANDLE_TYPE_OPAQUE_FD, vulkan.export(max(sizes), types))
         for desc in dict.fromkeys(descs):

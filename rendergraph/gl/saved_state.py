@@ -55,7 +55,7 @@ _INDEXED = ((0x0BE2, _DRAW_BUFFERS), (0x0C11, _VIEWPORTS))
 """Capabilities of each draw buffer or viewport, set by steps and framebuffers: BLEND, SCISSOR_TEST."""
 
 
-class Setting(Struct, frozen=True):
+class StateCall(Struct, frozen=True):
     """A raw function that sets state, and how its arguments are queried.
 
     Attributes:
@@ -78,39 +78,39 @@ def _each(*parameters: int) -> tuple[tuple[int, int], ...]:
     return tuple((parameter, 1) for parameter in parameters)
 
 
-def _pixel_store(*parameters: int, needed: int = 0) -> list[Setting]:
-    return [Setting("glPixelStorei", _each(p), (p,), needed=(needed,)) for p in parameters]
+def _pixel_store(*parameters: int, needed: int = 0) -> list[StateCall]:
+    return [StateCall("glPixelStorei", _each(p), (p,), needed=(needed,)) for p in parameters]
 
 
-def _buffer(target: int, binding: int, needed: tuple[float, ...] | None = None) -> Setting:
-    return Setting("glBindBuffer", _each(binding), (target,), needed=needed)
+def _buffer(target: int, binding: int, needed: tuple[float, ...] | None = None) -> StateCall:
+    return StateCall("glBindBuffer", _each(binding), (target,), needed=needed)
 
 
-SETTINGS: tuple[Setting, ...] = (
+STATE_CALLS: tuple[StateCall, ...] = (
     # fixed function
-    Setting("glClipControl", _each(0x935C, 0x935D), needed=(0x8CA1, 0x935F)),  # LOWER_LEFT, ZERO_TO_ONE
-    Setting("glProvokingVertex", _each(0x8E4F), needed=(0x8E4E,)),  # LAST_VERTEX_CONVENTION
-    Setting("glPointParameteri", _each(0x8CA0), (0x8CA0,), needed=(0x8CA2,)),  # SPRITE_COORD_ORIGIN, UPPER_LEFT
-    Setting("glHint", _each(0x8B8B), (0x8B8B,), needed=(0x1100,)),  # FRAGMENT_SHADER_DERIVATIVE_HINT, DONT_CARE
-    Setting("glLineWidth", _each(0x0B21), kind="f", needed=(1.0,)),
-    Setting("glDepthRangeIndexed", ((0x0B70, 2),), kind="f", count=_VIEWPORTS, needed=(0.0, 1.0)),
-    Setting("glViewportIndexedf", ((0x0BA2, 4),), kind="f", count=_VIEWPORTS),
-    Setting("glScissorIndexed", ((0x0C10, 4),), count=_VIEWPORTS),
-    Setting("glDepthFunc", _each(0x0B74)),
-    Setting("glDepthMask", _each(0x0B72)),
-    Setting("glColorMaski", ((0x0C23, 4),), count=_DRAW_BUFFERS),
-    Setting("glBlendFuncSeparatei", _each(0x80C9, 0x80C8, 0x80CB, 0x80CA), count=_DRAW_BUFFERS),
-    Setting("glBlendEquationSeparatei", _each(0x8009, 0x883D), count=_DRAW_BUFFERS),
-    Setting("glCullFace", _each(0x0B45)),
-    Setting("glFrontFace", _each(0x0B46)),
-    Setting("glPolygonMode", _each(0x0B40), (0x0408,)),
-    Setting("glPolygonOffset", _each(0x8038, 0x2A00), kind="f"),
-    Setting("glStencilFuncSeparate", _each(0x0B92, 0x0B97, 0x0B93), (_FRONT,)),
-    Setting("glStencilFuncSeparate", _each(0x8800, 0x8CA3, 0x8CA4), (_BACK,)),
-    Setting("glStencilOpSeparate", _each(0x0B94, 0x0B95, 0x0B96), (_FRONT,)),
-    Setting("glStencilOpSeparate", _each(0x8801, 0x8802, 0x8803), (_BACK,)),
-    Setting("glStencilMaskSeparate", _each(0x0B98), (_FRONT,)),
-    Setting("glStencilMaskSeparate", _each(0x8CA5), (_BACK,)),
+    StateCall("glClipControl", _each(0x935C, 0x935D), needed=(0x8CA1, 0x935F)),  # LOWER_LEFT, ZERO_TO_ONE
+    StateCall("glProvokingVertex", _each(0x8E4F), needed=(0x8E4E,)),  # LAST_VERTEX_CONVENTION
+    StateCall("glPointParameteri", _each(0x8CA0), (0x8CA0,), needed=(0x8CA2,)),  # SPRITE_COORD_ORIGIN, UPPER_LEFT
+    StateCall("glHint", _each(0x8B8B), (0x8B8B,), needed=(0x1100,)),  # FRAGMENT_SHADER_DERIVATIVE_HINT, DONT_CARE
+    StateCall("glLineWidth", _each(0x0B21), kind="f", needed=(1.0,)),
+    StateCall("glDepthRangeIndexed", ((0x0B70, 2),), kind="f", count=_VIEWPORTS, needed=(0.0, 1.0)),
+    StateCall("glViewportIndexedf", ((0x0BA2, 4),), kind="f", count=_VIEWPORTS),
+    StateCall("glScissorIndexed", ((0x0C10, 4),), count=_VIEWPORTS),
+    StateCall("glDepthFunc", _each(0x0B74)),
+    StateCall("glDepthMask", _each(0x0B72)),
+    StateCall("glColorMaski", ((0x0C23, 4),), count=_DRAW_BUFFERS),
+    StateCall("glBlendFuncSeparatei", _each(0x80C9, 0x80C8, 0x80CB, 0x80CA), count=_DRAW_BUFFERS),
+    StateCall("glBlendEquationSeparatei", _each(0x8009, 0x883D), count=_DRAW_BUFFERS),
+    StateCall("glCullFace", _each(0x0B45)),
+    StateCall("glFrontFace", _each(0x0B46)),
+    StateCall("glPolygonMode", _each(0x0B40), (0x0408,)),
+    StateCall("glPolygonOffset", _each(0x8038, 0x2A00), kind="f"),
+    StateCall("glStencilFuncSeparate", _each(0x0B92, 0x0B97, 0x0B93), (_FRONT,)),
+    StateCall("glStencilFuncSeparate", _each(0x8800, 0x8CA3, 0x8CA4), (_BACK,)),
+    StateCall("glStencilOpSeparate", _each(0x0B94, 0x0B95, 0x0B96), (_FRONT,)),
+    StateCall("glStencilOpSeparate", _each(0x8801, 0x8802, 0x8803), (_BACK,)),
+    StateCall("glStencilMaskSeparate", _each(0x0B98), (_FRONT,)),
+    StateCall("glStencilMaskSeparate", _each(0x8CA5), (_BACK,)),
     # how texels travel: bytes swapped, first bit, row length, rows, texels, images skipped, image height; alignment
     *_pixel_store(0x0CF0, 0x0CF1, 0x0CF2, 0x0CF3, 0x0CF4, 0x806D, 0x806E),
     *_pixel_store(0x0D00, 0x0D01, 0x0D02, 0x0D03, 0x0D04, 0x806B, 0x806C),
@@ -126,12 +126,12 @@ SETTINGS: tuple[Setting, ...] = (
     _buffer(0x88EB, 0x88ED, (0,)),  # PIXEL_PACK
     _buffer(0x88EC, 0x88EF, (0,)),  # PIXEL_UNPACK
     _buffer(0x9192, 0x9193, (0,)),  # QUERY
-    Setting("glBindRenderbuffer", _each(0x8CA7), (0x8D41,)),
-    Setting("glBindFramebuffer", _each(0x8CAA), (0x8CA8,)),  # READ
-    Setting("glBindFramebuffer", _each(0x8CA6), (0x8CA9,)),  # DRAW
-    Setting("glBindVertexArray", _each(0x85B5)),
-    Setting("glUseProgram", _each(0x8B8D)),
-    Setting("glBindTransformFeedback", _each(0x8E25), (_FEEDBACK,), needed=(0,)),
+    StateCall("glBindRenderbuffer", _each(0x8CA7), (0x8D41,)),
+    StateCall("glBindFramebuffer", _each(0x8CAA), (0x8CA8,)),  # READ
+    StateCall("glBindFramebuffer", _each(0x8CA6), (0x8CA9,)),  # DRAW
+    StateCall("glBindVertexArray", _each(0x85B5)),
+    StateCall("glUseProgram", _each(0x8B8D)),
+    StateCall("glBindTransformFeedback", _each(0x8E25), (_FEEDBACK,), needed=(0,)),
 )
 
 _BLOCKS = (
@@ -158,7 +158,7 @@ def settle(raw: RawGL) -> None:
     """Set the state that frames need and no step sets."""
     for capability, on in NEEDED.items():
         (raw.glEnable if on else raw.glDisable)(capability)
-    for setting in SETTINGS:
+    for setting in STATE_CALLS:
         if setting.needed is None:
             continue
         call = getattr(raw, setting.call)
@@ -198,7 +198,7 @@ class SavedState:
         self.blocks = list(_blocks(raw))
         self.settings = [
             (getattr(raw, setting.call), (*setting.first, *index, *_values(raw, setting, index)))
-            for setting in SETTINGS
+            for setting in STATE_CALLS
             for index in _indices(raw, setting)
         ]
 
@@ -230,11 +230,11 @@ class SavedState:
             raw.glResumeTransformFeedback()
 
 
-def _indices(raw: RawGL, setting: Setting) -> list[tuple[int, ...]]:
+def _indices(raw: RawGL, setting: StateCall) -> list[tuple[int, ...]]:
     return [(index,) for index in range(raw.integer(setting.count))] if setting.count else [()]
 
 
-def _values(raw: RawGL, setting: Setting, index: tuple[int, ...]) -> Iterator[float]:
+def _values(raw: RawGL, setting: StateCall, index: tuple[int, ...]) -> Iterator[float]:
     name, ctype = _READERS[setting.kind, bool(index)]
     found = (ctype * 4)()
     for parameter, count in setting.queries:

@@ -229,14 +229,6 @@ def upload(device: Device, texture: GpuTexture, texels: npt.NDArray[Any], *, mip
         )
 
 
-def upload_bytes(device: Device, texture: GpuTexture, texels: npt.NDArray[np.uint8]) -> None:
-    """Write (height, width, 4) bytes into mip 0 unchanged, so sRGB-encoded for an sRGB format."""
-    data = np.ascontiguousarray(texels)
-    height, width = data.shape[:2]
-    device.raw.glPixelStorei(0x0CF5, 1)
-    device.raw.glTextureSubImage2D(texture.glo, 0, 0, 0, width, height, 0x1908, _UBYTE, data.ctypes.data)
-
-
 def texel(value: float | tuple[float, ...], channels: int, dtype: Any) -> npt.NDArray[Any]:
     """Return a clear value for the channels of a format: one number fills them all, missing ones are 0."""
     values = np.zeros(channels, np.float64)

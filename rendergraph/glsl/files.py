@@ -65,7 +65,7 @@ class Directive(Struct, frozen=True, gc=False):
         return cls(number, text, "needs", needs[1]) if needs else None
 
 
-class Run(Struct, frozen=True, gc=False):
+class LineRun(Struct, frozen=True, gc=False):
     """Consecutive lines for the driver, and the directive after them.
 
     Attributes:
@@ -142,17 +142,17 @@ def about(file: Path) -> str:
     return " ".join(" ".join(line.removeprefix("//") for line in opening).split())
 
 
-def runs(file: Path) -> tuple[str, tuple[Run, ...]]:
+def runs(file: Path) -> tuple[str, tuple[LineRun, ...]]:
     """Return a file's text, and its lines without comments and trailing blanks."""
     record_read(file)
     return _runs(file, stamp(file))
 
 
 @lru_cache(maxsize=256)
-def _runs(file: Path, stamp: Stamp) -> tuple[str, tuple[Run, ...]]:
+def _runs(file: Path, stamp: Stamp) -> tuple[str, tuple[LineRun, ...]]:
     raw = read_text(file)
     lines = tuple(line.rstrip() for line in strip_comments(raw).split("\n"))
-    found: list[Run] = []
+    found: list[LineRun] = []
     begin = nests = 0
     for number, line in enumerate(lines):
         directive = _DIRECTIVE.match(line) if "#" in line else None
@@ -160,9 +160,9 @@ def _runs(file: Path, stamp: Stamp) -> tuple[str, tuple[Run, ...]]:
             nests += _NESTS.get(directive[1], 0)
             end = Directive.of(number + 1, line, directive[1], directive[2])
             if end is not None:
-                found.append(Run(begin + 1, lines[begin:number], _size(lines[begin:number]), nests, end))
+                found.append(LineRun(begin + 1, lines[begin:number], _size(lines[begin:number]), nests, end))
                 begin, nests = number + 1, 0
-    found.append(Run(begin + 1, lines[begin:], _size(lines[begin:]), nests, None))
+    found.append(LineRun(begin + 1, lines[begin:], _size(lines[begin:]), nests, None))
     return raw, tuple(found)
 
 

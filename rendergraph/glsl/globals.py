@@ -17,7 +17,7 @@ from rendergraph.glsl.names import TOKEN, Storage, declarators, head, statements
 _MACRO = re.compile(r"^[ \t]*#[ \t]*define[ \t]+([A-Za-z_]\w*)[ \t]+(\d{1,9})[ \t]*$", re.MULTILINE)
 
 
-class Word(str):
+class Token(str):
     """A token with its position."""
 
     __slots__ = ("at",)
@@ -99,14 +99,14 @@ def globals_of(text: str) -> Globals:
 def _words(text: str) -> list[str]:
     found: list[str] = []
     for match in TOKEN.finditer(text):
-        word = Word(match.group())
+        word = Token(match.group())
         word.at = match.start()
         found.append(word)
     return found
 
 
 def _at(word: str) -> int:
-    return word.at if isinstance(word, Word) else 0
+    return word.at if isinstance(word, Token) else 0
 
 
 # --- literals ---------------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.glsl.files import MAX_BYTES, Links, Run, runs
+from rendergraph.glsl.files import MAX_BYTES, LineRun, Links, runs
 from rendergraph.stamps import record_read
 
 MAX_DEPTH = 32
@@ -48,7 +48,7 @@ class Origin(Struct, frozen=True):
         return Place(shown_file(self.file), self.line, max(1, column - self.column))
 
 
-class Block(Struct, frozen=True, gc=False):
+class SourceBlock(Struct, frozen=True, gc=False):
     """Consecutive lines of a file, comments blanked out, or generated lines; `origin` is that of the first."""
 
     lines: tuple[str, ...]
@@ -65,11 +65,11 @@ class Block(Struct, frozen=True, gc=False):
 class SourceText(Struct, frozen=True, dict=True):
     """GLSL in which every line has an origin, computed only when something is wrong."""
 
-    blocks: tuple[Block, ...] = ()
+    blocks: tuple[SourceBlock, ...] = ()
 
     @classmethod
     def of(cls, rows: Iterable[tuple[str, Origin]]) -> SourceText:
-        return cls(tuple(Block((line,), origin) for line, origin in rows))
+        return cls(tuple(SourceBlock((line,), origin) for line, origin in rows))
 
     @cached_property
     def lines(self) -> tuple[str, ...]:
@@ -93,7 +93,7 @@ class SourceText(Struct, frozen=True, dict=True):
 
 def generated(lines: Iterable[str], made: str = "") -> SourceText:
     """Return lines of no file; `made` is their purpose."""
-    return SourceText((Block(tuple(lines), Origin(made=made)),))
+    return SourceText((SourceBlock(tuple(lines), Origin(made=made)),))
 
 
 _PARAMETER = re.compile(r"<([A-Z][A-Z0-9_]*)>\Z")
@@ -149,7 +149,7 @@ class Includes:
             inherited: more folders for includes in quotes that are not beside the file, each a root.
         """
         root = Path(self._links.of(root or source.parent))
-        self._blocks: list[Block] = []
+        self._blocks: list[SourceBlock] = []
         self._conditions = 0  # open `#if`
         self._certain.add((self._links.of(source), prefix))
         self._plugged = dict(plugged or {})
@@ -169,14 +169,14 @@ class Includes:
                 return
             origin = replace(base, file=file, line=line.number)
             if line.word == "needs" or (line.is_version and self._versions and len(stack) == 1):
-                self._blocks.append(Block(("",), origin))
+                self._blocks.append(SourceBlock(("",), origin))
                 continue
             if line.word != "include":
                 text = f"'#{line.word}' is written by rendergraph; remove the line"
                 raise _error("RG404", text, origin, raw)
             parameter = _PARAMETER.match(line.rest)
             if parameter is not None and parameter[1] not in self._plugged:
-                self._blocks.append(Block(("",), origin))
+                self._blocks.append(SourceBlock(("",), origin))
                 continue
             if parameter is not None:
                 target, shared, home = self._plugged[parameter[1]], True, self._plugged[parameter[1]].parent
@@ -190,7 +190,7 @@ class Includes:
             inner = replace(base, shared=shared, prefix="" if shared else base.prefix, by=origin)
             self._include(target, home, inner, stack)
 
-    def _add(self, run: Run, first: Origin, raw: str) -> None:
+    def _add(self, run: LineRun, first: Origin, raw: str) -> None:
         if self.bytes + run.bytes > MAX_BYTES:
             sizes = accumulate(len(line) + 1 for line in run.lines)
             beyond = sum(self.bytes + size <= MAX_BYTES for size in sizes)
@@ -198,7 +198,7 @@ class Includes:
             raise _error("RG403", text, replace(first, line=first.line + beyond), raw)
         self.bytes += run.bytes
         if run.lines:
-            self._blocks.append(Block(run.lines, first))
+            self._blocks.append(SourceBlock(run.lines, first))
 
     def _include(self, file: Path, root: Path, base: Origin, stack: list[str]) -> None:
         key = (self._links.of(file), base.prefix)
@@ -213,11 +213,11 @@ class Includes:
         if guard is None:
             self._file(file, root, base, stack)
             return
-        self._blocks.append(Block((f"#ifndef {guard}", f"#define {guard}"), Origin(shared=True)))
+        self._blocks.append(SourceBlock((f"#ifndef {guard}", f"#define {guard}"), Origin(shared=True)))
         self._conditions += 1
         self._file(file, root, base, stack)
         self._conditions -= 1
-        self._blocks.append(Block(("#endif",), Origin(shared=True)))
+        self._blocks.append(SourceBlock(("#endif",), Origin(shared=True)))
 
     def _find(
         self, written: str, file: Path, root: Path, origin: Origin, raw: str, in_shared: bool

@@ -14,7 +14,7 @@ knows; the same for other functions, by their name.
 
 from __future__ import annotations
 
-from rendergraph.program.checks import Texts, check_kept_text, check_texts, looked_at, named_reads, unfit_sampler
+from rendergraph.program.checks import Texts, check_kept_text, check_texts, named_reads, unfit_sampler, used_blocks
 from rendergraph.program.macros import positions_macro
 from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts, text_key
 
@@ -24,11 +24,11 @@ __all__ = [
     "Texts",
     "check_kept_text",
     "check_texts",
-    "looked_at",
     "named_reads",
     "positions_macro",
     "prefix",
     "stage_texts",
     "text_key",
     "unfit_sampler",
+    "used_blocks",
 ]

@@ -46,7 +46,7 @@ gl_SampleID gl_VertexID gl_WorkGroupID EmitVertex EndPrimitive
 """Names of GLSL 4.50 that are misspelt most."""
 
 
-class Said(Struct, frozen=True):
+class DriverMessage(Struct, frozen=True):
     """One message of a driver, with its line in the stage's text and its column, 0 if it names none."""
 
     text: str
@@ -55,60 +55,62 @@ class Said(Struct, frozen=True):
     is_warning: bool = False
 
 
-def causes(rows: Sequence[str], source: SourceText) -> list[Said]:
+def causes(rows: Sequence[str], source: SourceText) -> list[DriverMessage]:
     """Return the messages that name a line, without consequences of others; warnings only if there is no error.
 
     Of a statement only the first error counts, and unknown names. Such a name is reported once, with a near one; of the
     candidates for a call only the nearest are listed.
     """
-    found = list(_with_candidates([said for row in rows if (said := _read(row)) is not None]))
-    errors = [said for said in found if not said.is_warning]
+    found = list(_with_candidates([message for row in rows if (message := _read(row)) is not None]))
+    errors = [message for message in found if not message.is_warning]
     if not errors:
         return list(dict.fromkeys(found))
-    unknown = {name: None for said in errors if _UNKNOWN.search(said.text) for name in _QUOTED.findall(said.text)}
+    unknown = {
+        name: None for message in errors if _UNKNOWN.search(message.text) for name in _QUOTED.findall(message.text)
+    }
     words: list[str] = re.findall(r"[A-Za-z_]\w*", source.text)
     known = {*words, *_BUILT_IN.split()} - unknown.keys()
-    kept: list[Said] = []
+    kept: list[DriverMessage] = []
     told: dict[str, int] = {}
     begun: set[int] = set()
-    for said in errors:
-        statement = _statement(source, said.line)
-        if _UNKNOWN.search(said.text):
-            if said.text not in told:
-                told[said.text] = said.line
-                kept.append(replace(said, text=said.text + _near(said.text, known)))
-        elif statement not in begun and not re.search(r"\berror\b", said.text):
-            kept.append(said)
+    for message in errors:
+        statement = _statement(source, message.line)
+        if _UNKNOWN.search(message.text):
+            if message.text not in told:
+                told[message.text] = message.line
+                kept.append(replace(message, text=message.text + _near(message.text, known)))
+        elif statement not in begun and not re.search(r"\berror\b", message.text):
+            kept.append(message)
         begun.add(statement)
     return kept or errors[:1]
 
 
-def _read(row: str) -> Said | None:
+def _read(row: str) -> DriverMessage | None:
     match = next((match for form in _FORMS if (match := form.match(row))), None)
     if match is None:
         return None
     column = int(match.groupdict().get("column") or 0)
-    return Said(match["text"].rstrip(), int(match["line"]), column, "warning" in match["kind"].lower())
+    return DriverMessage(match["text"].rstrip(), int(match["line"]), column, "warning" in match["kind"].lower())
 
 
-def _with_candidates(found: Sequence[Said]) -> Iterator[Said]:
+def _with_candidates(found: Sequence[DriverMessage]) -> Iterator[DriverMessage]:
     """Join the overloads that Mesa lists beneath a call, one message each, to the message about the call."""
     at = 0
     while at < len(found):
-        said = found[at]
+        message = found[at]
         at += 1
-        call = _CALL.match(said.text)
+        call = _CALL.match(message.text)
         listed: list[str] = []
-        while call and at < len(found) and found[at].line == said.line and _CANDIDATE.match(found[at].text):
+        while call and at < len(found) and found[at].line == message.line and _CANDIDATE.match(found[at].text):
             listed.append(found[at].text.strip())
             at += 1
-        text = said.text.strip()
+        text = message.text.strip()
         if call and listed:
             types = call["types"]
             near = sorted(listed, key=lambda one: _distance(types, one))[:_MOST_CANDIDATES]
             which = "available:" if len(near) == len(listed) else f"the nearest of {len(listed)} are"
             text = f"{call['before'].strip()}; {which} {'; '.join(near)}"
-        yield replace(said, text=text)
+        yield replace(message, text=text)
 
 
 def _distance(types: str, candidate: str) -> tuple[int, int, list[bool]]:

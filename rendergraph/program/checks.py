@@ -216,7 +216,7 @@ def _blocks(text: str) -> Iterator[tuple[str, set[str]]]:
 
 
 @lru_cache(maxsize=256)
-def looked_at(text: str) -> frozenset[str]:
+def used_blocks(text: str) -> frozenset[str]:
     """Return the blocks of which `main` of a program text, or what it calls, uses a member."""
     names = reachable_names(text)
     return frozenset(block for block, members in _blocks(text) if not names.isdisjoint(members))

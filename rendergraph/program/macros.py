@@ -43,7 +43,7 @@ def positions_macro(samples: int) -> str:
     return f"SAMPLE_POSITIONS_{samples}"
 
 
-def looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
+def used_macros(macros: Mapping[str, str], text: str) -> dict[str, str]:
     """Return the macros whose names occur in a text or in the value of such a macro.
 
     The others would only make different programs of equal ones: a blur is the same for any number of lights.
@@ -57,7 +57,7 @@ def looked_at(macros: Mapping[str, str], text: str) -> dict[str, str]:
     return {name: macros[name] for name in macros if name in found}
 
 
-def written(macros: Mapping[str, str]) -> SourceText:
+def macro_text(macros: Mapping[str, str]) -> SourceText:
     return SourceText.of(
         (f"#define {key} {value}".rstrip(), Origin(made=f"the macro {key}")) for key, value in macros.items()
     )

@@ -10,7 +10,7 @@ from typing import Literal
 from rendergraph.errors import Place, Problem
 from rendergraph.glsl.globals import globals_of
 from rendergraph.glsl.source import Origin, SourceText
-from rendergraph.program.causes import Said, causes
+from rendergraph.program.causes import DriverMessage, causes
 from rendergraph.program.text import StageText
 
 _SECTION = re.compile(r"\s*(Vertex|Geometry|Fragment|Compute) info\s*\Z")
@@ -96,36 +96,36 @@ def mentioned_at(source: SourceText, names: Sequence[str]) -> tuple[Place, str] 
 
 
 def _located(rows: Sequence[str], text: StageText, code: str) -> list[Problem]:
-    return list(dict.fromkeys(_problem(code, said, text) for said in causes(rows, text.source)))
+    return list(dict.fromkeys(_problem(code, message, text) for message in causes(rows, text.source)))
 
 
-def _problem(code: str, message: Said, stage: StageText) -> Problem:
-    rows, said, line = stage.source, message.text.strip(), message.line
+def _problem(code: str, message: DriverMessage, stage: StageText) -> Problem:
+    rows, text, line = stage.source, message.text.strip(), message.line
     severity: Literal["error", "warning"] = "warning" if message.is_warning else "error"
     if not 1 <= line <= len(rows.lines):  # of the whole: that functions call each other, say
         first = _first_place(rows)
-        spot = declared_at(rows, _FUNCTION.findall(said)) or (first.place() if first else None, "")
-        return Problem(code, f"{stage.who}: {said}", *spot, severity)
+        spot = declared_at(rows, _FUNCTION.findall(text)) or (first.place() if first else None, "")
+        return Problem(code, f"{stage.who}: {text}", *spot, severity)
     origin, shown_line = rows.origins[line - 1], rows.lines[line - 1]
     column = _unsqueezed(shown_line, message.column)
     if origin.prefix:
-        said = said.replace(origin.prefix, "")
+        text = text.replace(origin.prefix, "")
         column = len(shown_line[: column - 1].replace(origin.prefix, "")) + 1
         shown_line = shown_line.replace(origin.prefix, "")
     if origin.file is None:
-        near = _nearest_author(rows, shown_line, said)
+        near = _nearest_author(rows, shown_line, text)
         what = f"what rendergraph writes for {origin.made}" if origin.made else "generated text"
-        said += f" (in {what}: {shown_line.strip()})"
+        text += f" (in {what}: {shown_line.strip()})"
         place = near.place() if near else None
-        return Problem(code, f"{stage.who}: {said}", place, severity=severity)
-    macro = _macro(rows, shown_line, said)
+        return Problem(code, f"{stage.who}: {text}", place, severity=severity)
+    macro = _macro(rows, shown_line, text)
     if macro is not None:
         column, where = macro
-        said += where
+        text += where
     else:
-        column = _of_name(shown_line, said, column)
-    said += _included(origin)
-    return Problem(code, f"{stage.who}: {said}", origin.place(column), shown_line, severity)
+        column = _of_name(shown_line, text, column)
+    text += _included(origin)
+    return Problem(code, f"{stage.who}: {text}", origin.place(column), shown_line, severity)
 
 
 def _unsqueezed(line: str, column: int) -> int:
@@ -139,19 +139,19 @@ def _unsqueezed(line: str, column: int) -> int:
     return kept[column - 1] + 1 if column <= len(kept) else len(line.rstrip()) + 1
 
 
-def _of_name(line: str, said: str, column: int) -> int:
+def _of_name(line: str, message: str, column: int) -> int:
     """Return where a quoted name is, next to the reported column: macros of the line shift that one."""
-    for name in _QUOTED.findall(said):
+    for name in _QUOTED.findall(message):
         starts = [match.start() + 1 for match in _WORD.finditer(line) if match.group() == name]
         if starts:
             return min(starts, key=lambda start: abs(start - column))
     return column
 
 
-def _macro(source: SourceText, line: str, said: str) -> tuple[int, str] | None:
+def _macro(source: SourceText, line: str, message: str) -> tuple[int, str] | None:
     """Return the macro that contains a quoted name: drivers report the line that uses it, and odd columns."""
     words = [(match.group(), match.start()) for match in _WORD.finditer(line)]
-    for name in _QUOTED.findall(said):
+    for name in _QUOTED.findall(message):
         if name in (word for word, _ in words):
             return None
         for word, start in words:
@@ -178,14 +178,14 @@ def _first_place(source: SourceText) -> Origin | None:
     return Origin(last.file, 1) if last else None
 
 
-def _nearest_author(source: SourceText, line: str, said: str) -> Origin | None:
+def _nearest_author(source: SourceText, line: str, message: str) -> Origin | None:
     """Return the first line of an author's file that names what a generated line is about."""
     own = [
         (text, origin)
         for text, origin in zip(source.lines, source.origins, strict=True)
         if origin.file is not None and not origin.shared
     ]
-    for name in _names(line, said):
+    for name in _names(line, message):
         pattern = re.compile(rf"\b{re.escape(name)}\b")
         for text, origin in own:
             if pattern.search(text):
@@ -193,9 +193,9 @@ def _nearest_author(source: SourceText, line: str, said: str) -> Origin | None:
     return _first_place(source)
 
 
-def _names(line: str, said: str) -> Iterator[str]:
+def _names(line: str, message: str) -> Iterator[str]:
     """Yield the names that the driver quotes, then the longest of the line."""
-    yield from _QUOTED.findall(said)
+    yield from _QUOTED.findall(message)
     yield from sorted(set(_WORD.findall(line)) - {"define", "uniform", "layout", "const", "float", "int"}, key=len)[
         ::-1
     ]

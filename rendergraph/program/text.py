@@ -17,8 +17,8 @@ from rendergraph.errors import InputError, Problem, node_named
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
-from rendergraph.glsl.source import Block, Includes, Origin, SourceText, generated
-from rendergraph.program.macros import looked_at, read_defines, sample_macros, written
+from rendergraph.glsl.source import Includes, Origin, SourceBlock, SourceText, generated
+from rendergraph.program.macros import macro_text, read_defines, sample_macros, used_macros
 from rendergraph.resources import folder
 from rendergraph.stamps import FileCache
 from rendergraph.steps import FunctionBinding, Read, Resource, Step, Write
@@ -178,7 +178,7 @@ class _Program(Struct, frozen=True):
     def stage(self, stage: str, name: str, includes: Includes) -> StageText:
         include_folder = includes.include_folder
         view = includes.expand(include_folder / "view.glsl")
-        view = SourceText(tuple(Block(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
+        view = SourceText(tuple(SourceBlock(block.lines, replace(block.origin, shared=True)) for block in view.blocks))
         step, node = self.step, self.types[self.step.node]
         file, root = node.shader_file(name, include_folder)
         # What the file calls decides which functions stand before it, so it is read as if there were none.
@@ -206,7 +206,7 @@ class _Program(Struct, frozen=True):
         body = functions.text + source.text
         declarations = _read_declarations(step.reads, self.resources, "", body)
         text = view + declarations + functions + source
-        head = generated([VERSION, *extensions]) + written(looked_at(self.macros, text.text))
+        head = generated([VERSION, *extensions]) + macro_text(used_macros(self.macros, text.text))
         return StageText(stage, head + text, step.node)
 
     def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
@@ -276,11 +276,11 @@ class _Program(Struct, frozen=True):
         lines = iter(renamed(own.text, rename).split("\n"))
         final = SourceText(
             tuple(
-                block if block.origin.shared else Block(tuple(islice(lines, len(block.lines))), block.origin)
+                block if block.origin.shared else SourceBlock(tuple(islice(lines, len(block.lines))), block.origin)
                 for block in source.blocks
             )
         )
-        head = written({before + key: renamed(value, rename) for key, value in macros.items()})
+        head = macro_text({before + key: renamed(value, rename) for key, value in macros.items()})
         return head + _read_declarations(binding.reads, self.resources, before, final.text) + final
 
 

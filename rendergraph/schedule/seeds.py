@@ -123,23 +123,12 @@ def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
 
 
 def random_order(model: Model, seed: int) -> list[int]:
-    """Return a legal order drawn by the seed: any ready step with equal chance."""
+    """Return a legal order drawn by the seed."""
     import random  # rarely needed
 
-    chooser = random.Random(seed)
-    missing = [len(steps) for steps in model.before]
-    ready = [step for step, number in enumerate(missing) if not number]
-    order: list[int] = []
-    while ready:
-        place = chooser.randrange(len(ready))
-        ready[place], ready[-1] = ready[-1], ready[place]
-        step = ready.pop()
-        order.append(step)
-        for other in model.after[step]:
-            missing[other] -= 1
-            if not missing[other]:
-                ready.append(other)
-    return order
+    rank = list(range(len(model)))
+    random.Random(seed).shuffle(rank)
+    return program_order(model, rank)
 
 
 def program_order(model: Model, rank: Sequence[int]) -> list[int]:

@@ -27,7 +27,7 @@ Macro: TypeAlias = Annotated[bool | int | float | str, "a number, True, False or
 P = ParamSpec("P")
 
 
-def argument(name: str, value: object, annotation: Any) -> None:
+def check_argument(name: str, value: object, annotation: Any) -> None:
     """Refuse an argument that does not fit its annotation."""
     for mistake in mistakes_in(name, value, annotation):
         raise Misuse(mistake.text)
@@ -37,22 +37,22 @@ def checked(method: Callable[P, None]) -> Callable[P, None]:
     """Check a method's arguments first, except those that may be ports, which it checks itself, knowing the node."""
 
     @cache
-    def looked_at() -> tuple[list[str], dict[str, tuple[Any, Callable[[Any], bool]]]]:
+    def tested_parameters() -> tuple[list[str], dict[str, tuple[Any, Callable[[Any], bool]]]]:
         hints = hints_of(method)
         return list(hints), {name: (hint, test_of(hint)) for name, hint in hints.items() if not accepts(hint, Port)}
 
     @wraps(method)
     def call(*arguments: P.args, **named: P.kwargs) -> None:
-        names, looked = looked_at()
+        names, tests = tested_parameters()
         for name, value in (*zip(names, arguments[1:], strict=False), *named.items()):
-            if name in looked and not looked[name][1](value):
-                argument(name, value, looked[name][0])
+            if name in tests and not tests[name][1](value):
+                check_argument(name, value, tests[name][0])
         method(*arguments, **named)
 
     return call
 
 
-def own_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
+def declared_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
     """Return a port that the node itself declares; `what` is the argument's name in messages."""
     if isinstance(value, Part):
         value = value.port
@@ -72,11 +72,11 @@ def own_port(ports: Mapping[str, Port], value: object, what: str) -> Port:
 
 def part_of(ports: Mapping[str, Port], value: object, what: str) -> Part:
     """Return a port of the node, or a part of one."""
-    port = own_port(ports, value, what)
+    port = declared_port(ports, value, what)
     return value if isinstance(value, Part) else port.whole
 
 
-def within(part: Part, desc: TextureDesc | BufferDesc) -> None:
+def check_part(part: Part, desc: TextureDesc | BufferDesc) -> None:
     """Refuse a mip or layer that a texture does not have."""
     if part.mip is None and part.layer is None:
         return
@@ -97,8 +97,8 @@ def targets(ports: Mapping[str, Port], out: object) -> dict[str, Part]:
         for name in out:
             if not isinstance(name, str) or not name.isidentifier():
                 raise Misuse(f"out has the key {quoted(name)}; the keys are the shader's names")
-        there = {name: value for name, value in out.items() if value is not None or name in ports}  # others are dropped
-        found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in there.items()}
+        given = {name: value for name, value in out.items() if value is not None or name in ports}  # others are dropped
+        found = {name: part_of(ports, value, f"out[{name!r}]") for name, value in given.items()}
     else:
         part_of(ports, out, "out")  # says what it is instead
         raise AssertionError
@@ -167,7 +167,7 @@ def objects(value: str | Sequence[str]) -> str | tuple[str, ...]:
 def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> dict[str, Port]:
     """Return layouts of a draw step's buffers: `3f 2f in_position in_uv` to the buffer's port."""
     mapping: Any = Annotated[Mapping[Any, Any], "a mapping from layouts to buffers"]
-    argument("attributes", value, mapping | None)
+    check_argument("attributes", value, mapping | None)
     found = {}
     for layout, port in (value or {}).items():
         example = "it reads like '3f 2f in_position in_uv'"
@@ -180,7 +180,7 @@ def attributes(ports: Mapping[str, Port], value: Mapping[str, Port] | None) -> d
             raise Misuse(f"attributes has the layout {quoted(layout)}; {example}")
         if wanted != len(names):
             raise Misuse(f"attributes has the layout {quoted(layout)}: {wanted} formats, {len(names)} names; {example}")
-        found[layout] = buffer(own_port(ports, port, f"attributes[{layout!r}]"), f"attributes[{layout!r}]")
+        found[layout] = buffer(declared_port(ports, port, f"attributes[{layout!r}]"), f"attributes[{layout!r}]")
     return found
 
 
@@ -196,17 +196,17 @@ def buffer(port: Port, what: str) -> Port:
     return port
 
 
-def resolved(source: Port, out: Port, descs: Sequence[TextureDesc | BufferDesc | None]) -> None:
+def check_resolve(source: Port, out: Port, descs: Sequence[TextureDesc | BufferDesc | None]) -> None:
     """Refuse what no device averages: one sample, depth, integers, unit vectors, another format or size."""
-    given, made = descs
-    if given is None:
+    source_desc, out_desc = descs
+    if source_desc is None:
         raise unconnected(source)
-    if not (isinstance(given, TextureDesc) and isinstance(made, TextureDesc)):
+    if not (isinstance(source_desc, TextureDesc) and isinstance(out_desc, TextureDesc)):
         raise Misuse(f"'{source.name}' or '{out.name}' is a buffer; only textures have samples")
-    if given.samples == 1:
+    if source_desc.samples == 1:
         raise Misuse(f"source is '{source.name}', which has one sample per texel, so nothing to resolve")
-    texel = FORMATS[given.format]
+    texel = FORMATS[source_desc.format]
     if texel.is_depth or texel.family in ("uint", "int") or getattr(source, "semantic", None) == Normal:
         raise Misuse(f"'{source.name}' has values that cannot be averaged; choose a sample in a shader with texelFetch")
-    if replace(given, samples=1) != made:
+    if replace(source_desc, samples=1) != out_desc:
         raise Misuse(f"'{out.name}' is not what '{source.name}' becomes; declare it like that input, with samples=1")

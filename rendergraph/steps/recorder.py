@@ -99,11 +99,13 @@ class Steps:
 
     def connected(self, port: Port | None) -> bool:
         """Whether an input is connected; False for one that the class drops."""
-        return port is not None and self.facts.connected(checks.own_port(self.ports, port, "connected's argument").name)
+        return port is not None and self.facts.connected(
+            checks.declared_port(self.ports, port, "connected's argument").name
+        )
 
     def used(self, port: Port | None) -> bool:
         """Whether any node reads an output; an unused one, or one that the class drops, need not be written."""
-        return port is not None and self._recorder.used(checks.own_port(self.ports, port, "used's argument"))
+        return port is not None and self._recorder.used(checks.declared_port(self.ports, port, "used's argument"))
 
     def draws(self, objects: str | Sequence[str]) -> bool:
         """Whether a geometry step of these `objects` would draw anything in this scene: `transparent`, …, or names."""
@@ -119,7 +121,7 @@ class Steps:
         Raises:
             Misuse: it is not a port of this node, holds no texture, or is an input that is not connected.
         """
-        own = checks.own_port(self.ports, port, "desc's argument")
+        own = checks.declared_port(self.ports, port, "desc's argument")
         found = self._desc(own)
         if found is None:
             raise checks.unconnected(own)
@@ -243,10 +245,10 @@ class Steps:
             view, view_index: as for `geometry`.
         """
         if isinstance(vertices, Port):
-            checks.buffer(checks.own_port(self.ports, vertices, "vertices"), "vertices")
+            checks.buffer(checks.declared_port(self.ports, vertices, "vertices"), "vertices")
             self._connected(vertices)
         else:
-            checks.argument("vertices", vertices, Count)
+            checks.check_argument("vertices", vertices, Count)
         buffers = checks.attributes(self.ports, attributes)
         for port in buffers.values():
             self._connected(port)
@@ -287,14 +289,14 @@ class Steps:
         """Fill a texture with one value in every channel, or one per channel; a buffer with 0."""
         part = checks.part_of(self.ports, out, "out")
         numbers = checks.uniform("value", value)
-        checks.argument("value", numbers, Texel)
+        checks.check_argument("value", numbers, Texel)
         if getattr(part.port, "kind", "") == "buffer" and numbers != 0:
             raise Misuse(f"'{part.port.name}' is a buffer, which can only be cleared to 0")
         self._add("clear", {}, out, {}, None, value=numbers)
 
     def mipmaps(self, out: Port) -> None:
         """Make mips 1 and up from mip 0 by 2×2 averages."""
-        port = checks.own_port(self.ports, out, "out")
+        port = checks.declared_port(self.ports, out, "out")
         if isinstance(out, Part):
             raise Misuse(f"out is a part of '{port.name}'; mips are made of a whole texture")
         desc = self._desc(port)
@@ -307,8 +309,8 @@ class Steps:
 
         A mean of depths, of unit vectors or of integers is meaningless: a shader chooses among the samples instead.
         """
-        ports = checks.own_port(self.ports, source, "source"), checks.own_port(self.ports, out, "out")
-        checks.resolved(*ports, [self._desc(port) for port in ports])
+        ports = checks.declared_port(self.ports, source, "source"), checks.declared_port(self.ports, out, "out")
+        checks.check_resolve(*ports, [self._desc(port) for port in ports])
         self._add("resolve", {}, out, {"source": source}, None)
 
     def _add(
@@ -333,7 +335,7 @@ class Steps:
             if isinstance(part, Part) and (part.mip is not None or part.layer is not None):
                 desc = self._desc(part.port)
                 if desc is not None:
-                    checks.within(part, desc)
+                    checks.check_part(part, desc)
         self._check_options(options)
         if "over" in options:
             options["invocations"] = self._invocations(options.pop("over"), targets, textures)
@@ -365,7 +367,7 @@ class Steps:
             if not isinstance(value, Port | Part):
                 uniforms[name] = checks.uniform(name, value)
                 continue
-            port = checks.own_port(self.ports, value, name)
+            port = checks.declared_port(self.ports, value, name)
             if isinstance(port, Views):
                 raise Misuse(f"{name} is the view table '{port.name}'; give it as `view=` to a step that draws")
             textures[name] = checks.part_of(self.ports, value, name) if isinstance(value, Part) else port
@@ -373,7 +375,7 @@ class Steps:
 
     def _check_options(self, options: Mapping[str, Any]) -> None:
         if options.get("view") is not None:
-            port = checks.own_port(self.ports, options["view"], "view")
+            port = checks.declared_port(self.ports, options["view"], "view")
             if not isinstance(port, Views | Input):
                 raise Misuse(f"view is {quoted(port)}; it is a Views port or an input that carries views")
 
@@ -382,7 +384,7 @@ class Steps:
     ) -> tuple[int, int, int]:
         """Return how many invocations a dispatch needs along each axis."""
         if over is not None and not isinstance(over, Port | Part | str):
-            checks.argument("over", over, Counts)
+            checks.check_argument("over", over, Counts)
             return checks.counts(over)
         if over is not None:
             part = checks.part_of(self.ports, over, "over")
@@ -391,7 +393,7 @@ class Steps:
                 raise Misuse(f"over is the buffer '{part.port.name}'; give the number of invocations, as in over=256")
             if desc is None:
                 raise Misuse(f"over is input '{part.port.name}', which is not connected; ask `steps.connected` first")
-            checks.within(part, desc)
+            checks.check_part(part, desc)
             return _texels(desc, part)
         for part in (*targets.values(), *self._reads(reads)):
             desc = self._desc(part.port)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 
-from rendergraph.allocate.heap import Item, least_bytes, share_blocks
+from rendergraph.allocate.heap import HeapItem, least_bytes, share_blocks
 
 
-def ways(items: list[Item]) -> Iterator[list[list[int]]]:
+def ways(items: list[HeapItem]) -> Iterator[list[list[int]]]:
     """All partitions into blocks whose members are never alive together, by the definition."""
 
     def extend(number: int, blocks: list[list[int]]) -> Iterator[list[list[int]]]:
@@ -24,13 +24,13 @@ def ways(items: list[Item]) -> Iterator[list[list[int]]]:
     return extend(0, [])
 
 
-def blocks_bytes(items: Sequence[Item], blocks: Sequence[Sequence[int]]) -> int:
+def blocks_bytes(items: Sequence[HeapItem], blocks: Sequence[Sequence[int]]) -> int:
     return sum(max(items[number].bytes for number in block) for block in blocks)
 
 
-def drawn(chooser: random.Random) -> list[Item]:
+def drawn(chooser: random.Random) -> list[HeapItem]:
     starts = [chooser.randrange(6) for _ in range(chooser.randint(1, 6))]
-    return [Item(chooser.choice((1, 2, 3, 5, 8, 16)), start, start + chooser.randrange(3)) for start in starts]
+    return [HeapItem(chooser.choice((1, 2, 3, 5, 8, 16)), start, start + chooser.randrange(3)) for start in starts]
 
 
 def test_the_least_of_all_ways_to_share() -> None:
@@ -44,11 +44,11 @@ def test_the_least_of_all_ways_to_share() -> None:
 
 
 def test_blocks_can_need_more_than_the_peak() -> None:
-    items = [Item(4, 0, 0), Item(3, 1, 1), Item(3, 1, 1)]
+    items = [HeapItem(4, 0, 0), HeapItem(3, 1, 1), HeapItem(3, 1, 1)]
     assert blocks_bytes(items, share_blocks(tuple(items))) == least_bytes(items) == 7  # of 6 that live at once
     assert share_blocks(()) == ()
 
 
 def test_members_are_in_the_order_of_time_and_like_goes_with_like() -> None:
-    items = [Item(4, 2, 3, "a"), Item(4, 0, 1, "a"), Item(4, 0, 1, "b"), Item(4, 2, 3, "b")]
+    items = [HeapItem(4, 2, 3, "a"), HeapItem(4, 0, 1, "a"), HeapItem(4, 0, 1, "b"), HeapItem(4, 2, 3, "b")]
     assert sorted(share_blocks(tuple(items))) == [(1, 0), (2, 3)]

@@ -11,7 +11,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.errors import RenderError
-from rendergraph.gl.memory_objects import Block, make_blocks
+from rendergraph.gl.memory_objects import MemoryBlock, make_blocks
 from rendergraph.gl.textures import Clear, read
 from rendergraph.textures import TextureDesc
 
@@ -36,14 +36,14 @@ def _able(gl: rg.Session) -> None:
 
 
 @pytest.fixture
-def block(gl: rg.Session) -> Iterator[Block]:
+def block(gl: rg.Session) -> Iterator[MemoryBlock]:
     with gl.device.current():
         made = make_blocks(gl.device, [DESCS])[0]
         yield made
         made.release()
 
 
-def test_each_holds_its_own_until_another_is_written(gl: rg.Session, block: Block) -> None:
+def test_each_holds_its_own_until_another_is_written(gl: rg.Session, block: MemoryBlock) -> None:
     def texels(desc: TextureDesc) -> Any:
         found = read(gl.device, block.textures[desc], layer=0)[..., 0]
         return found / 255 if found.dtype == np.uint8 else found

@@ -14,13 +14,13 @@ from rendergraph.api import Node, Output
 from rendergraph.catalog import Catalog
 from rendergraph.errors import InputError
 from rendergraph.glsl.expansion import check_expansion
-from rendergraph.glsl.source import Block, Origin, SourceText
+from rendergraph.glsl.source import Origin, SourceBlock, SourceText
 
 HERE = Path("/somewhere/a.frag")
 
 
 def text_of(text: str, file: Path = HERE) -> SourceText:
-    return SourceText((Block(tuple(text.split("\n")), Origin(file, 1)),))
+    return SourceText((SourceBlock(tuple(text.split("\n")), Origin(file, 1)),))
 
 
 def chain(length: int, body: str = "A{0} A{0}") -> str:

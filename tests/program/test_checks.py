@@ -9,7 +9,7 @@ import pytest
 from rendergraph.api import ADD, Depth, InOut, Input, Internal, Node, Output, Radiance, State, Steps, structural
 from rendergraph.api import Any as AnyTexel
 from rendergraph.errors import InputError
-from rendergraph.program import looked_at
+from rendergraph.program import used_blocks
 
 
 class Maker(Node):
@@ -173,5 +173,5 @@ def test_an_inout_that_is_read_has_one_sample(bench: Any) -> None:
 )
 def test_blocks_are_looked_at_by_their_members(block: str, use: str) -> None:
     other = "uniform Other { float nobody; };"
-    assert looked_at(f"{other}\n{block}\nvoid main() {{ float x = {use}; }}") == {"B"}
-    assert looked_at(f"{other}\n{block}\nvoid main() {{ float x = 1.0; }}") == set()
+    assert used_blocks(f"{other}\n{block}\nvoid main() {{ float x = {use}; }}") == {"B"}
+    assert used_blocks(f"{other}\n{block}\nvoid main() {{ float x = 1.0; }}") == set()
