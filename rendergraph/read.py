@@ -96,7 +96,7 @@ PIPELINE: Table = Table(
 _PATCH = replace(
     PIPELINE,
     keys=tuple(key for key in PIPELINE.keys if key.name != "extends"),
-    refused={"extends": "a patch cannot extend a pipeline; leave 'extends' out"},
+    refused={"extends": "a patch cannot extend a pipeline; remove 'extends'"},
 )
 _HOLDS = "`nodes` and `outputs`"
 
@@ -132,12 +132,12 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
         validator.report(value, CODES.file, f"the file is empty; a pipeline has at least {_HOLDS}")
         raise InputError(validator.problems)
     if (sweep := value.get("sweep")) is not None:
-        text = "this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
+        text = "this file is a sweep, not a pipeline; run it with: rendergraph sweep FILE -o FOLDER"
         validator.report(sweep, "RG101", text, key=True)
         raise InputError(validator.problems)
     scene = value.get("scene")
     if scene is not None and type(scene.data) is int and value.get("nodes") is value.get("extends") is None:
-        text = "this is no pipeline but a scene; draw it with: rendergraph run forward --scene FILE"
+        text = "this file is a scene, not a pipeline; render it with: rendergraph run forward --scene FILE"
         validator.report(scene, "RG013", text, key=True)
         raise InputError(validator.problems)
     root = validator.file(value, _PATCH if patch else PIPELINE, _HOLDS)
@@ -149,8 +149,13 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
 def entries(value: Value | None, *path: str) -> dict[str, Value]:
     """Return the non-null entries of a mapping at a path; empty where it does not exist."""
     found = value.get(*path) if value is not None else None
-    data = found.data if found is not None else None
-    return {key: child for key, child in data.items() if child.data is not None} if isinstance(data, dict) else {}
+    return {key: child for key, child in found.items() if child.data is not None} if found is not None else {}
+
+
+def flag(value: Value | None, *path: str) -> bool:
+    """Return whether `true` is at a path."""
+    found = value.get(*path) if value is not None else None
+    return found is not None and found.data is True
 
 
 def word(value: Value | None, *path: str) -> str | None:

@@ -192,7 +192,7 @@ class Roots(Struct, frozen=True):
         name = shown(written or path, 120)
         record_read(path)
         if "://" in (written or str(path)):
-            return "RG012", f"'{name}' is an address; only files are read"
+            return "RG012", f"'{name}' is not a file path; only local files can be loaded"
         try:
             resolved = path.resolve()
             # Asked before whether it exists: a file outside is none of the pipeline's business.
@@ -204,9 +204,9 @@ class Roots(Struct, frozen=True):
             if resolved.is_dir() if folder else resolved.is_file():
                 return None
             if resolved.is_dir():
-                return "RG011", f"'{name}' is a folder, a file is needed"
+                return "RG011", f"'{name}' is a folder; a file is expected"
             if resolved.is_file():
-                return "RG011", f"'{name}' is a file, a folder is needed"
+                return "RG011", f"'{name}' is a file; a folder is expected"
             if resolved.exists():
                 return "RG011", f"'{name}' is not a regular file"
         except (OSError, ValueError, RuntimeError):

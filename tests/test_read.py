@@ -22,7 +22,7 @@ outputs: {image: b-1.blurred}
 
 def test_a_right_file_is_read_as_it_is() -> None:
     document = read(None, TEXT)
-    assert document.value["nodes"]["b-1"]["inputs"] == {
+    assert document.root.plain()["nodes"]["b-1"]["inputs"] == {
         "source": "a.albedo",
         "more": ["a.normal", "a.depth"],
         "none": None,
@@ -46,20 +46,24 @@ def test_going_on_leaves_out_what_is_wrong() -> None:
     wrong = TEXT.replace("type: gbuffer", "type: [gbuffer], typ: 1, inputs: {x: *nowhere}")
     document = read(None, wrong, keep_going=True)
     assert [problem.code for problem in document.problems] == ["RG006", "RG106", "RG105"]
-    assert document.value["nodes"]["a"] == {"inputs": {}}
+    assert document.root.plain()["nodes"]["a"] == {"inputs": {}}
     assert ("nodes", "a", "type") in document.dropped
     assert ("nodes", "a", "inputs", "x") in document.dropped
 
 
 def test_nulls_stay_for_merging() -> None:
     document = read(None, "nodes: {a: null, b: {type: null, params: null}}\noutputs: null\nscene: null")
-    assert document.value == {"nodes": {"a": None, "b": {"type": None, "params": None}}, "outputs": None, "scene": None}
+    assert document.root.plain() == {
+        "nodes": {"a": None, "b": {"type": None, "params": None}},
+        "outputs": None,
+        "scene": None,
+    }
 
 
 def test_a_patch_extends_nothing() -> None:
     with pytest.raises(InputError, match="RG101 a patch cannot extend a pipeline"):
         read(None, "extends: forward", patch=True)
-    assert checked(read(None, TEXT), patch=True).value == read(None, TEXT).value
+    assert checked(read(None, TEXT), patch=True).root.plain() == read(None, TEXT).root.plain()
 
 
 def test_an_empty_patch_is_none() -> None:

@@ -76,7 +76,7 @@ def test_ranges_and_units_are_there(made: dict[str, Any]) -> None:
 def test_an_independent_validator_agrees(made: dict[str, Any]) -> None:
     fastjsonschema = pytest.importorskip("fastjsonschema")
     validate = fastjsonschema.compile(made)
-    validate(parse(FORWARD).value)
+    validate(parse(FORWARD).root.plain())
     validate({"extends": "forward", "nodes": {"light": None, "display": {"params": {"exposure": 1}}}})
     validate({"nodes": {"shadows": {"type": "shadow_vsm", "params": {"taps": None}}}})  # drops an inherited one
     for wrong in (
@@ -92,7 +92,7 @@ def test_an_independent_validator_agrees(made: dict[str, Any]) -> None:
     ):
         assert wrong != FORWARD
         with pytest.raises(fastjsonschema.JsonSchemaException, match=r"^data"):
-            validate(parse(wrong).value)
+            validate(parse(wrong).root.plain())
 
 
 # --- a schema on disk ------------------------------------------------------------------------------------------------

@@ -193,7 +193,7 @@ def _checked(document: Document) -> Header:
     for section, found in parts.items():
         for name, entry in (root.get(section) or root.with_data(None)).items():
             if name in names:
-                line = names[name].key_line
+                line = names[name].key_place.line
                 text = f"'{name}' stands in line {line} too; no port or parameter has the name of another"
                 validator.report(entry, _CODES.name, text, key=True)
                 continue

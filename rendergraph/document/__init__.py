@@ -9,23 +9,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rendergraph.document.parsing import YamlLimits, build, over_limit, scalar
+from rendergraph.document.parsing import YamlLimits, over_limit, parse, scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
-from rendergraph.errors import InputError, Option, Place, Problem
+from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import record_read
 
 
-def load(
-    path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = False, name: str | None = None
-) -> Document:
-    """Return the values of a YAML file; `keep_going` collects mistakes that do not stop the reading in `problems`."""
-    name = name or str(path)
-    text = read_text(path, limits, name)
-    return build(text, Source(name, path, text), limits, keep_going)
+def load(path: Path, *, limits: YamlLimits = YamlLimits(), keep_going: bool = False) -> Document:
+    """Return the values of a YAML file; see `parse`. Whether it may be read is the caller's question."""
+    text = read_text(path, limits, str(path))
+    return parse(text, str(path), path=path, limits=limits, keep_going=keep_going)
 
 
 def read_text(path: Path, limits: YamlLimits, name: str) -> str:
-    """Return the text of a file without its byte order mark; `name` is how messages name it."""
+    """Return the text of a file; `name` is how messages name it."""
     raw = read_bytes(path, limits.bytes, name)
     try:
         return raw.decode("utf-8-sig")
@@ -36,26 +33,13 @@ def read_text(path: Path, limits: YamlLimits, name: str) -> str:
         raise InputError(Problem("RG008", "the text is not UTF-8; save the file as UTF-8", where)) from None
 
 
-def parse(
-    text: str,
-    origin: str | Option = "<text>",
-    *,
-    path: Path | None = None,
-    limits: YamlLimits = YamlLimits(),
-    keep_going: bool = False,
-) -> Document:
-    """Return the values of a YAML text; `path` is the file it comes from, to which its relative paths are relative."""
-    text = text.removeprefix("\ufeff")
-    return build(text, Source(origin, path, text), limits, keep_going)
-
-
 def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
     """Return the bytes of a regular file of at most `most` bytes."""
     name = shown(name or str(path))
     record_read(path)
     try:
         if not path.is_file() and path.exists():
-            what = "is a folder, a file is needed" if path.is_dir() else "is not a regular file"
+            what = "is a folder; a file is expected" if path.is_dir() else "is not a regular file"
             raise InputError(Problem("RG011", f"'{name}' {what}"))
         with path.open("rb") as file:
             raw = file.read(most + 1)

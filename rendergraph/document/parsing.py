@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
 
 from rendergraph.document.values import BROKEN, Broken, Document, Scalar, Source, Value, kind_of, shown
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Option, Place, Problem
 
 _NULL = frozenset(["", "~", "null", "Null", "NULL"])
 _BOOL = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
@@ -83,14 +84,13 @@ def over_limit(what: str, limit: int) -> str:
     return f"the text {_UNITS[what].format(f'more than {limit:,}')}; --limit yaml-{what}=N allows more"
 
 
-class _Builder:
-    def __init__(self, source: Source, limits: YamlLimits) -> None:
-        self.source = source
-        self.limits = limits
-        self.problems: list[Problem] = []
-        self.anchors: dict[str, tuple[Value, int] | None] = {}
-        self.nodes = 0
-        self.aliases = 0
+class _Builder(Struct, eq=False):
+    source: Source
+    limits: YamlLimits
+    problems: list[Problem] = []
+    anchors: dict[str, tuple[Value, int] | None] = {}
+    nodes: int = 0
+    aliases: int = 0
 
     def say(self, code: str, text: str, mark: Any) -> None:
         self.problems.append(self.source.problem(code, text, mark.line + 1, mark.column + 1))
@@ -150,10 +150,10 @@ class _Builder:
         elif name is BROKEN:
             pass
         elif isinstance(name, bool) or not isinstance(name, str | int | float) or name != name:
-            self.say("RG009", f"a key must be text or a number, this is {kind_of(name)}", mark)
+            self.say("RG009", f"a key must be text or a number, got {kind_of(name)}", mark)
         elif name in into:
-            first = into[name].key_line
-            self.say("RG002", f"the key '{shown(name)}' stands here twice, first in line {first}; remove one", mark)
+            first = into[name].key_place.line
+            self.say("RG002", f"duplicate key '{shown(name)}', first in line {first}; remove one", mark)
         else:
             into[name] = value
         return not merge
@@ -186,10 +186,27 @@ class _Builder:
             return BROKEN
 
 
-def build(text: str, source: Source, limits: YamlLimits, keep_going: bool) -> Document:
-    """Return the values of a text without a byte order mark."""
+def parse(
+    text: str,
+    origin: str | Option = "<text>",
+    *,
+    path: Path | None = None,
+    limits: YamlLimits = YamlLimits(),
+    keep_going: bool = False,
+) -> Document:
+    """Return the values of a YAML text.
+
+    Args:
+        text: the text.
+        origin: how messages name it.
+        path: the file it comes from, to which its relative paths are relative.
+        limits: budgets.
+        keep_going: put mistakes that do not stop the reading into `Document.problems`.
+    """
     import yaml  # loaded with the first file
 
+    text = text.removeprefix("\ufeff")
+    source = Source(origin, path, text)
     if len(text) > limits.bytes or len(text.encode("utf-8", "surrogatepass")) > limits.bytes:
         raise InputError(Problem("RG007", over_limit("bytes", limits.bytes), Place(source.origin)))
     # To compile a set of so many signs takes as long as to read a pipeline, and files are mostly text in lines.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -59,24 +59,14 @@ class Broken:
 BROKEN = Broken()
 
 
-class Value:
+class Value(Struct, eq=False):
     """One value with its position, counted from 1, and that of its key; lists and mappings hold further values."""
 
-    __slots__ = ("column", "data", "key_column", "key_line", "line", "source")
-
-    def __init__(
-        self,
-        data: Data,
-        source: Source,
-        line: int = 0,
-        column: int = 0,
-        key: tuple[int, int] | None = None,
-    ) -> None:
-        self.data = data
-        self.source = source
-        self.line = line
-        self.column = column
-        self.key_line, self.key_column = key or (line, column)
+    data: Data
+    source: Source
+    line: int = 0
+    column: int = 0
+    key: tuple[int, int] | None = None
 
     def __repr__(self) -> str:
         return f"Value({self.data!r}, {self.place})"
@@ -87,18 +77,27 @@ class Value:
 
     @property
     def key_place(self) -> Place:
-        return Place(self.source.origin, self.key_line, self.key_column)
+        return Place(self.source.origin, *(self.key or (self.line, self.column)))
 
     @property
     def kind(self) -> str:
         return kind_of(self.data)
 
     def with_data(self, data: Data) -> Value:
-        return Value(data, self.source, self.line, self.column, (self.key_line, self.key_column))
+        return Value(data, self.source, self.line, self.column, self.key)
+
+    @property
+    def mapping(self) -> dict[Any, Value]:
+        """The entries of a mapping, none for other values."""
+        return self.data if isinstance(self.data, dict) else {}
+
+    def updated(self, entries: Mapping[Any, Value]) -> Value:
+        """Return a mapping with some of its entries replaced or added."""
+        return self.with_data({**self.mapping, **entries})
 
     def problem(self, code: str, text: str, *, key: bool = False) -> Problem:
-        line, column = (self.key_line, self.key_column) if key else (self.line, self.column)
-        return self.source.problem(code, text, line, column)
+        place = self.key_place if key else self.place
+        return self.source.problem(code, text, place.line, place.column)
 
     def relocate(self, problem: Problem, *, key: bool = False, code: str = "", context: str = "") -> Problem:
         place = self.key_place if key else self.place
@@ -106,7 +105,7 @@ class Value:
 
     def items(self) -> Iterator[tuple[Any, Value]]:
         """Iterate over a mapping; over nothing for other values."""
-        return iter(self.data.items() if isinstance(self.data, dict) else ())
+        return iter(self.mapping.items())
 
     def get(self, *path: Index) -> Value | None:
         found: Value = self
@@ -153,34 +152,8 @@ class Document(Struct, frozen=True, eq=False, dict=True):
     dropped: frozenset[tuple[str, ...]] = frozenset()
 
     @property
-    def file(self) -> str:
-        return str(self.source.origin)
-
-    @property
     def path(self) -> Path | None:
         return self.source.path
-
-    @cached_property
-    def value(self) -> Any:
-        """The whole document as plain Python data; not to be changed, for aliases share it."""
-        return self.root.plain()
-
-    def place(self, path: Sequence[Index] = (), *, key: bool = False) -> Place:
-        found, rest = self._nearest(path)
-        return found.key_place if key and not rest else found.place
-
-    def problem(self, code: str, text: str, path: Sequence[Index] = (), *, key: bool = False) -> Problem:
-        found, rest = self._nearest(path)
-        return found.problem(code, text, key=key and not rest)
-
-    def _nearest(self, path: Sequence[Index]) -> tuple[Value, bool]:
-        found = self.root
-        for position, step in enumerate(path):
-            child = found.get(step)
-            if child is None:
-                return found, position < len(path)
-            found = child
-        return found, False
 
 
 def from_plain(data: Any, source: Source) -> Value:
@@ -195,7 +168,7 @@ def from_plain(data: Any, source: Source) -> Value:
         return Value(data, source)
     raise InputError(
         source.problem(
-            "RG106", f"{shown(repr(data))} cannot stand in a file; it takes text, numbers, lists and mappings"
+            "RG106", f"{shown(repr(data))} cannot be written to a file; use text, numbers, lists and mappings"
         )
     )
 

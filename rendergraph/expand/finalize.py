@@ -21,7 +21,7 @@ def finalize_resources(graph: Graph, found: VersionedSteps, wanted: Mapping[str,
         end = follow_forwards(found.forwarded, port)
         if end not in found.final or end.node in found.idle:
             reason = found.idle.get(end.node, "it makes no texture")
-            text = f"output '{name}' shows '{end}', but that is never drawn: {reason}"
+            text = f"output '{name}' shows '{end}', but that is never rendered: {reason}"
             raise InputError(Problem("RG204", text, graph[end.node].place, subject=str(end)))
         resource, version = found.final[end]
         shown[name] = resource
@@ -82,7 +82,7 @@ def _dependencies(step: Step, made: Sequence[str], resources: Mapping[str, Resou
     kept = made[0]
     maker = kept.rpartition(".")[0]
     if maker != step.node:
-        yield f"it goes on with '{kept}', which is kept from frame to frame; draw into a texture that is not"
+        yield f"it continues '{kept}', which is kept from frame to frame; write to a texture that is not kept"
         return
     others = [write.resource for write in step.writes if write.resource not in made]
     if others:

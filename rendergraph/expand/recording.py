@@ -245,7 +245,7 @@ def _why_unread(graph: Graph, node: GraphNode, reached: set[str]) -> str:
         if end in graph.empty and any(end in ends for ends in links):
             reached.add(node.id)
             return f"{end} has no layers: {_why_empty(graph, node, name)}"
-    return "nothing that is wanted reads its outputs"
+    return "no requested output depends on it"
 
 
 def _why_empty(graph: Graph, node: GraphNode, name: str) -> str:
@@ -261,7 +261,7 @@ def _why_empty(graph: Graph, node: GraphNode, name: str) -> str:
         return "there is nothing to draw"
     kinds = Counter(light.type for light in graph.lights)
     listed = " and ".join(f"{count} {kind}" for kind, count in kinds.items())
-    return f"it takes none of the scene's lights ({listed})" if listed else "the scene has no light"
+    return f"it uses none of the scene's lights ({listed})" if listed else "the scene has no light"
 
 
 def _forward_demand(node: GraphNode, used: set[str], demanded: Mapping[str, set[str]]) -> None:

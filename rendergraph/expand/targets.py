@@ -73,11 +73,11 @@ def attachment_mismatch(
         elif extent != first[1]:
             return (
                 f"'{first[0]}' is {_difference(first[1], extent)}, but '{name}' is {_difference(extent, first[1])}; "
-                + ("the targets of one step are alike in size, samples and layers")
+                + ("all targets of a step must have the same size, samples and layers")
             )
     depths = list(dict.fromkeys(depths))
     if len(depths) > 1:
-        return f"'{depths[0]}' and '{depths[1]}' are both depth; one step has one"
+        return f"'{depths[0]}' and '{depths[1]}' are both depth; a step can have only one depth target"
     return None
 
 
@@ -93,10 +93,12 @@ def undefined_destination(request: StepRequest, writes: Iterable[Write]) -> str 
     blends = state.blend if isinstance(state.blend, tuple) else (state.blend,) * len(colors)
     for write, blend in zip(colors, blends, strict=False):
         if write.load == "discard" and blend is not None and blend.takes_destination:
-            return f"it blends onto '{write.resource}', which holds nothing yet; declare it with `clear=`"
+            return f"it blends onto '{write.resource}', whose contents are undefined; declare it with `clear=`"
     for write in writes:
         if write.use == "depth" and write.load == "discard" and tested and state.depth_func != "always":
-            return f"it tests depth against '{write.resource}', which holds nothing yet; declare it with `clear=0.0`"
+            return (
+                f"it tests depth against '{write.resource}', whose contents are undefined; declare it with `clear=0.0`"
+            )
     return None
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from msgspec import Struct
+
 from rendergraph.catalog import Catalog, NodeType
 from rendergraph.declare import Facts, LightFacts, TextureInfo
 from rendergraph.errors import InputError, Option, Problem, suggestion
@@ -43,7 +45,8 @@ def link(
         objects: the scene's objects; None without a scene, where any may exist.
         environment: the description of the scene's environment map.
     """
-    return _Linker(spec, catalog, lights, objects, environment).graph()
+    given = None if objects is None else tuple(objects)
+    return _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment).graph()
 
 
 def sketch(
@@ -53,7 +56,7 @@ def sketch(
     try:
         return link(spec, catalog, lights, environment=environment), ()
     except InputError as error:
-        linker = _Linker(spec, catalog, lights, None, environment, sketching=True)
+        linker = _Linker(spec, spec.catalog or catalog, tuple(lights), None, environment, sketching=True)
         graph = linker.graph()
         lacking = {*linker.missing, *(problem for problem in spec.problems if problem.code == "RG130")}
         if any(problem not in lacking for problem in error.problems):
@@ -71,7 +74,7 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
         text = f"node '{node}' is left out: the scene has no environment; give it one (--environment)"
         raise InputError(Problem("RG132", text))
     if node in graph.disabled:
-        text = f"node '{node}' is disabled, and nothing stands in for '{port}'; enable it"
+        text = f"node '{node}' is disabled, and nothing replaces '{port}'; enable it"
         raise InputError(Problem("RG132", text))
     if node not in names:
         hint = suggestion(node or text, names) if node else f"; write NODE.PORT{suggestion(text, names)}"
@@ -85,28 +88,18 @@ def endpoint(graph: Graph, text: str) -> Endpoint:
     return found
 
 
-class _Linker:
+class _Linker(Struct, eq=False):
     """Links one pipeline; `missing` holds the problems about types that are missing or cannot be used."""
 
-    def __init__(
-        self,
-        spec: PipelineSpec,
-        catalog: Catalog,
-        lights: Sequence[LightFacts],
-        objects: Sequence[ObjectFacts] | None,
-        environment: TextureDesc | None,
-        *,
-        sketching: bool = False,
-    ) -> None:
-        self.spec = spec
-        self.sketching = sketching
-        self.missing: list[Problem] = []
-        self.catalog = spec.catalog or catalog
-        self.lights = tuple(lights)
-        self.objects = None if objects is None else tuple(objects)
-        self.environment = environment
-        self.problems: list[Problem] = []
-        self.warnings: list[Problem] = []
+    spec: PipelineSpec
+    catalog: Catalog
+    lights: tuple[LightFacts, ...]
+    objects: tuple[ObjectFacts, ...] | None
+    environment: TextureDesc | None
+    sketching: bool = False
+    missing: list[Problem] = []
+    problems: list[Problem] = []
+    warnings: list[Problem] = []
 
     def graph(self) -> Graph:
         types = self._types()
@@ -261,7 +254,7 @@ class _Linker:
         for name, found in outputs.items():
             info = infer.info(found.source)
             if found.source.previous:
-                text = f"output '{name}' shows this frame; leave '@previous' out"
+                text = f"output '{name}' shows this frame; remove '@previous'"
                 self._report(found.value.problem("RG127", text))
             elif info is not None:
                 kind = port_kind(nodes[found.source.node].ports[found.source.port], info)
@@ -270,7 +263,7 @@ class _Linker:
                     self._report(found.value.problem("RG129", text))
                 elif name == "image" and info.semantic.name == Radiance.name:
                     text = (
-                        "output 'image' is scene-linear light as it is; send it through an output transform "
+                        "output 'image' is scene-linear light without an output transform; add one "
                         "('rendergraph nodes display' lists them), or call the output 'radiance'"
                     )
                     self.warnings.append(found.value.problem("RG154", text).as_warning())
@@ -283,7 +276,7 @@ class _Linker:
                 if parameter is None or not draft.links.get(parameter.unless):
                     continue
                 path, place = f"{draft.spec.id}.{name}", f"{draft.spec.id}.{parameter.unless}"
-                text = f"'{path}' changes nothing: '{place}' takes its place; -s {place}=null disconnects that"
+                text = f"'{path}' changes nothing: '{place}' replaces it; -s {place}=null disconnects that"
                 self.warnings.append(value.problem("RG155", text).as_warning())
 
     def _aliases(self, references: References, written: Mapping[str, UnlinkedNode]) -> dict[str, Endpoint]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
+from msgspec import Struct
+
 from rendergraph.catalog import Catalog
 from rendergraph.declare import Function, InOut, Input, Node, Output, Port, TextureInfo, Views, WrittenPort
 from rendergraph.errors import InputError, Problem
@@ -16,19 +18,12 @@ from rendergraph.textures import FORMATS, TEXTURE_KINDS, Semantic, Signature
 Accepts = Callable[[type[Node]], bool]
 
 
-class Checker:
-    def __init__(
-        self,
-        nodes: Mapping[str, UnlinkedNode],
-        textures: Mapping[Endpoint, TextureInfo],
-        infer: TextureInference,
-        catalog: Catalog,
-    ) -> None:
-        self.nodes = nodes
-        self.textures = textures
-        self.infer = infer
-        self.catalog = catalog
-        self.problems: list[Problem] = []
+class Checker(Struct, eq=False):
+    nodes: Mapping[str, UnlinkedNode]
+    textures: Mapping[Endpoint, TextureInfo]
+    infer: TextureInference
+    catalog: Catalog
+    problems: list[Problem] = []
 
     def check(self) -> list[Problem]:
         for draft in self.nodes.values():
@@ -53,11 +48,11 @@ class Checker:
             taken = given  # type: ignore[assignment]
         if link.source.previous and (isinstance(port, InOut) or given in ("function", "view", "buffer")):
             what = "continues a texture of this frame" if isinstance(port, InOut) else f"takes a {given}"
-            text = f"'{draft.spec.id}.{port.name}' {what}, which has no last frame's value; leave '@previous' out"
+            text = f"'{draft.spec.id}.{port.name}' {what}, which has no last frame's value; remove '@previous'"
             self.problems.append(link.value.problem("RG127", text))
         elif link.source.previous and getattr(source, "kept", False):
-            text = f"'{link.source}' means last frame's value, but it is kept: one value in all frames"
-            self.problems.append(link.value.problem("RG127", f"{text}; leave '@previous' out"))
+            text = f"'{link.source}' has no effect: the texture is kept, with one value in all frames"
+            self.problems.append(link.value.problem("RG127", f"{text}; remove '@previous'"))
         elif given != taken:
             self._report(
                 draft, port, link, "RG201", f"takes a {taken}", f"is a {given}", self._by_kind(info, taken, port)
@@ -178,7 +173,7 @@ class Checker:
         if default and len(made) > 1:
             (a, one), (b, other) = list(made.items())[:2]
             ends = f"'{draft.spec.id}.{one}' is {_size(a)} and '{draft.spec.id}.{other}' {_size(b)}"
-            text = f"{ends}: one pass draws all its targets in one size"
+            text = f"{ends}: all render targets of a pass must have the same size"
             self.problems.append(draft.spec.value.problem("RG216", text, key=True))
             return
         for name, taken in draft.type.read.items():

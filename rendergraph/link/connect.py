@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from msgspec import Struct
+
 from rendergraph.catalog import Catalog
 from rendergraph.declare import InOut, Input
 from rendergraph.document import Value
@@ -13,11 +15,11 @@ from rendergraph.resolve import PipelineSpec
 from rendergraph.textures import Signature
 
 
-class Connector:
-    def __init__(
-        self, spec: PipelineSpec, catalog: Catalog, references: References, say: Callable[[Problem], None]
-    ) -> None:
-        self.spec, self.catalog, self.references, self.report = spec, catalog, references, say
+class Connector(Struct, eq=False):
+    spec: PipelineSpec
+    catalog: Catalog
+    references: References
+    report: Callable[[Problem], None]
 
     def connect(self, draft: UnlinkedNode) -> None:
         cls = draft.type.cls
@@ -29,7 +31,7 @@ class Connector:
                 self._group(draft, name, groups[name], value)
             else:
                 known = [*inputs, *groups]
-                hint = suggestion(name, known) if known else "; it takes none"
+                hint = suggestion(name, known) if known else "; it has none"
                 if name in cls.parameters():
                     hint = f"; '{name}' is a param, move it to `params`"
                 text = f"node type '{draft.type.name}' has no input '{name}'{hint}"
@@ -61,7 +63,7 @@ class Connector:
     def _input(self, draft: UnlinkedNode, name: str, port: Input | InOut, value: Value) -> None:
         if isinstance(value.data, list):
             if not (isinstance(port, Input) and port.many):
-                text = f"'{draft.spec.id}.{name}' takes one link, not a list; write one as in node.port"
+                text = f"'{draft.spec.id}.{name}': expected one link as in node.port, got a list"
                 self.report(value.problem("RG115", text))
                 draft.failed.add(name)
                 return
@@ -89,7 +91,7 @@ class Connector:
         node, _, previous = str(value.data).partition("@")
         scope = draft.spec.scope
         if isinstance(value.data, list) or "." in node or (previous and previous != "previous"):
-            text = f"'{draft.spec.id}.{group}' is a group, it takes a node's id and no port"
+            text = f"'{draft.spec.id}.{group}' is a group; link it to a node's id, without a port"
             self.report(value.problem("RG113", text))
         elif not self.references.is_known(scope, node):
             self.report(self.references.no_node(scope, node, value))

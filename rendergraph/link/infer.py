@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, NoReturn, Optional, overload
+from typing import Annotated, Any, NoReturn, Optional
 
 import msgspec
 
@@ -73,11 +73,7 @@ class _LazyInfos(Sequence[TextureInfo]):
     def __len__(self) -> int:
         return len(self._ends)
 
-    @overload
-    def __getitem__(self, index: int) -> TextureInfo: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[TextureInfo]: ...
-    def __getitem__(self, index: int | slice) -> TextureInfo | Sequence[TextureInfo]:
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [self._infer.known(end) for end in self._ends[index]]
         return self._infer.known(self._ends[index])

@@ -115,7 +115,7 @@ def _unknown(value: Value, name: str, node_type: NodeType) -> Problem:
     if name in cls.inputs() or name in cls.groups():
         hint = f"; '{name}' is an input, move it to `inputs`"
     else:
-        hint = suggestion(name, cls.parameters()) if cls.parameters() else "; it takes none"
+        hint = suggestion(name, cls.parameters()) if cls.parameters() else "; it has none"
     return value.problem("RG103", f"node type '{node_type.name}' has no param '{shown(name)}'{hint}", key=True)
 
 
@@ -124,16 +124,16 @@ _LINK = re.compile(r"([^.@]+)(?:\.([^.@]+))?(?:@previous)?\Z")
 
 def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
     if name in spec.unrun:
-        return f"node type '{name}' is Python, which no pipeline file runs; say --plugin {spec.unrun[name]}"
+        return f"node type '{name}' is Python, which a pipeline file cannot load; pass --plugin {spec.unrun[name]}"
     text = f"there is no node type '{shown(name)}'"
     near = nearest(name, catalog.names())
     if near is not None:
         text += f"; did you mean '{near}'?"
     if spec.missing:
-        return f"{text}; it may come with what is not installed: {', '.join(spec.missing)}"
+        return f"{text}; a missing package may provide it: {', '.join(spec.missing)}"
     project = nearest_settings(spec.path.parent) if spec.path is not None else None
     if project is not None and project.plugins and not Path.cwd().resolve().is_relative_to(project.folder):
-        return f"{text}; {shown_file(project.file)} names plugins, but only for those who stand in its folder"
+        return f"{text}; {shown_file(project.file)} names plugins, but they load only when you work inside its folder"
     if near is not None:
         return text
     return f"{text}; install the plugin that brings it, or name its file: --plugin; explain RG102 has all ways"

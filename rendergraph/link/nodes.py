@@ -14,7 +14,7 @@ from rendergraph.declare import Function, InOut, Input, Node, Port, WrittenPort
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Place, Problem, suggestion
 from rendergraph.link.graph import Endpoint
-from rendergraph.read import NAME, word
+from rendergraph.read import NAME, flag, word
 from rendergraph.resolve import NodeSpec, PipelineSpec
 
 _ID = NAME.pattern.removesuffix(r"\Z")
@@ -64,10 +64,9 @@ class UnlinkedNode(Struct, eq=False):
         return self.unlit or self.spec.disabled is not None
 
 
-class References:
-    def __init__(self, spec: PipelineSpec, types: Mapping[str, NodeType]) -> None:
-        self.spec = spec
-        self.types = types
+class References(Struct, eq=False):
+    spec: PipelineSpec
+    types: Mapping[str, NodeType]
 
     def follow(self, scope: str, value: Value, wanted: str) -> Link | None:
         """Return the link to the port that a reference names; None for an optional sub-pipeline input without a link.
@@ -79,16 +78,8 @@ class References:
         Raises:
             InputError: it leads nowhere; without problems where the reason has been reported.
         """
-        text = str(value.data)
-        match = _LINK.match(text)
-        if match is None:
-            text = f"'{shown(text)}' is no link; write node.port, or a node's id for its port '{wanted}'"
-            raise InputError(value.problem("RG113", text))
-        found = self._follow(scope, match[1], match[2], wanted, value, 0)
-        if found is None:
-            return None
-        source = _last(found.source) if match[3] else found.source
-        return found if source is found.source and value is found.value else replace(found, source=source, value=value)
+        link = self._reference(scope, value, wanted, 0)
+        return replace(link, value=value) if link is not None and link.value is not value else link
 
     def outputs_of(self, scope: str, name: str) -> list[str]:
         inner = self.spec.scopes.get(f"{scope}{name}/")
@@ -112,15 +103,24 @@ class References:
         names += [inside[:-1] for inside, found in self.spec.scopes.items() if found.parent == scope]
         return [name.removeprefix(scope) for name in names[:500]] + (["inputs"] if scope else [])
 
-    def _follow(self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
+    def _reference(self, scope: str, value: Value, wanted: str, depth: int) -> Link | None:
+        match = _LINK.match(value.data) if isinstance(value.data, str) else None
+        if match is None:
+            text = f"'{shown(value.data)}' is not a link; write node.port, or a node's id for its port '{wanted}'"
+            raise InputError(value.problem("RG113", text))
         if depth > 100:
             text = f"'{shown(value.data)}' leads back to itself; link it to a node's port"
             raise InputError(value.problem("RG117", text))
+        link = self._follow(scope, match[1], match[2], wanted, value, depth)
+        if link is None or not match[3]:
+            return link
+        return replace(link, source=link.source._replace(previous=True))
+
+    def _follow(self, scope: str, name: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
         if name == "inputs" and scope:
             return self._outside(scope, port or wanted, value, depth)
         if name == "inputs" and (declared := self.spec.tree.get("inputs", port or wanted)):
-            optional = declared.get("optional")
-            if optional is not None and optional.data:
+            if flag(declared, "optional"):
                 return None
             raise InputError(())  # a sub-pipeline run on its own
         inner = self.spec.scopes.get(f"{scope}{name}/")
@@ -145,20 +145,17 @@ class References:
             raise InputError(value.problem("RG111", text))
         given = found.links.get(port)
         if given is None or given.data is None:
-            optional = found.inputs[port].get("optional")
-            if optional is not None and optional.data:
+            if flag(found.inputs[port], "optional"):
                 return None
             raise InputError(())  # said at the node
-        match = _LINK.match(given.data) if isinstance(given.data, str) else None
-        if match is None:
-            kind = "takes one link" if isinstance(given.data, list) else "takes a link as in node.port"
-            raise InputError(given.problem("RG113", f"input '{port}' of sub-pipeline '{scope[:-1]}' {kind}"))
-        link = self._follow(found.parent, match[1], match[2], port, given, depth + 1)
+        if isinstance(given.data, list):
+            text = f"input '{port}' of sub-pipeline '{scope[:-1]}' takes one link"
+            raise InputError(given.problem("RG113", text))
+        link = self._reference(found.parent, given, port, depth + 1)
         if link is None:
             return None
-        source = _last(link.source) if match[3] else link.source
         entered = SubgraphInput(f"{scope[:-1]}.{port}", word(found.inputs[port], "semantic"), given)
-        return replace(link, source=source, declared=(*link.declared, entered))
+        return replace(link, declared=(*link.declared, entered))
 
     def _inside(self, scope: str, port: str | None, wanted: str, value: Value, depth: int) -> Link | None:
         outputs = self.spec.scopes[scope].outputs
@@ -167,15 +164,7 @@ class References:
             name = shown(scope[:-1])
             text = f"sub-pipeline '{name}' has no output '{port or wanted}'{suggestion(port or wanted, outputs)}"
             raise InputError(value.problem("RG112", text))
-        match = _LINK.match(str(inner.data))
-        if match is None:
-            text = f"'{shown(inner.data)}' is no link; write node.port, or a node's id for its port '{port or wanted}'"
-            raise InputError(inner.problem("RG113", text))
-        link = self._follow(scope, match[1], match[2], port or wanted, inner, depth + 1)
-        if link is None:
-            return None
-        source = _last(link.source) if match[3] else link.source
-        return replace(link, source=source)
+        return self._reference(scope, inner, port or wanted, depth + 1)
 
     def _no_output(self, node: NodeSpec, node_type: NodeType, port: str | None, wanted: str, value: Value) -> str:
         outputs = node_type.cls.outputs()
@@ -186,10 +175,6 @@ class References:
         if name in node_type.cls.inputs():
             return f"{text}, only an input of that name{suggestion(name, outputs)}"
         return text + suggestion(name, outputs)
-
-
-def _last(source: Endpoint) -> Endpoint:
-    return source._replace(previous=True)
 
 
 def line_of(place: Place, here: Place) -> str:
@@ -252,7 +237,7 @@ def missing_source(user: str, link: Link, nodes: Mapping[str, UnlinkedNode]) -> 
         text = f"{user}, but '{link.source.node}' is left out: the scene has no environment"
         return link.value.problem("RG132", f"{text}; give it one (--environment), or link another node here")
     where = line_of(value.place, link.value.place)
-    text = f"{user}, but '{link.source.node}' is disabled ({where}) and nothing that goes into it can stand in"
+    text = f"{user}, but '{link.source.node}' is disabled ({where}) and none of its inputs can replace its output"
     return link.value.problem("RG132", f"{text}; enable it, or link another node here")
 
 

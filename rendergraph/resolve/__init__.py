@@ -11,7 +11,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, Value, YamlLimits, from_plain
 from rendergraph.errors import InputError, Option, Place, Problem, shown_file, suggestion
 from rendergraph.keys import Validator, plain
-from rendergraph.read import CODES, SIZE, checked, entries, read, word
+from rendergraph.read import CODES, SIZE, checked, entries, flag, read, word
 from rendergraph.resolve.files import Files
 from rendergraph.resolve.flatten import Flattener, parameters
 from rendergraph.resolve.patches import diff, merge_patch, patch_of, settings
@@ -57,7 +57,7 @@ def resolve(
         overrides["scene"] = Value(str(scene), Source(Option("--scene", str(scene)), Path.cwd() / "--scene"))
     if size is not None:
         overrides["size"] = from_plain(list(size), Source(Option("--size", f"{size[0]}x{size[1]}")))
-    tree = tree.with_data({**_parts(tree), **overrides})
+    tree = tree.updated(overrides)
     settled, problems = patch_of(tree, [s for s in wanted if not s.scope], files.names_of)
     files.problems += problems
     if settled is not None:
@@ -68,7 +68,7 @@ def resolve(
     found, roots = _scene(tree, files, scene)
     tree = _with_plugins(_with_scene(tree, found, document), files)
     return PipelineSpec(
-        name=document.path.stem if document.path else Path(document.file).stem,
+        name=document.path.stem if document.path else Path(str(document.source.origin)).stem,
         path=document.path,
         description=word(tree, "description") or "",
         size=_size(tree, files),
@@ -89,10 +89,6 @@ def resolve(
     )
 
 
-def _parts(tree: Value) -> dict[str, Value]:
-    return dict(tree.data) if isinstance(tree.data, dict) else {}
-
-
 def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
     if isinstance(source, Document):
         return checked(source, keep_going=True)
@@ -103,7 +99,7 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
             if (here := next(Path().glob(f"{source}.y*ml"), None)) is not None:
                 hint = f"; the file is named '{here}'"
             elif source in shipped_scenes():
-                hint = f"; it is a scene, draw it with: rendergraph run forward --scene {source}"
+                hint = f"; it is a scene, render it with: rendergraph run forward --scene {source}"
             raise InputError(Problem("RG015", f"there is no shipped pipeline '{source}'{hint}"))
         return read(shipped[source], None, limits, keep_going=True)
     path = Path(source)
@@ -114,7 +110,7 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
 
         if path.suffix.lower() in MESHES:
             way = f"rendergraph run forward --scene {shlex.quote(shown_file(path))}"
-            text = f"this is no pipeline but a scene; draw it with: {way}"
+            text = f"this file is a scene, not a pipeline; render it with: {way}"
             raise InputError(Problem("RG013", text, Place(str(path))))
     try:
         return read(path, None, limits, keep_going=True)  # it is looked for again, also where it is missing now
@@ -143,9 +139,8 @@ def _complete(tree: Value, files: Files) -> None:
             empty = tree.get(part)
             files.say(tree.problem("RG125", text) if empty is None else empty.problem("RG125", text, key=True))
     for name, declared in entries(tree, "inputs").items():
-        optional = declared.get("optional")
-        if not (optional and optional.data):
-            text = f"input '{name}' comes from outside: this file is the type of a node, no pipeline to run"
+        if not flag(declared, "optional"):
+            text = f"input '{name}' comes from outside: this file is a sub-pipeline and cannot be run"
             files.say(declared.problem("RG124", text, key=True))
 
 
@@ -186,7 +181,7 @@ def _with_scene(tree: Value, found: Path | None, document: Document) -> Value:
     path = found.resolve()
     text = os.path.relpath(path, home) if path.is_relative_to(home) else str(path)
     text = text if not is_name(text) else f"./{text}"
-    return tree.with_data({**_parts(tree), "scene": value.with_data(text)})
+    return tree.updated({"scene": value.with_data(text)})
 
 
 def _with_plugins(tree: Value, files: Files) -> Value:
@@ -195,7 +190,7 @@ def _with_plugins(tree: Value, files: Files) -> Value:
         return tree
     named = tree.get("plugins") or next(iter(written.values()))
     listed = [value.with_data(text) for text, value in written.items()]
-    return tree.with_data({**_parts(tree), "plugins": named.with_data(list(listed))})
+    return tree.updated({"plugins": named.with_data(list(listed))})
 
 
 __all__ = [

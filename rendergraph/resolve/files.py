@@ -10,7 +10,7 @@ from rendergraph.catalog import Catalog
 from rendergraph.document import Document, Source, Value, YamlLimits, shown
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.keys import MOST_PROBLEMS
-from rendergraph.read import checked, entries, read, word
+from rendergraph.read import checked, entries, flag, read, word
 from rendergraph.resolve.patches import TypeNames, merge_pipeline
 from rendergraph.resolve.plugins import Plugins, is_shader
 from rendergraph.resources import is_name, shipped_pipelines
@@ -31,7 +31,6 @@ class Files:
         self.dropped: set[tuple[str, ...]] = set()
         self.removed: dict[str, Value] = {}
         self._roots: dict[Source, Roots] = {}
-        self._open: list[Path] = []
         self._trees: dict[Path, Value | None] = {}
         self._names: dict[str, TypeNames | None] = {}
 
@@ -98,32 +97,33 @@ class Files:
 
     def chain(self, document: Document) -> Value:
         """Return a file merged onto everything it extends."""
+        documents = self._with_bases(document)
+        base = documents.pop().root
+        tree = base.with_data({key: value for key, value in entries(base).items() if key != "extends"})
+        for above in reversed(documents):
+            written = {key: value for key, value in above.root.items() if key != "extends"}  # a null removes
+            tree = self.patched(tree, above.root.with_data(written))
+        return tree
+
+    def _with_bases(self, document: Document) -> list[Document]:
+        """Parse a file and everything it extends, before anything is merged."""
         self.problems += document.problems
-        base = document.root.get("extends")
-        if base is None or base.data is None:
-            return document.root.with_data({key: v for key, v in entries(document.root).items() if key != "extends"})
-        written = {key: value for key, value in document.root.items() if key != "extends"}  # a null removes
-        found = self.locate(base, shipped_pipelines(), "pipeline")
-        if found is None:
-            raise InputError(self.problems)
-        path, roots = found
-        key = path.resolve()
-        here = document.path.resolve() if document.path else Path()
-        if key in self._open or key == here:
-            names = " → ".join(file.name for file in (*self._open, here, key))
-            raise InputError([*self.problems, base.problem("RG118", f"the file extends itself: {names}")])
-        if len(self._open) >= _MOST_EXTENDED:
-            text = f"the chain of files that extend each other is longer than {_MOST_EXTENDED}"
-            raise InputError([*self.problems, base.problem("RG118", text)])
-        self._open.append(here)
-        try:
-            below = self._read(path, roots, base)
-            target = self.chain(below)
-        finally:
-            self._open.pop()
-        merged, notes = merge_pipeline(target, document.root.with_data(written), self.names_of)
-        self.notes += notes
-        return merged
+        documents, open_files = [document], [document.path.resolve() if document.path else Path()]
+        while (base := documents[-1].root.get("extends")) is not None and base.data is not None:
+            found = self.locate(base, shipped_pipelines(), "pipeline")
+            if found is None:
+                raise InputError(self.problems)
+            path, roots = found
+            open_files.append(path.resolve())
+            if open_files[-1] in open_files[:-1]:
+                names = " → ".join(file.name for file in open_files)
+                raise InputError([*self.problems, base.problem("RG118", f"the file extends itself: {names}")])
+            if len(documents) > _MOST_EXTENDED:
+                text = f"the chain of files that extend each other is longer than {_MOST_EXTENDED}"
+                raise InputError([*self.problems, base.problem("RG118", text)])
+            documents.append(self._read(path, roots, base))
+            self.problems += documents[-1].problems
+        return documents
 
     def patched(self, tree: Value, patch: Value) -> Value:
         merged, notes = merge_pipeline(tree, patch, self.names_of)
@@ -180,8 +180,7 @@ class Files:
         sub = self.sub_pipeline(value)
         if sub is not None:
             inputs = entries(sub, "inputs")
-            may_lack = ((name, value.get("optional")) for name, value in inputs.items())
-            optional = frozenset(name for name, flag in may_lack if flag is not None and flag.data is True)
+            optional = frozenset(name for name, value in inputs.items() if flag(value, "optional"))
             outputs = frozenset(entries(sub, "outputs"))
             return TypeNames(frozenset(entries(sub, "parameters")), frozenset(inputs), {}, optional, outputs)
         text = self.type_name(value)

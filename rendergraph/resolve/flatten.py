@@ -7,9 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
+from msgspec import Struct
+from msgspec.structs import replace
+
 from rendergraph.document import Value, shown
 from rendergraph.errors import InputError, Problem, suggestion
-from rendergraph.read import NAME, entries, word
+from rendergraph.read import NAME, entries, flag, word
 from rendergraph.resolve.files import Files, display
 from rendergraph.resolve.patches import Setting, patch_of
 from rendergraph.resolve.spec import NodeSpec, PipelineParameter, Scope
@@ -20,12 +23,11 @@ MOST_NESTED = 32
 _REFERENCE = rf"\$({NAME.pattern})"
 
 
-class Flattener:
-    def __init__(self, files: Files) -> None:
-        self.files = files
-        self.nodes: dict[str, NodeSpec] = {}
-        self.scopes: dict[str, Scope] = {}
-        self._open: list[Path] = []
+class Flattener(Struct, eq=False):
+    files: Files
+    nodes: dict[str, NodeSpec] = {}
+    scopes: dict[str, Scope] = {}
+    _open: list[Path] = []
 
     def flatten(self, tree: Value, scope: str, given: Mapping[str, Value], sets: Sequence[Setting]) -> Value:
         """Add the nodes of one level; return the tree with sub-pipelines in place of their names.
@@ -51,7 +53,7 @@ class Flattener:
         for name, value in declared.items():
             if name not in used:
                 self._warn(value.problem("RG151", f"the parameter '{name}' is used nowhere", key=True))
-        top = dict(tree.data) if isinstance(tree.data, dict) else {}
+        top = dict(tree.mapping)
         if scope:
             top.pop("plugins", None)  # the resolved file names those of all files at its top
         if "nodes" in top:
@@ -83,7 +85,7 @@ class Flattener:
         sub = self.files.sub_pipeline(node_type) if node_type is not None else None
         if sub is None or node_type is None:
             if sets:
-                text = f"node '{node_id}' is no sub-pipeline; there is nothing inside it to set"
+                text = f"node '{node_id}' is not a sub-pipeline, so it has no inner nodes to set"
                 for setting in sets:
                     self.files.say(setting.problem("RG109", text))
             problem = self.files.missing(node_type) if node_type is not None else None
@@ -128,23 +130,17 @@ class Flattener:
                 )
                 self.files.say(link.problem("RG111", text, key=True))
         for key, declared in declared_inputs.items() if disabled is None else ():
-            optional = declared.get("optional")
-            if (key not in inputs or inputs[key].data is None) and not (optional and optional.data):
+            if (key not in inputs or inputs[key].data is None) and not flag(declared, "optional"):
                 text = f"input '{key}' of node '{scope}{name}' is not connected; link it to a node's port"
                 self.files.say(node.problem("RG114", text, key=True))
         self.scopes[inside] = Scope(scope, declared_inputs, inputs, entries(sub, "outputs"), node, disabled)
         self._open.append(path or Path())
         if path is None:
             self._open[-1] = Path(f"/{len(self._open)}")  # written in place: it has no file to contain
-        deeper = [
-            Setting(setting.scope[1:], setting.node, setting.name, setting.value, setting.text)
-            for setting in sets
-            if len(setting.scope) > 1
-        ]
+        deeper = [replace(setting, scope=setting.scope[1:]) for setting in sets if len(setting.scope) > 1]
         whole = self.flatten(sub, inside, params, deeper)
         self._open.pop()
-        parts = dict(node.data) if isinstance(node.data, dict) else {}
-        return node.with_data({**parts, "type": node_type.with_data(whole.data)})
+        return node.updated({"type": node_type.with_data(whole.data)})
 
     def _disabled(self, parts: Mapping[str, Value], scope: str) -> Value | None:
         own = parts.get("enabled")
@@ -231,9 +227,9 @@ def parameters(tree: Value) -> dict[str, PipelineParameter]:
 
 def _typed(node: Value, node_type: Value | None, name: str) -> Value:
     """Write the type as the resolved file needs it: as a path relative to that file."""
-    if node_type is None or not isinstance(node.data, dict) or not name or node_type.data == name:
+    if node_type is None or not node.mapping or not name or node_type.data == name:
         return node
-    return node.with_data({**node.data, "type": node_type.with_data(name)})
+    return node.updated({"type": node_type.with_data(name)})
 
 
 def _number(declared: Value, key: str) -> float | None:

@@ -31,9 +31,7 @@ def merge_patch(target: Value | None, patch: Value) -> Value:
     """RFC 7386: mappings merge, null removes, everything else replaces; each value keeps its own place."""
     if not isinstance(patch.data, dict):
         return patch
-    merged: dict[str, Value] = {}
-    if target is not None and isinstance(target.data, dict):
-        merged.update(target.data)
+    merged = dict(target.mapping) if target is not None else {}
     for key, value in patch.data.items():
         if value.data is None:
             merged.pop(key, None)
@@ -77,11 +75,9 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
             fed.append((name, node, new_type, names.outputs))
         elif not retyped and (names := names_of(node.get("type") or node)) and names.groups:
             inputs = change.get("inputs")
-            disconnected[name] = {
-                key: link
-                for key, link in (inputs.items() if inputs is not None else ())
-                if link.data is None and any(key in members for members in names.groups.values())
-            }
+            members = {member for group in names.groups.values() for member in group}
+            inherited = inputs.mapping if inputs is not None else {}
+            disconnected[name] = {key: link for key, link in inherited.items() if link.data is None and key in members}
     for name, node, new_type, outputs in fed:
         before = names_of(node.get("type") or node)
         lost = before.outputs - outputs if before is not None else frozenset[str]()
@@ -89,21 +85,15 @@ def merge_pipeline(target: Value, patch: Value, names_of: NamesOf) -> tuple[Valu
             text = f"node '{name}' is now '{word(new_type) or 'the new type'}', which has no output '{port}' of "
             text += f"'{word(node, 'type')}'; '{other}.{key}' does without"
             notes.append(_note(new_type, text))
-    if "nodes" in (target.data if isinstance(target.data, dict) else {}):
-        nodes = target.get("nodes")
-        assert nodes is not None
-        target = target.with_data({**_mapping(target), "nodes": nodes.with_data(kept)})
+    if (nodes := target.get("nodes")) is not None:
+        target = target.updated({"nodes": nodes.with_data(kept)})
     merged = merge_patch(target, patch)
     # Merging takes a null away, but beside a group it still has to say that this one member is not connected.
     for name, links in disconnected.items():
         present = merged.get("nodes", name, "inputs")
         if links and present is not None:
-            _mapping(present).update(links)
+            present.mapping.update(links)
     return merged, notes
-
-
-def _mapping(value: Value) -> dict[str, Value]:
-    return value.data if isinstance(value.data, dict) else {}
 
 
 def _differ(old: Value | None, new: Value) -> bool:
@@ -115,12 +105,12 @@ def _differ(old: Value | None, new: Value) -> bool:
 
 
 def _drop(name: str, node: Value, change: Value, new_type: Value, names: TypeNames, notes: list[Problem]) -> Value:
-    parts = dict(_mapping(node))
+    parts = dict(node.mapping)
     old, new = word(node, "type"), word(new_type) or "the new type"
     for part, known in (("params", names.params), ("inputs", names.inputs)):
         inherited = entries(node, part)
         written = change.get(part)
-        own = _mapping(written) if written is not None else {}
+        own = written.mapping if written is not None else {}
         lost = [key for key in inherited if key not in known and key not in own]
         if part in parts and lost:
             parts[part] = parts[part].with_data({key: value for key, value in inherited.items() if key not in lost})
@@ -141,7 +131,7 @@ def _unlinked(
     """Remove inherited links to a node's lost outputs from optional inputs; yield node, input and output of each."""
     for other, node in list(nodes.items()) if lost else ():
         change = patch.get(other)
-        own = _mapping(change.get("inputs") or change) if change is not None else {}
+        own = (change.get("inputs") or change).mapping if change is not None else {}
         for key, link in entries(node, "inputs").items():
             parts = link.data if isinstance(link.data, list) else [link]
             left = [part for part in parts if _port_of(name, key, part) not in lost]
@@ -151,9 +141,9 @@ def _unlinked(
             inputs = nodes[other].get("inputs")
             if names is None or key not in names.optional or inputs is None:
                 continue
-            rest = {name: value for name, value in _mapping(inputs).items() if name != key}
+            rest = {name: value for name, value in inputs.items() if name != key}
             rest |= {key: link.with_data(left)} if left else {}
-            nodes[other] = nodes[other].with_data({**_mapping(nodes[other]), "inputs": inputs.with_data(rest)})
+            nodes[other] = nodes[other].updated({"inputs": inputs.with_data(rest)})
             for port in sorted({str(_port_of(name, key, part)) for part in parts} & lost):
                 yield other, key, port
 
@@ -193,7 +183,7 @@ def settings(sets: Sequence[str] | Mapping[str, object]) -> list[Setting]:
             problems.append(source.problem("RG120", "a setting is written PATH=VALUE, as in light.ambient=0.1"))
         elif match is None or (match[1] and match[2] is None):
             words = "NODE.PARAM, NODE.INPUT, NODE.type, NODE.enabled or the NAME of a parameter"
-            problems.append(source.problem("RG120", f"'{shown(path)}' is no path; write {words}"))
+            problems.append(source.problem("RG120", f"'{shown(path)}' is not a path; write {words}"))
         else:
             try:
                 value = _value(str(raw), source) if is_text else from_plain(raw, source)
@@ -322,7 +312,5 @@ def _of_nodes(name: str, nodes: Mapping[str, Value], names_of: NamesOf) -> list[
 def _put(root: Value, value: Value, *path: str) -> None:
     found = root
     for step in path[:-1]:
-        assert isinstance(found.data, dict)
-        found = found.data.setdefault(step, Value({}, value.source))
-    assert isinstance(found.data, dict)
-    found.data[path[-1]] = value
+        found = found.mapping.setdefault(step, Value({}, value.source))
+    found.mapping[path[-1]] = value

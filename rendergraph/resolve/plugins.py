@@ -92,7 +92,7 @@ class Plugins:
         try:
             found, python = find.shaders(folder)
         except ValueError as error:
-            self._say(value.problem("RG131", f"'{shown(text)}' is no folder of plugins: {error}"))
+            self._say(value.problem("RG131", f"'{shown(text)}' is not a folder of plugins: {error}"))
             return
         outside = [one.file for _, one in found if roots.mistake(one.file)]
         for file in outside:
@@ -107,7 +107,7 @@ class Plugins:
             words = f"'{shown(text)}' has Python ({names}), which is not run because a pipeline file names it; "
             named = shlex.quote(shown_file(folder))
             self.unrun |= dict.fromkeys((file.stem for file in strange), named)
-            problem = value.problem("RG152", words + f"where you trust it, say --plugin {named}")
+            problem = value.problem("RG152", words + f"if you trust it, pass --plugin {named}")
             self.notes.append(problem.as_warning())
 
 

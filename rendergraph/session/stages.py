@@ -51,7 +51,9 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     """
     for folder in selection.asset_roots:
         if not folder.is_dir():
-            text = f"'{folder}' is a file, a folder is needed" if folder.exists() else f"there is no folder '{folder}'"
+            text = (
+                f"'{folder}' is a file; a folder is expected" if folder.exists() else f"there is no folder '{folder}'"
+            )
             raise InputError(Problem("RG011", text, Place(Option("--asset-root"))))
     catalog = catalog or Catalog.discover(selection.plugins)
     limits = YamlLimits(**selection.allowed("yaml"))
@@ -76,7 +78,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
         catalog=catalog,
     )
     if spec.tree.get("rendergraph") is None:
-        text = "the file does not say which version of the format it is written in; begin it with rendergraph: 1"
+        text = "missing format version: add `rendergraph: 1` as the first line"
         note = spec.tree.problem("RG016", text).as_warning()
         spec = replace(spec, notes=(*spec.notes, note))
     return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps)

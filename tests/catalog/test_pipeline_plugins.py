@@ -156,7 +156,7 @@ def test_a_path_on_the_command_line_is_the_users_own(
         ("./in/../../times.frag", "RG012 './in/../../times.frag' lies outside"),
         ("./time.frag", "RG011 there is no file './time.frag'"),
         ("./folder.frag", "RG011 './folder.frag' is a folder"),
-        ("http://x/y.frag", "RG012 'http://x/y.frag' is an address; only files are read"),
+        ("http://x/y.frag", "RG012 'http://x/y.frag' is not a file path; only local files can be loaded"),
     ],
 )
 def test_a_shader_stays_inside_the_root(write: Write, effect: str, text: str) -> None:
@@ -336,10 +336,10 @@ def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.M
     (note,) = spec_of(folder / "p.yaml").notes
     assert str(note).splitlines()[0] == (
         f"{folder}/p.yaml:2:11: warning: RG152 './fx' has Python (evil.py), which is not run because a pipeline file "
-        f"names it; where you trust it, say --plugin {folder.name}/fx"
+        f"names it; if you trust it, pass --plugin {folder.name}/fx"
     )
     (folder / "p.yaml").write_text(pipeline("evil", "plugins: [./fx]\n"))
-    said = rf"RG102 node type 'evil' is Python, which no pipeline file runs; say --plugin {folder.name}/fx"
+    said = rf"RG102 node type 'evil' is Python, which a pipeline file cannot load; pass --plugin {folder.name}/fx"
     with pytest.raises(InputError, match=said):
         link(spec_of(folder / "p.yaml"), Catalog.discover())
     (folder / "p.yaml").write_text(pipeline("times", "plugins: [./fx]\n"))
@@ -352,7 +352,7 @@ def test_python_that_is_not_run_is_a_warning(write: Write, monkeypatch: pytest.M
     [
         ("[../fx]", "2:11: RG012 '../fx' lies outside"),
         ("[./none]", "2:11: RG011 there is no folder './none'"),
-        ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file, a folder is needed"),
+        ("[./p.yaml]", "2:11: RG011 './p.yaml' is a file; a folder is expected"),
         (
             "./fx",
             "2:10: RG106 'plugins': expected a list of folders and packages, as in plugins: [./effects, some-package], got './fx'",
@@ -375,7 +375,7 @@ def test_a_folder_has_a_plugins_size(write: Write, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("rendergraph.catalog.find.MOST_FILES", 30)
     (message, *_) = messages(folder / "p.yaml")
     assert message == (
-        "2:11: RG131 './fx' is no folder of plugins: it has more than 30 files; name the folder of the effects itself"
+        "2:11: RG131 './fx' is not a folder of plugins: it has more than 30 files; name the folder of the effects itself"
     )
 
 
@@ -427,7 +427,7 @@ def test_check_says_what_to_install_and_finds_the_rest(write: Write) -> None:
     assert messages(folder / "p.yaml") == [
         "2:11: RG130 the pipeline needs the plugin 'rendergraph-outline', which is not installed: "
         "pip install rendergraph-outline",
-        "4:16: RG102 there is no node type 'outline'; it may come with what is not installed: rendergraph-outline",
+        "4:16: RG102 there is no node type 'outline'; a missing package may provide it: rendergraph-outline",
         "5:59: RG111 node type 'tonemap' has no input 'depht'; available: gain, radiance",
     ]
 

@@ -269,7 +269,7 @@ def headed(text: str) -> str:
             ],
         ),
         ("doc: 'open", ["2:6: RG001 not valid YAML: the quote that starts here is not closed"]),
-        ("doc: a\ndoc: b", ["3:1: RG002 the key 'doc' stands here twice, first in line 2; remove one"]),
+        ("doc: a\ndoc: b", ["3:1: RG002 duplicate key 'doc', first in line 2; remove one"]),
         (
             "doc: 1\ninputs: 2\nparams: {strength: {min: x, uint: EV}}",
             [

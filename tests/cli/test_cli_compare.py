@@ -288,7 +288,7 @@ def test_a_sweep_s_file_is_checked_without_drawing(cli: Any, tmp_path: Path) -> 
         found = cli(verb, "study.yaml")
         assert found.code == 3
         assert found.err.splitlines()[0] == (
-            "study.yaml:1:1: RG101 this is no pipeline but a sweep; draw it with: rendergraph sweep FILE -o FOLDER"
+            "study.yaml:1:1: RG101 this file is a sweep, not a pipeline; run it with: rendergraph sweep FILE -o FOLDER"
         )
         assert found.err.count("RG") == 1
 

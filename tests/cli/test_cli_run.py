@@ -206,7 +206,7 @@ def test_no_picture_takes_the_place_of_a_texture_that_is_read(cli: Any, tmp_path
     ("words", "code", "message"),
     [
         (("run", "forward", "--asset-root", "none"), 3, "--asset-root: RG011 there is no folder 'none'"),
-        (("check", "forward", "--asset-root", "file"), 3, "--asset-root: RG011 'file' is a file, a folder is needed"),
+        (("check", "forward", "--asset-root", "file"), 3, "--asset-root: RG011 'file' is a file; a folder is expected"),
         (("run", "forward", "--asset-root", ""), 2, "invalid value for '--asset-root': '' is not the name of a file"),
         (("run", "forward", "--plugin", ""), 2, "invalid value for '--plugin': '' is not the name of a file"),
         (

@@ -124,7 +124,7 @@ def test_an_output_is_recorded_where_somebody_wants_it(also: bool) -> None:
     ends = [Endpoint("s", "color"), *([Endpoint("s", "spare")] if also else [])]
     found = expanded(BLUR, "image: b.blurred", *ends)
     assert [step.shaders[-1][1] for step in found.steps] == ["color.frag", *(["spare.frag"] if also else [])]
-    assert found.idle == {"b": "nothing that is wanted reads its outputs"}
+    assert found.idle == {"b": "no requested output depends on it"}
 
 
 def test_who_continues_a_texture_makes_its_next_version() -> None:
@@ -154,14 +154,14 @@ def test_an_optional_continued_texture_that_is_not_connected_is_the_nodes_own() 
 @pytest.mark.parametrize(
     ("pipeline", "shadows"),
     [
-        ("shadow-pcf", "shadows.visibility has no layers: it takes none of the scene's lights (18 point)"),
+        ("shadow-pcf", "shadows.visibility has no layers: it uses none of the scene's lights (18 point)"),
         ("forward", "sun.shadow_map has no layers: there is nothing to read"),
     ],
 )
 def test_a_node_that_finds_no_light_says_so(pipeline: str, shadows: str) -> None:
     culled = rg.load(pipeline, scene="many_lights").plan().schedule.culled
-    assert culled["sun"] == "sun.shadow_map has no layers: it takes none of the scene's lights (18 point)"
+    assert culled["sun"] == "sun.shadow_map has no layers: it uses none of the scene's lights (18 point)"
     assert culled["shadows"] == shadows
     apart = [f"light.{name}=null" for name in ("visibility", "lookup", "blended_lookup")]
     rest = rg.load(pipeline, scene="many_lights", sets=apart).plan()
-    assert rest.schedule.culled["shadows"] == "nothing that is wanted reads its outputs"
+    assert rest.schedule.culled["shadows"] == "no requested output depends on it"

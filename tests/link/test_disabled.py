@@ -95,13 +95,13 @@ def test_lists_keep_the_others_and_optional_inputs_are_left_open(toy_catalog: Ca
     assert not linked(CHAIN, toy_catalog, *off("lamp", "shadows"))["light"].inputs
     graph = linked(DEFERRED, toy_catalog, *off("ao"))
     assert "occlusion" not in graph["light"].inputs
-    with pytest.raises(InputError, match="RG132 node 'ao' is disabled, and nothing stands in for 'occlusion'"):
+    with pytest.raises(InputError, match="RG132 node 'ao' is disabled, and nothing replaces 'occlusion'"):
         endpoint(graph, "ao.occlusion")
 
 
 def test_who_cannot_do_without_says_so_once_a_link(toy_catalog: Catalog) -> None:
     found = problems(DEFERRED, toy_catalog, *off("gbuffer"))
-    ends = "but 'gbuffer' is disabled (--set gbuffer.enabled=false) and nothing that goes into it can stand in"
+    ends = "but 'gbuffer' is disabled (--set gbuffer.enabled=false) and none of its inputs can replace its output"
     assert len(found) == 2
     assert found[0].startswith(f"<text>:4:36: RG132 'ao.depth' needs 'gbuffer.depth', {ends}")
     assert f"RG132 'light.albedo', 'light.normal', 'light.depth' need 'gbuffer', {ends}" in found[1]

@@ -410,7 +410,7 @@ def test_any_value_is_written_so_that_it_reads_back(value: Any) -> None:
 
     tree = from_plain({"params": {"x": value}}, Source("here"))
     try:
-        found = parse(to_yaml(tree, origins=True)).value["params"]["x"]
+        found = parse(to_yaml(tree, origins=True)).root.plain()["params"]["x"]
     except InputError as error:  # lone surrogates and the like cannot stand in YAML at all
         assert all(problem.code == "RG008" for problem in error.problems)  # noqa: PT017  # any other error fails here
     else:

@@ -120,11 +120,11 @@ CALLS = {
     'steps.connected("source")': "RG423 connected's argument is the text 'source'; give the port itself, self.source",
     'steps.used("color")': "RG423 used's argument is the text 'color'; give the port itself, self.color",
     # what no driver draws
-    'steps.fullscreen("wrong.frag", out={"color": self.color, "small": self.small})': "RG425 'a.color' is 16×8, but 'a.small' is 8×4; the targets of one step are alike in size, samples and layers",
+    'steps.fullscreen("wrong.frag", out={"color": self.color, "small": self.small})': "RG425 'a.color' is 16×8, but 'a.small' is 8×4; all targets of a step must have the same size, samples and layers",
     'steps.fullscreen("wrong.frag", source=self.color, out=self.color)': "RG422 it samples 'a.color' in the step that writes it; blend, sample another mip or layer, or go through an "
     "`Internal`",
-    'steps.fullscreen("wrong.frag", out=self.color, state=State(blend=(Blend("dst_color", "zero"),)))': "RG429 it blends onto 'a.color', which holds nothing yet; declare it with `clear=`",
-    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))': "RG429 it tests depth against 'a.nearest', which holds nothing yet; declare it with `clear=0.0`",
+    'steps.fullscreen("wrong.frag", out=self.color, state=State(blend=(Blend("dst_color", "zero"),)))': "RG429 it blends onto 'a.color', whose contents are undefined; declare it with `clear=`",
+    'steps.fullscreen("wrong.frag", out={"color": self.color, "nearest": self.nearest}, state=State(depth_test=True))': "RG429 it tests depth against 'a.nearest', whose contents are undefined; declare it with `clear=0.0`",
     # Python's own
     'steps.fulscreen("wrong.frag")': "RG420 AttributeError: 'Steps' object has no attribute 'fulscreen'; did "
     "you mean 'fullscreen'?",
