@@ -319,9 +319,7 @@ def test_python_in_its_folder_is_never_imported(write: Write) -> None:
 def test_settings_that_do_not_count_are_said(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = write({"p/fx/times.frag": EFFECT, "p/rendergraph.toml": 'plugins = ["fx"]', "p/p.yaml": pipeline("times")})
     monkeypatch.chdir(folder)
-    said = (
-        r"RG102 there is no node type 'times'; p/rendergraph\.toml names plugins, but only for those who stand in its"
-    )
+    said = r"RG102 there is no node type 'times'; p/rendergraph\.toml names plugins, but they load only when you work inside its"
     with pytest.raises(InputError, match=said):
         link(spec_of(Path("p/p.yaml")), Catalog.discover(), ())
     monkeypatch.chdir(folder / "p")

@@ -302,7 +302,7 @@ def test_targets_that_no_driver_draws_together(bench: Any) -> None:
     shaders = {"mixed.frag": "out float color; out float layers; void main() { color = layers = 1.0; }"}
     text = "nodes: {m: {type: mixed}}\noutputs: {image: m.color, two: m.layers}"
     with pytest.raises(
-        InputError, match=r"RG425 .*'m.color' is a plain 2D target, but 'm.layers' is 2 layers; the tar"
+        InputError, match=r"RG425 .*'m.color' is a plain 2D target, but 'm.layers' is 2 layers; all tar"
     ):
         bench.pipeline(text, Mixed, shaders=shaders).check()
 
