@@ -11,7 +11,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.allocate import Physical
-from rendergraph.compile.memory import Memory
+from rendergraph.compile.memory import Memory, TexturePool
 from rendergraph.gl import textures
 from rendergraph.gl.saved_state import settle
 from rendergraph.steps import Resource
@@ -37,7 +37,7 @@ def memory_of(device: Any, storage: str, viewed: str) -> Memory:
         placement=dict.fromkeys(descs, (0,)),
         resources={name: Resource(name, desc) for name, desc in descs.items()},
     )
-    return Memory(device, plan, pytest.fail)
+    return Memory(device, plan, pytest.fail, TexturePool(device))
 
 
 def expected(name: str) -> npt.NDArray[np.float64]:
