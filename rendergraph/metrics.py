@@ -1,4 +1,4 @@
-"""How unlike two pictures are: RMSE, PSNR, SSIM and FLIP, each with what it was computed on.
+"""Errors of pictures: RMSE, PSNR, SSIM and FLIP.
 
 | metric | on display-referred pictures | on scene-linear ones |
 |---|---|---|
@@ -7,10 +7,10 @@
 | SSIM | of the encoded values, the mean of R, G and B | of the values clipped to 0…1 and encoded |
 | FLIP | LDR-FLIP, the mean over pixels | HDR-FLIP, exposures from the reference |
 
-Of textures that are neither, such as occlusion or depth (`values`): RMSE of the values as they are; the others of
-values 0…1, stretched by the reference's least and greatest where those lie outside.
+Textures that are neither, such as occlusion or depth (`values`), have the RMSE of their values; the other metrics map
+the reference's minimum and maximum to 0…1 if they lie outside.
 
-Alpha does not count. SSIM is Wang et al., "Image Quality Assessment", 2004: an 11×11 Gaussian window of standard
+Alpha is ignored. SSIM is Wang et al., "Image Quality Assessment", 2004: an 11×11 Gaussian window of standard
 deviation 1.5, K1 = 0.01, K2 = 0.03. FLIP is Andersson et al., "FLIP: A Difference Evaluator for Alternating Images",
 2020, and "Visualizing Errors in Rendered High Dynamic Range Images", 2021, as OpenImageIO computes them.
 """
@@ -43,7 +43,7 @@ _SIGMA = 1.5
 
 @dataclass(frozen=True)
 class Metrics:
-    """The four figures of one pair; equal pictures have 0, None, 1 and 0. Plugins' figures by name."""
+    """The four metrics of a pair; equal pictures have 0, None, 1 and 0. Plugins' metrics are by name."""
 
     rmse: float
     psnr: float | None
@@ -52,9 +52,8 @@ class Metrics:
     plugins: Mapping[str, float] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """The fields by name; `plugin_metrics` where there are any."""
-        found: dict[str, Any] = {"rmse": self.rmse, "psnr": self.psnr, "ssim": self.ssim, "flip": self.flip}
-        return found | ({"plugin_metrics": dict(self.plugins)} if self.plugins else {})
+        plugins = {"plugin_metrics": dict(self.plugins)} if self.plugins else {}
+        return {"rmse": self.rmse, "psnr": self.psnr, "ssim": self.ssim, "flip": self.flip, **plugins}
 
 
 SAME = Metrics(0.0, None, 1.0, 0.0)
@@ -69,18 +68,16 @@ def measure(
     names: tuple[str, str] = ("the picture", "the reference"),
     plugins: Sequence[Added[Metric]] = (),
 ) -> tuple[Metrics, Pixels]:
-    """All figures of a picture against a reference, and FLIP's map of where they differ.
+    """Return the metrics of a picture against a reference, and FLIP at each pixel: (height, width), 0…1.
+
+    The metrics are NaN if a picture contains NaN or infinity.
 
     Args:
-        image, reference: (height, width, channels), uint8 or 0…1 where `display`, linear light where `linear`, anything
-            where `values`.
-        encoding: what the values of both are.
-        names: what messages call them.
+        image, reference: (height, width, channels), uint8 or 0…1 for `display`, linear light for `linear`, any values
+            for `values`.
+        encoding: of both.
+        names: of both, for messages.
         plugins: metrics that plugins add.
-
-    Returns:
-        The figures, and FLIP at each pixel: (height, width), 0…1. The figures are NaN where a picture holds NaN or
-        infinity.
 
     Raises:
         InputError: the sizes differ, or a plugin's metric fails.
@@ -100,33 +97,25 @@ def measure(
 
 
 def same(pixels: Pixels, plugins: Sequence[Added[Metric]] = ()) -> Metrics:
-    """A picture against itself; what a plugin thinks of that, it is asked.
-
-    Raises:
-        InputError: a plugin's metric fails.
-    """
+    """Return the metrics of a picture against itself; plugins compute theirs."""
     own = colors(pixels)
     more = {metric.name: _figure(metric, own, own, ("a picture", "itself")) for metric in plugins}
     return replace(SAME, plugins=more)
 
 
 def _figure(metric: Added[Metric], a: Floats, b: Floats, names: tuple[str, str]) -> float:
-    """What a plugin's metric says; it gets copies, so that it cannot spoil what others see."""
+    """Return a plugin's metric; it gets copies, so that it cannot change the pictures."""
     what = f"metric '{metric.name}' of '{names[0]}' against '{names[1]}'"
-    found = metric.run("RG497", f"{what} cannot be computed", a.copy(), b.copy())
+    value = metric.run("RG497", f"{what} cannot be computed", a.copy(), b.copy())
     try:
-        return float(found)
+        return float(value)
     except (TypeError, ValueError):
-        text = f"{what} cannot be computed: plugin '{metric.plugin}' gave {type(found).__name__}, not a number"
+        text = f"{what} cannot be computed: plugin '{metric.plugin}' gave {type(value).__name__}, not a number"
         raise InputError(Problem("RG498", text, Place(shown_file(metric.file)))) from None
 
 
 def check_sizes(a: Pixels, b: Pixels, names: tuple[str, str]) -> None:
-    """Say that two pictures cannot be compared.
-
-    Raises:
-        InputError: they differ in width or height.
-    """
+    """Raise an InputError if two pictures differ in width or height."""
     if a.shape[:2] != b.shape[:2]:
         sizes = [f"'{name}' has {p.shape[1]}×{p.shape[0]} pixels" for name, p in zip(names, (a, b), strict=True)]
         text = f"{sizes[0]}, but {sizes[1]}; render both at one size: --size {b.shape[1]}x{b.shape[0]}"
@@ -134,7 +123,7 @@ def check_sizes(a: Pixels, b: Pixels, names: tuple[str, str]) -> None:
 
 
 def colors(pixels: Pixels) -> Floats:
-    """The R, G and B of a picture as floats, 8-bit and 16-bit integers as 0…1; grey becomes three equal channels."""
+    """Return R, G and B as floats, 8-bit and 16-bit integers as 0…1; grey becomes three equal channels."""
     shaped = pixels[..., np.newaxis] if pixels.ndim == 2 else pixels
     shaped = shaped[..., :3] if shaped.shape[-1] >= 3 else np.repeat(shaped[..., :1], 3, axis=-1)
     scale = np.iinfo(shaped.dtype).max if np.issubdtype(shaped.dtype, np.unsignedinteger) else 1
@@ -142,7 +131,7 @@ def colors(pixels: Pixels) -> Floats:
 
 
 def _values(*pixels: Pixels) -> tuple[Floats, ...]:
-    """The channels that all have, a fourth left out, as floats; those of 8 and 16 bits as 0…1."""
+    """Return the channels that all pictures have, without alpha, as floats; 8-bit and 16-bit integers as 0…1."""
     shaped = [each[..., np.newaxis] if each.ndim == 2 else each for each in pixels]
     count = min(3, *(each.shape[-1] for each in shaped))
     scales = [np.iinfo(each.dtype).max if each.dtype in (np.uint8, np.uint16) else 1 for each in shaped]
@@ -150,7 +139,7 @@ def _values(*pixels: Pixels) -> tuple[Floats, ...]:
 
 
 def _unit(values: Floats, reference: Floats) -> Floats:
-    """Values as a picture of 0…1: as they are where the reference's are, else stretched by its least and greatest."""
+    """Return values as a picture of 0…1; if the reference's lie outside, its minimum and maximum are mapped there."""
     known = reference[np.isfinite(reference)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     if low < 0 or high > 1:
@@ -160,21 +149,21 @@ def _unit(values: Floats, reference: Floats) -> Floats:
 
 
 def rmse(a: Pixels, b: Pixels) -> float:
-    """Root of the mean squared difference over pixels and channels; NaN where a value is NaN or infinite."""
+    """Return the root mean square difference over pixels and channels; NaN if a value is NaN or infinite."""
     with np.errstate(invalid="ignore"):  # infinity against infinity
         error = float(np.mean(np.square(a.astype(np.float64) - b)))
     return math.sqrt(error) if math.isfinite(error) else math.nan
 
 
 def psnr(error: float) -> float | None:
-    """Peak signal-to-noise ratio in dB of an RMSE whose peak is 1; None where the RMSE is 0."""
+    """Return the peak signal-to-noise ratio in dB of an RMSE whose peak is 1; None for an RMSE of 0."""
     return -20.0 * math.log10(error) if error > 0 else None
 
 
 def ssim(a: Pixels, b: Pixels) -> float:
-    """Mean structural similarity of two pictures of values 0…1: 1 where they are equal.
+    """Return the mean structural similarity of two pictures of values 0…1, in windows inside the picture.
 
-    Windows lie wholly inside the picture; one with a side under 11 pixels is continued by reflection instead.
+    Pictures with a side under 11 pixels are continued by reflection.
     """
     if min(a.shape[:2]) < _WINDOW:
         around = [(_WINDOW // 2,) * 2] * 2 + [(0, 0)]
@@ -192,7 +181,7 @@ def _ssim(a: Floats, b: Floats) -> float:
 
 
 def _windowed(x: Floats) -> Floats:
-    """The Gaussian mean of every window inside the picture."""
+    """Return the Gaussian mean of every window inside the picture."""
     weights = np.exp(-0.5 * np.square((np.arange(_WINDOW) - _WINDOW // 2) / _SIGMA))
     for axis in (0, 1):
         parts = np.lib.stride_tricks.sliding_window_view(x, _WINDOW, axis)
@@ -201,11 +190,11 @@ def _windowed(x: Floats) -> Floats:
 
 
 def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray[np.float32]:
-    """FLIP at each pixel, 0…1; `b` is the reference.
+    """Return FLIP at each pixel, 0…1; `b` is the reference.
 
-    OpenImageIO takes linear light for both forms, so display values are decoded first. HDR-FLIP chooses its exposures
-    from the reference alone: a `maxluminance` of 0 is what the authors' own program computes. A reference without light
-    gives no exposure; light is then compared as a display would show it unexposed, clipped to 0…1.
+    OpenImageIO expects linear light for both forms, so display values are decoded first. HDR-FLIP chooses exposures by
+    the reference alone; a `maxluminance` of 0 computes the same as the authors' program. Without light in the reference
+    there is no exposure; light is then clipped to 0…1, as an unexposed display would show it.
     """
     import OpenImageIO as oiio  # for this metric alone
 
@@ -218,16 +207,16 @@ def flip(a: Pixels, b: Pixels, *, encoding: Encoding = "display") -> npt.NDArray
     ]
     linear = [np.nan_to_num(x, nan=0.0, posinf=65504.0, neginf=0.0) for x in linear]
     test, reference = (oiio.ImageBuf(x) for x in linear)
-    found = oiio.ImageBufAlgo.FLIP_diff(
+    result = oiio.ImageBufAlgo.FLIP_diff(
         reference, test, hdr=int(hdr), maxluminance=0.0 if hdr else 2.0, ppd=PIXELS_PER_DEGREE
     )
-    if found.has_error:
-        raise RuntimeError(f"FLIP cannot be computed: {found.geterror()}")
-    return np.asarray(found.get_pixels(oiio.FLOAT), np.float32)[..., 0]
+    if result.has_error:
+        raise RuntimeError(f"FLIP cannot be computed: {result.geterror()}")
+    return np.asarray(result.get_pixels(oiio.FLOAT), np.float32)[..., 0]
 
 
 def description() -> dict[str, Any]:
-    """Versions and parameters of the metrics, for results that outlive the program."""
+    """Return versions and parameters of the metrics, for results that outlive the program."""
     return {
         "rmse": {"on": "sRGB-encoded R, G, B, 0…1; linear values for scene-linear references"},
         "psnr": {"peak": 1.0},

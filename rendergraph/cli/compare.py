@@ -48,18 +48,13 @@ def _threshold(text: str) -> Threshold:
 
 
 def check_thresholds(thresholds: Sequence[Threshold], extensions: Extensions) -> None:
-    """Check that each threshold has a built-in metric or one of a plugin.
-
-    Raises:
-        UsageError: there is no such metric.
-    """
+    """Check that each threshold has a built-in metric or one of a plugin."""
     names = [*_LIMITED, *(added.name for added in extensions.metrics())]
     for metric in dict.fromkeys(one.metric for one in thresholds if one.metric not in names):
         text = f"--fail-above: there is no metric '{metric}'{suggestion(metric, names)}"
         raise UsageError([Problem("RG500", text), *extensions.problems])
 
 
-WITH = options.Parsed("'PATH=VALUE …'", options.settings)
 reference_option = click.option(
     "--reference",
     metavar="FILE|PIPELINE",
@@ -99,7 +94,7 @@ threshold_option = click.option(
     "--with",
     "withs",
     multiple=True,
-    type=WITH,
+    type=options.Parsed("'PATH=VALUE …'", options.settings),
     shell_complete=options.offered("settings"),
     help="Compare the pipeline with these settings, several in one text; a single one with the unchanged pipeline.",
 )
@@ -210,11 +205,7 @@ def _are_pictures(names: Sequence[str], reference: str | None, select: options.S
 
 
 def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
-    """Return one of the pipelines; where an -s fits only another one, the message says how to apply it there.
-
-    Raises:
-        InputError: with all mistakes.
-    """
+    """Return one of the pipelines; where an -s fits only another one, the message says how to apply it there."""
     try:
         return options.linked(select(name))
     except InputError as error:
@@ -235,11 +226,7 @@ def _load(name: str, names: Sequence[str], select: options.Select) -> Pipeline:
 
 
 def _with(settings: Sequence[str], selection: Selection) -> Pipeline:
-    """Return the pipeline with the settings of one variant; mistakes in them are located at `--with`.
-
-    Raises:
-        InputError: with all mistakes.
-    """
+    """Return the pipeline with the settings of one variant; mistakes in them are located at `--with`."""
     try:
         return options.linked(replace(selection, sets=(*selection.sets, *settings)))
     except InputError as error:
@@ -264,12 +251,7 @@ def load_reference(reference: str | None, select: options.Select) -> Path | Pipe
 
 
 def check_page(output: Path) -> None:
-    """Check, before anything is rendered, that a report can be written.
-
-    Raises:
-        UsageError: the file is not an HTML page.
-        InputError: the folder is missing or cannot be written to.
-    """
+    """Check, before anything is rendered, that a report can be written."""
     from rendergraph.images import check_target
 
     if output.suffix.lower() not in (".html", ".htm"):
@@ -299,7 +281,8 @@ def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[obje
         m = result.metrics
         psnr = "∞" if m.psnr is None else f"{m.psnr:.2f}"
         errors = (f"{m.flip:.4f}", f"{m.rmse:.4f}", psnr, f"{m.ssim:.4f}")
-        rows.append((result.name, *errors, *(_figure(result.columns.get(name)) for name in more)))
+        figures = ("–" if (own := result.columns.get(name)) is None else f"{own:.4g}" for name in more)
+        rows.append((result.name, *errors, *figures))
     if not all(result.memory for result in results):
         return heads, rows
     again = ("repeats",) if any(result.times.repeated for result in results) else ()
@@ -307,10 +290,6 @@ def summary(results: Sequence[Result]) -> tuple[tuple[str, ...], list[tuple[obje
     return (*heads, "GPU ms", "10–90 %", *again, "CPU ms", "passes", "textures"), [
         (*row, *cost) for row, cost in zip(rows, costs, strict=True)
     ]
-
-
-def _figure(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"
 
 
 def _costs(result: Result, *, repeated: bool) -> tuple[object, ...]:

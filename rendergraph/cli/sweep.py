@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,6 @@ from rendergraph.errors import InputError, Problem, RenderError, UsageError
 if TYPE_CHECKING:
     from rendergraph.compare import Axis, Space, Sweep
     from rendergraph.compare.listing import Listing
-    from rendergraph.compare.space import Sampling
     from rendergraph.compare.sweepfile import SweepFile
     from rendergraph.session import Selection
 
@@ -36,10 +36,6 @@ def _group(text: str) -> tuple[str, ...]:
     return paths
 
 
-AXIS = options.Parsed("PATH=V,V,…", _axis)
-GROUP = options.Parsed("PATH,PATH", _group)
-
-
 @click.command("sweep", no_args_is_help=True)
 @click.argument("pipeline", shell_complete=options.offered("pipelines"))
 @click.option(
@@ -47,11 +43,17 @@ GROUP = options.Parsed("PATH,PATH", _group)
     "--axis",
     "axes",
     multiple=True,
-    type=AXIS,
+    type=options.Parsed("PATH=V,V,…", _axis),
     shell_complete=options.offered("settings"),
     help="Values of a path that -s takes: 8,16, or 8:64:8, log:0.1:10:5; 0.1:2 for --samples.",
 )
-@click.option("--zip", "zipped", multiple=True, type=GROUP, help="Step through the values of these axes together.")
+@click.option(
+    "--zip",
+    "zipped",
+    multiple=True,
+    type=options.Parsed("PATH,PATH", _group),
+    help="Step through the values of these axes together.",
+)
 @click.option("--samples", type=click.IntRange(1, 10_000), metavar="N", help="Render N samples, not all combinations.")
 @click.option(
     "--sampling", type=click.Choice(["latin", "random"]), help="One sample in each part of every axis, or anywhere."
@@ -97,10 +99,6 @@ GROUP = options.Parsed("PATH,PATH", _group)
 def command(
     pipeline: str,
     axes: tuple[Axis, ...],
-    zipped: tuple[tuple[str, ...], ...],
-    samples: int | None,
-    sampling: Sampling | None,
-    seed: int | None,
     out: Path | None,
     listing: bool,
     as_csv: bool,
@@ -134,7 +132,7 @@ def command(
     from rendergraph.session import Pipeline
 
     file = _file(pipeline)
-    space = _space(file, axes, zipped, samples, sampling, seed)
+    space = _space(file, axes, **{name: settings.pop(name) for name in ("zipped", "samples", "sampling", "seed")})
     given = {name: value for name, value in settings.items() if value not in (None, ())}
     if file is not None:
         given = {**file.options, **given}
@@ -156,7 +154,8 @@ def command(
 
         with at_its_lines(file):
             prepared = prepare(base, space, out or Path(), against, how)
-            _show(list_sweep(prepared, out, how), as_json=as_json)
+            runs = list_sweep(prepared, out, how)
+        emit_json(runs.as_json()) if as_json else _show(runs)
         return
     if out is None:
         raise UsageError(Problem("RG500", "a sweep needs a folder for its runs: -o DIR; --list needs none"))
@@ -222,34 +221,19 @@ def at_its_lines(file: SweepFile | None) -> Iterator[None]:
         raise error if file is None else file.placed(error) from None
 
 
-def _space(
-    file: SweepFile | None,
-    axes: tuple[Axis, ...],
-    zipped: tuple[tuple[str, ...], ...],
-    samples: int | None,
-    sampling: Sampling | None,
-    seed: int | None,
-) -> Space:
+def _space(file: SweepFile | None, axes: tuple[Axis, ...], **sampling: Any) -> Space:
     """Return the axes of a file and of the options, which override those of the file."""
     from rendergraph.compare import Space
 
     base = Space(()) if file is None else file.space
     named = {axis.path for axis in axes}
-    return Space(
-        (*(axis for axis in base.axes if axis.path not in named), *axes),
-        zipped or base.zipped,
-        samples or base.samples,
-        sampling or base.sampling,
-        base.seed if seed is None else seed,
-    )
+    merged = (*(axis for axis in base.axes if axis.path not in named), *axes)
+    given = {name: value for name, value in sampling.items() if value not in (None, ())}
+    return dataclasses.replace(base, axes=merged, **given)
 
 
 def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, ...]]:
-    """Check a sweep's file and its runs, and return the number of runs and the warnings.
-
-    Raises:
-        InputError: with all mistakes.
-    """
+    """Check a sweep's file and its runs, and return the number of runs and the warnings."""
     from rendergraph.compare import SweepOptions, check_search
     from rendergraph.compare.prepare import prepare
     from rendergraph.compare.sweepfile import read_sweep
@@ -260,13 +244,13 @@ def check_file(path: Path, select: options.Select) -> tuple[int, tuple[Problem, 
     with at_its_lines(file):
         against = shared.load_reference(file.reference, select)
         base = Pipeline(select(file.pipeline))
-        options = SweepOptions(**file.options)
-        if options.minimise:
-            prepared = check_search(base, file.space, against, options.minimise, options.metric)
+        how = SweepOptions(**file.options)
+        if how.minimise:
+            prepared = check_search(base, file.space, against, how.minimise, how.metric)
         else:
-            prepared = prepare(base, file.space, Path(), against, options)
+            prepared = prepare(base, file.space, Path(), against, how)
     warnings = dict.fromkeys(problem for run in prepared.runs for problem in run.planned.linked.warnings)
-    return options.budget if options.minimise else len(prepared.runs), tuple(warnings)
+    return how.budget if how.minimise else len(prepared.runs), tuple(warnings)
 
 
 def with_file(file: SweepFile, select: options.Select) -> options.Select:
@@ -306,10 +290,7 @@ def _value(value: float) -> str:
     return f"{value:.0f}" if value >= 1e4 else f"{value:.4g}"
 
 
-def _show(found: Listing, *, as_json: bool) -> None:
-    if as_json:
-        emit_json(found.as_json())
-        return
+def _show(found: Listing) -> None:
     document, runs = found.as_json(), found.prepared.runs
     emit(
         f"{amount(len(runs), 'run')} against {document['reference']}: "

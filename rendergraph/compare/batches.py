@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from msgspec.structs import replace
 
 from rendergraph.compare.results import Pixels, passes
+from rendergraph.compare.space import unique_names
 from rendergraph.compare.timing import Times, times_repeated
 from rendergraph.declare import InOut, TextureInfo
 from rendergraph.errors import InputError
@@ -41,12 +42,7 @@ Key: TypeAlias = "tuple[int, str]"
 
 @dataclass(frozen=True)
 class MergedGraph:
-    """Several graphs as one.
-
-    Attributes:
-        graph: its outputs are called `number/name`.
-        names: for each graph, its nodes' ids to ids in `graph`.
-    """
+    """Several graphs as one, and for each of them its nodes' ids to ids in the merged graph."""
 
     graph: Graph
     names: tuple[Mapping[str, str], ...]
@@ -79,13 +75,7 @@ class RenderedVariant:
 
 
 def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
-    """Return the variants in as few batches as possible, those together that share most of their first passes.
-
-    Args:
-        variants: with the same scene, camera and size.
-        numbers: which of them.
-        most_bytes: limit for the textures of a batch; a single variant may exceed it.
-    """
+    """Return these variants in as few batches as possible; a single variant may exceed the limit for textures."""
     groups = group_similar(variants, numbers, MOST_RUNS)
     return [batch for group in groups for batch in fitting_batches(variants, group, most_bytes)]
 
@@ -153,13 +143,7 @@ def measure_batch(
 ) -> Iterator[tuple[int, Times]]:
     """Yield the times of a batch's variants, each the sum of its own passes.
 
-    Args:
-        gpu: where to render.
-        variants: all of them.
-        batch: which of them.
-        frames: number of frames of each measurement.
-        repeats: number of measurements, each from the first frame on, after a frame to warm up.
-        warm: whether the batch has just been rendered.
+    Each measurement starts at the first frame, after a frame to warm up, unless the batch is `warm` from rendering.
     """
     times = []
     for number in range(repeats):
@@ -183,7 +167,7 @@ def node_types(planned: Planned) -> dict[str, str]:
 def merge(graphs: Sequence[Graph]) -> MergedGraph:
     """Return one graph that renders the outputs of all of them; they must have one scene and one size."""
     classes = _equivalence_classes(graphs)
-    ids = _class_ids(graphs, classes)
+    ids = _class_ids(classes)
     names = tuple(
         {node.id: ids[classes[number, node.id]] for node in graph.nodes} for number, graph in enumerate(graphs)
     )
@@ -251,18 +235,9 @@ def _followers(graphs: Sequence[Graph]) -> dict[Key, list[tuple[str, Key, str]]]
     return {key: sorted(followers) for key, followers in table.items()}
 
 
-def _class_ids(graphs: Sequence[Graph], classes: Mapping[Key, int]) -> dict[int, str]:
+def _class_ids(classes: Mapping[Key, int]) -> dict[int, str]:
     """Return an id for each class: that of its first member, with a number behind if it is taken."""
-    ids: dict[int, str] = {}
-    taken = {node.id for graph in graphs for node in graph.nodes}
-    used: set[str] = set()
+    first: dict[int, str] = {}
     for (_, name), number in classes.items():
-        if number in ids:
-            continue
-        unique, count = name, 1
-        while unique in used or (count > 1 and unique in taken):
-            count += 1
-            unique = f"{name}-{count}"
-        used.add(unique)
-        ids[number] = unique
-    return ids
+        first.setdefault(number, name)
+    return dict(zip(first, unique_names(list(first.values())), strict=True))

@@ -16,11 +16,10 @@ from rendergraph.compare.prepare import (
     prepare,
     prepare_variants,
     read_picture,
-    unique_names,
 )
 from rendergraph.compare.results import Comparison, Reference, Result, Search, measure_against, pareto
 from rendergraph.compare.runner import Runner, SweepRunner
-from rendergraph.compare.space import Axes, Space, typed
+from rendergraph.compare.space import Axes, Space, typed, unique_names
 from rendergraph.compare.store import RUN, Failure, SweepFolder, locked
 from rendergraph.diff import diff
 from rendergraph.errors import InputError, Problem, UsageError

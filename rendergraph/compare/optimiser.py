@@ -167,11 +167,15 @@ def search(
             optimiser.learn(trials, parts[-1].comparison.results)
         runs = [run for run, _ in optimiser.asked]
         whole = render(runs, resume=True)
+    results = whole.comparison.results
+    values = {result.name: own for result in results if (own := objective_values(result, objectives)) is not None}
+    names = {_key(result.settings): result.name for result in results}
+    order = tuple(names.get(_key(run)) for run in runs)
     counts = ("executed", "alone", "resumed", "timed", "redrawn", "torn")
     return replace(
         whole,
         space=replace(space, chosen=tuple(runs)),
-        search=_summary(whole.comparison.results, runs, objectives, budget),
+        search=Search(objectives, budget, order, values, pareto_front(values)),
         **{name: sum(getattr(part, name) for part in parts) for name in counts},
     )
 
@@ -183,11 +187,7 @@ def check_search(
     minimise: Sequence[str],
     metric: str | None = None,
 ) -> Prepared:
-    """Check everything about a search that can be checked without GL, and return the runs at the ends of the axes.
-
-    Raises:
-        InputError: as from `search`.
-    """
+    """Check everything about a search that can be checked without GL, and return the runs at the ends of the axes."""
     space.check(spans=True)
     problems = []
     if reference is None:
@@ -211,14 +211,6 @@ def _ends(space: Space) -> Iterator[dict[str, str]]:
     yield first
     for path, values in ends.items():
         yield from ({**first, path: value} for value in values[1:])
-
-
-def _summary(
-    results: Sequence[Result], runs: Sequence[Mapping[str, str]], objectives: tuple[str, ...], budget: int
-) -> Search:
-    values = {result.name: own for result in results if (own := objective_values(result, objectives)) is not None}
-    names = {_key(result.settings): result.name for result in results}
-    return Search(objectives, budget, tuple(names.get(_key(run)) for run in runs), values, pareto_front(values))
 
 
 def _key(settings: Mapping[str, str]) -> Settings:

@@ -16,7 +16,7 @@ from msgspec import Struct, structs
 from rendergraph.compare.batches import MOST_BYTES
 from rendergraph.compare.fingerprint import file_digest, run_key
 from rendergraph.compare.results import Pixels, Reference
-from rendergraph.compare.space import Axes, Space, pipelines, run_name
+from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_names
 from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.metrics import Encoding, check_sizes
 from rendergraph.session.made import at_time, described, is_picture
@@ -87,20 +87,10 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
     events: Events | None = None
 
     def replace(self, **settings: Any) -> Self:
-        """Return a copy with other settings.
-
-        Raises:
-            TypeError: there is no such setting.
-        """
         return structs.replace(self, **settings)
 
     def open_executor(self, tasks: int, *, travels: bool) -> AbstractContextManager[Executor]:
-        """Open the executor for a number of tasks; `travels` tells whether other processes can do them.
-
-        Raises:
-            UsageError: there is no such executor, or a package that it needs is missing.
-            RenderError: the cluster cannot be reached.
-        """
+        """Open the executor for a number of tasks; `travels` tells whether other processes can do them."""
         from rendergraph.farm.executors import make_executor  # a sweep is checked without it
 
         return make_executor(
@@ -116,16 +106,9 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One variant of a comparison, or one combination of a sweep.
+    """One variant of a comparison, or one combination of a sweep, which has settings and a folder.
 
-    Attributes:
-        name: unique, and the name of its folder.
-        planned: the pipeline with the settings.
-        output: the compared output.
-        frame: number of the compared frame.
-        settings: path to value.
-        folder: where a sweep keeps it.
-        reference_key: what decides the reference's picture.
+    `reference_key` is what decides the picture that it is measured against.
     """
 
     name: str
@@ -195,11 +178,7 @@ def prepare(
     options: SweepOptions = SweepOptions(),
     **settings: Any,
 ) -> Prepared:
-    """Plan the runs of a sweep, with the arguments of `sweep`.
-
-    Raises:
-        InputError: as from `sweep`, except for mistakes that concern the folder.
-    """
+    """Plan the runs of a sweep, with the arguments of `sweep`."""
     options = options.replace(**settings)
     space = Space.of(axes)
     space.check()
@@ -229,11 +208,7 @@ def prepare(
 def prepare_variants(
     variants: Sequence[Pipeline], reference: Path | Pipeline | None, options: SweepOptions, names: Sequence[str] = ()
 ) -> Prepared:
-    """Plan pipelines, which already have the measured port, with the scene and size of the first one.
-
-    Raises:
-        InputError: a mistake in a pipeline, or the pictures cannot be compared.
-    """
+    """Plan pipelines, which already have the measured port, with the scene and size of the first one."""
     others = [reference] if isinstance(reference, Pipeline) else []
     matched, notes = match_scene_and_size([*variants, *others])
     planned = [pipeline.check() for pipeline in matched]
@@ -285,13 +260,7 @@ def named_reference(reference: Path | Pipeline | str | None) -> Path | Pipeline 
 def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = "") -> tuple[Pixels, Encoding]:
     """Read a reference picture; floats are linear light, integers are display-referred.
 
-    Args:
-        path: the file.
-        size: width and height that it must have, if known.
-        name: of the variant that is compared with it, for the message.
-
-    Raises:
-        InputError: it cannot be read, has layers, or another size.
+    If a size is given, it must have the same; `name` is that of the variant of this size, for the message.
     """
     from rendergraph.images import read  # a sweep is checked without OpenImageIO
 
@@ -305,11 +274,7 @@ def read_picture(path: Path, size: tuple[int, int] | None = None, name: str = ""
 
 
 def measured_at(pipeline: Pipeline, metric: str | None) -> Pipeline:
-    """Return the pipeline with an additional output: the port that is measured instead of its picture.
-
-    Raises:
-        InputError: there is no such port, or it is not a picture.
-    """
+    """Return the pipeline with an additional output: the port that is measured instead of its picture."""
     if metric is None:
         return pipeline
     measured, place = pipeline.patch({"outputs": {METRIC: metric}}), Place(Option("--metric", metric))
@@ -350,11 +315,7 @@ def match_scene_and_size(pipelines: Sequence[Pipeline]) -> tuple[list[Pipeline],
 
 
 def compared_output(graphs: Sequence[Graph], encoding: Encoding | None, *, measured: bool) -> tuple[str, Encoding]:
-    """Return the output that all pipelines have and that fits the reference picture's encoding, and its own encoding.
-
-    Raises:
-        InputError: a pipeline lacks it.
-    """
+    """Return the output that all pipelines have and that fits the reference picture, and its own encoding."""
     if measured:
         return METRIC, graphs[0].textures[graphs[0].outputs[METRIC]].semantic.encoding or "values"
     names = {"display": ["image"], "linear": ["radiance"]}.get(encoding or "", ["image", "radiance"])
@@ -369,16 +330,3 @@ def compared_output(graphs: Sequence[Graph], encoding: Encoding | None, *, measu
 def scene_name(linked: Linked) -> str:
     """Return the name of the scene's file, or else of the scene."""
     return linked.spec.scene.stem if linked.spec.scene else linked.scene.name
-
-
-def unique_names(names: Sequence[str]) -> list[str]:
-    """Return the names with a number behind duplicates: `forward`, `forward-2`."""
-    unique: dict[str, None] = {}
-    given = frozenset(names)
-    for name in names:
-        number, candidate = 1, name
-        while candidate in unique or (number > 1 and candidate in given):
-            number += 1
-            candidate = f"{name}-{number}"
-        unique[candidate] = None
-    return list(unique)

@@ -25,7 +25,7 @@ from rendergraph.compare.tasks import (
 )
 from rendergraph.diff import diff
 from rendergraph.errors import Problem, RendergraphError
-from rendergraph.farm import Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, TaskRetried
+from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOutput, TaskRetried
 
 
 class Runner:
@@ -61,7 +61,7 @@ class Runner:
         elif self.prepared.other is not None or 0 in self.results:
             kind: Literal["variant", "pipeline"] = "variant" if self.prepared.other is None else "pipeline"
             base = RunSpec.of(self.prepared.base, -1)
-            farm.submit(ReferenceTask(base, kind, self.prepared.encoding, self.options.frame))
+            farm.submit(ReferenceTask(base.name, base, kind, self.prepared.encoding, self.options.frame))
         elif self._waiting:
             first = self._waiting.pop(0)
             if farm.workers > 1 and len(first) > 1:  # all others wait for the first run
@@ -103,17 +103,21 @@ class Runner:
         """Return the number of outputs so far, and of all: three for each run."""
         return min(self._outputs, 3 * len(self.prepared.runs)), 3 * len(self.prepared.runs)
 
-    def _task(self, specs: tuple[RunSpec, ...]) -> Task:
-        o, base = self.options, self.prepared.base
-        spec = RunSpec.of(base, -1 if self.prepared.other else 0)
-        return ComparisonTask(
-            specs, self._handle, self.prepared.encoding, o.frame, o.frames, o.repeats, o.most_bytes, spec
-        )
-
     def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
-        runs = self.prepared.runs
-        specs = [RunSpec.of(runs[number], number, is_rendered=number in self.results) for number in numbers]
-        farm.submit(self._task(tuple(specs)))
+        base = RunSpec.of(self.prepared.base, -1 if self.prepared.other else 0)
+        farm.submit(ComparisonTask(**self._work(numbers), base=base))
+
+    def _work(self, numbers: Sequence[int]) -> dict[str, Any]:
+        """Return what every task of runs has."""
+        runs, options = self.prepared.runs, self.options
+        first = runs[numbers[0]].name
+        return {
+            "name": f"{first} and {len(numbers) - 1} more" if len(numbers) > 1 else first,
+            "needs": (self._handle,) if self._handle else (),
+            "runs": tuple(RunSpec.of(runs[n], n, is_rendered=n in self.results) for n in numbers),
+            "encoding": self.prepared.encoding,
+            **{name: getattr(options, name) for name in ("frame", "frames", "repeats", "most_bytes")},
+        }
 
     def _distribute(self, farm: Executor, reference: Reference) -> None:
         """Submit everything that waits for the reference."""
@@ -202,9 +206,8 @@ class SweepRunner(Runner):
         total = len(self.prepared.runs)
         return total - len(self.missing), total
 
-    def _task(self, specs: tuple[RunSpec, ...]) -> Task:
-        o = self.options
-        return VariantTask(specs, self._handle, self.prepared.encoding, o.frame, o.frames, o.repeats, o.most_bytes)
+    def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
+        farm.submit(VariantTask(**self._work(numbers)))
 
     def _take(self, farm: Executor, output: Any, worker: str) -> None:
         if isinstance(output, PassCount):

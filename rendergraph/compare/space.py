@@ -186,12 +186,7 @@ class Space:
         return math.prod(min(len(axis.values) for axis in group) for group in self.groups)
 
     def check(self, *, spans: bool = False) -> None:
-        """Check the axes as a whole; `spans` allows continuous ranges, as for an optimiser.
-
-        Raises:
-            InputError: there is no axis, two have one path, zipped axes do not fit, a continuous range is not sampled,
-                or there are too many runs.
-        """
+        """Check the axes as a whole; `spans` allows continuous ranges without samples, as for an optimiser."""
         problems = [Problem("RG524", text) for text in _axis_mistakes(self.axes)]
         problems += _zip_problems(self.axes, self.zipped)
         if self.samples is None and not spans and self.chosen is None:
@@ -214,11 +209,7 @@ Axes: TypeAlias = "Space | str | Sequence[Axis | str] | Mapping[str, Any]"
 
 
 def parse_axis(text: str) -> Axis:
-    """Parse `ao.samples=8,16,32` or `ao.samples=8:64:8`; commas inside brackets and quotes belong to a value.
-
-    Raises:
-        ValueError: the text is not an axis.
-    """
+    """Parse `ao.samples=8,16,32` or `ao.samples=8:64:8`; a ValueError describes a mistake."""
     path, equals, rest = text.partition("=")
     path = path.strip()
     if not equals or not path:
@@ -227,11 +218,7 @@ def parse_axis(text: str) -> Axis:
 
 
 def axis_of(path: str, text: str) -> Axis:
-    """Return the axis of a path from its values and ranges, separated by commas.
-
-    Raises:
-        ValueError: the text is not a list of values and ranges.
-    """
+    """Return the axis of a path from its values and ranges, separated by commas; a ValueError describes a mistake."""
     if not text.strip():
         raise ValueError(f"axis '{path}' has no values; write {path}=VALUE,VALUE,…")
     parts = [part.strip() for part in _split(text)]
@@ -254,13 +241,10 @@ def axis_of(path: str, text: str) -> Axis:
 
 
 def parse_range(text: str) -> tuple[str, ...] | Span | None:
-    """Return the values of a range, or a continuous range; None where the text is not a range.
+    """Return the values of a range, or a continuous range; None where the text does not start like a range.
 
     Both ends are included, the last one if the steps reach it. Values are whole if all numbers are written so; of a
-    logarithmic range only the two ends count, and the values are rounded.
-
-    Raises:
-        ValueError: the text starts like a range and is not one, or the range has no values.
+    logarithmic range only the two ends count, and the values are rounded. A ValueError describes a mistake.
     """
     text = text.strip()
     match = RANGE.match(text)
@@ -464,3 +448,16 @@ def run_name(run: Mapping[str, str]) -> str:
         digest = hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()[:8]
         name = f"{name[: _LONGEST_NAME - 9]}-{digest}"
     return name or "run"
+
+
+def unique_names(names: Sequence[str]) -> list[str]:
+    """Return the names with a number behind duplicates: `forward`, `forward-2`."""
+    unique: dict[str, None] = {}
+    given = frozenset(names)
+    for name in names:
+        number, candidate = 1, name
+        while candidate in unique or (number > 1 and candidate in given):
+            number += 1
+            candidate = f"{name}-{number}"
+        unique[candidate] = None
+    return list(unique)

@@ -154,29 +154,25 @@ class PassCount:
 TaskEvent: TypeAlias = "ReferenceResult | RenderedResult | TimingResult | DifferenceResult | TaskError | PassCount"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class VariantTask(Task):
     """Runs that are rendered together; passes that they share are executed once.
 
-    They have the same scene, camera and size. Without a `reference` they are measured against the first one.
+    They have the same scene, camera and size. Unless they need a reference, they are measured against the first one.
     """
 
+    name: str
+    needs: tuple[Handle, ...]
     runs: tuple[RunSpec, ...]
-    reference: Handle | None
     encoding: Encoding
     frame: int
     frames: int
     repeats: int
     most_bytes: int
 
-    @property
-    def name(self) -> str:  # type: ignore[override]  # a value of the base class
-        first, *more = self.runs
-        return f"{first.name} and {len(more)} more" if more else first.name
-
-    @property
-    def needs(self) -> tuple[Handle, ...]:  # type: ignore[override]  # a value of the base class
-        return () if self.reference is None else (self.reference,)
+    def reference(self, worker: Worker) -> Reference | None:
+        reference: Reference | None = worker.value(self.needs[0]) if self.needs else None
+        return reference
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
         """Yield each run's picture, then its times, batch after batch; a faulty run ends only itself."""
@@ -185,11 +181,11 @@ class VariantTask(Task):
             try:
                 runs.append((run, run.plan(worker, runs[-1][1].linked.catalog if runs else None)))
             except InputError as error:
-                if self.reference is None:
+                if not self.needs:
                     raise
                 yield TaskError(run.number, _mapped(error, worker))
         planned = [each for _, each in runs]
-        reference: Reference | None = worker.value(self.reference) if self.reference is not None else None
+        reference = self.reference(worker)
         waiting = fitting_batches(planned, range(len(runs)), self.most_bytes) if runs else []
         done: set[int] = set()
         while waiting:
@@ -231,7 +227,7 @@ class VariantTask(Task):
         yield PassCount(batch.pass_count)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ComparisonTask(VariantTask):
     """Runs of any structure, each rendered by itself; they take turns in measuring, and are compared with a base."""
 
@@ -241,7 +237,7 @@ class ComparisonTask(VariantTask):
         """Yield the pictures of all runs, then their times, then their first differences."""
         gpu = worker.gpu
         planned = [run.plan(worker) for run in self.runs]
-        reference: Reference | None = worker.value(self.reference) if self.reference is not None else None
+        reference = self.reference(worker)
         for run, each in zip(self.runs, planned, strict=True):
             frame = stages.draw_last(each.for_frames(range(1, self.frame + 1)), gpu)
             if reference is None:
@@ -273,14 +269,11 @@ class ComparisonTask(VariantTask):
 class ReferenceTask(Task):
     """The reference, where it is not one of the runs that are rendered."""
 
+    name: str
     spec: RunSpec
     kind: Literal["variant", "pipeline"]
     encoding: Encoding
     frame: int
-
-    @property
-    def name(self) -> str:  # type: ignore[override]  # a value of the base class
-        return self.spec.name
 
     def run(self, worker: Worker) -> Iterator[ReferenceResult]:
         planned = self.spec.plan(worker)

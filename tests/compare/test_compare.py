@@ -11,7 +11,7 @@ import pytest
 
 import rendergraph as rg
 from rendergraph.compare.engine import compare
-from rendergraph.compare.prepare import unique_names
+from rendergraph.compare.space import unique_names
 from rendergraph.compare.timing import Spread, times_of
 from rendergraph.errors import InputError, UsageError
 from rendergraph.execute import FrameTimes, StepTime

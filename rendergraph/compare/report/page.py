@@ -20,7 +20,6 @@ from rendergraph.compare.report.html import (
 from rendergraph.compare.report.pictures import first_differences, sheet, viewer
 from rendergraph.compare.report.scatter import Point, scatter_svg
 from rendergraph.compare.results import Comparison, Result, Search, machine, pareto
-from rendergraph.compare.timing import Times
 from rendergraph.diagrams import lifetimes_svg
 from rendergraph.diff import diff, diff_svg, diff_text
 from rendergraph.formatting import format_bytes
@@ -29,7 +28,6 @@ from rendergraph.resources import folder
 
 MOST_COLUMNS = 8
 """Maximum number of variants whose passes are compared side by side; of more, those on the front."""
-_QUALITY = "Error against time"
 
 
 def comparison_page(comparison: Comparison, command: str, *, title: str = "", note: str = "") -> str:
@@ -67,6 +65,8 @@ def sweep_page(sweep: Sweep, command: str, *, title: str = "", note: str = "") -
     best = front[:MOST_COLUMNS]
     axes = card((axis.path, axis.text.replace(",", ", ")) for axis in sweep.space.axes)
     failed = card((f"{failure.name} failed", failure.text) for failure in sweep.failures)
+    names = ", ".join(f"<code>{escape(result.name)}</code>" for result in front)
+    best_words = f"<p>No run is both faster and nearer to the reference than these: {names}.</p>"
     saved = (
         f"<p>{sweep.executed} passes were executed for {len(comparison.results) - sweep.resumed} runs, which need "
         f"{sweep.alone} one by one: passes that several runs share are executed once. "
@@ -77,7 +77,7 @@ def sweep_page(sweep: Sweep, command: str, *, title: str = "", note: str = "") -
         section("search", "Search", _search(sweep.search) if sweep.search else ""),
         section("summary", "Runs", _summary(comparison, front=front), failed, software_note(comparison.software)),
         section("pictures", "Pictures", viewer(comparison), sheet(comparison, MOST_COLUMNS)),
-        section("times", "Times", *_times(comparison, best, front), _front_words(front)),
+        section("times", "Times", *_times(comparison, best, front), best_words),
         section("memory", "Memory", _memory(best)),
     ]
     return _page(title or f"Sweep of {comparison.results[0].source}", note, comparison, sections, command)
@@ -104,7 +104,7 @@ def _value(value: float) -> str:
 
 
 def _times(comparison: Comparison, results: Sequence[Result], front: Sequence[Result]) -> tuple[str, str]:
-    chart = drawing(quality_svg(comparison, front), _QUALITY)
+    chart = drawing(quality_svg(comparison, front), "Error against time")
     return f'<div class="beside"><div>{_passes(results)}</div>{chart}</div>', software_note(comparison.software)
 
 
@@ -120,7 +120,7 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Sect
             "again",
             "Command",
             f"<pre><code>{escape(command)}</code></pre>",
-            _notes(comparison),
+            "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes),
             _folded("The machine", _machine(comparison)),
         ),
     ]
@@ -144,11 +144,6 @@ def _page(title: str, note: str, comparison: Comparison, sections: Sequence[Sect
 
 
 # --- tables ----------------------------------------------------------------------------------------------------------
-
-
-def _repeats(times: Times) -> str:
-    medians = times.repeated
-    return _cell(f"{number(medians.min, 2)}–{number(medians.max, 2)} ({len(times.repeats)})" if medians else "–")
 
 
 def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
@@ -186,7 +181,10 @@ def _summary(comparison: Comparison, front: Sequence[Result]) -> str:
         cells += [_cell(number(result.radiance_rmse))] if light else []
         if measured:
             cells += [milliseconds(times.gpu_ms, most if times.gpu_ms else 0)]
-            cells += [_repeats(times)] if again else []
+            if again:
+                medians = times.repeated
+                span = f"{number(medians.min, 2)}–{number(medians.max, 2)}" if medians else "–"
+                cells.append(_cell(f"{span} ({len(times.repeats)})" if medians else span))
             cells += [milliseconds(times.cpu_ms)]
             cells += [milliseconds(times.frame_ms)] if whole else []
             cells += [_cell(str(result.pass_count)), _cell(format_bytes(result.allocated_bytes))]
@@ -243,28 +241,21 @@ def quality_svg(comparison: Comparison, front: Sequence[Result] = ()) -> str:
     """Return error against time as an SVG document, with a point for each result; the front is computed if missing."""
     results = comparison.results
     best = {result.name for result in (front or pareto(results))}
-    points = []
-    for result in results:
-        time = result.times.headline
-        points.append(
-            Point(
-                result.name,
-                " · ".join(result.settings.values()) or result.name,
-                time.median,
-                time.p10,
-                time.p90,
-                result.metrics.flip,
-                result.name in best,
-            )
+    points = [
+        Point(
+            name=result.name,
+            label=" · ".join(result.settings.values()) or result.name,
+            ms=result.times.headline.median,
+            low=result.times.headline.p10,
+            high=result.times.headline.p90,
+            error=result.metrics.flip,
+            best=result.name in best,
         )
+        for result in results
+    ]
     kind = "GPU" if results[0].times.gpu_ms else "frame"
     note = ", software rasteriser" if comparison.software else ""
     return scatter_svg(points, f"{kind} time, ms{note}", f"FLIP against {comparison.reference.name}")
-
-
-def _front_words(front: Sequence[Result]) -> str:
-    names = ", ".join(f"<code>{escape(result.name)}</code>" for result in front)
-    return f"<p>No run is both faster and nearer to the reference than these: {names}.</p>"
 
 
 def _structure(comparison: Comparison) -> str:
@@ -280,9 +271,10 @@ def _structure(comparison: Comparison) -> str:
         if not difference:
             parts.append(f"<p>{escape(title)}: no difference.</p>")
         else:
-            lines = "\n".join(line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:])
+            lines = [line.removeprefix("  ") for line in diff_text(difference).splitlines()[1:]]
+            changes = f"{len(lines)} change{'s' if len(lines) > 1 else ''}"
             picture = drawing(diff_svg(graph, result.graph, difference), title)
-            parts.append(_folded(f"{title}: {_amount(lines)}", f"<pre>{escape(lines)}</pre>{picture}"))
+            parts.append(_folded(f"{title}: {changes}", f"<pre>{escape(chr(10).join(lines))}</pre>{picture}"))
     return "\n".join(parts)
 
 
@@ -306,15 +298,6 @@ def _machine(comparison: Comparison) -> str:
     entries.append(("SSIM", f"{ssim['window']}×{ssim['window']} Gaussian, σ {ssim['sigma']}"))
     entries.append(("made", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")))
     return card(entries)
-
-
-def _notes(comparison: Comparison) -> str:
-    return "".join(f"<p class=quiet>{escape(note)}.</p>" for note in comparison.notes)
-
-
-def _amount(lines: str) -> str:
-    count = len(lines.splitlines())
-    return f"{count} change{'s' if count > 1 else ''}"
 
 
 def _folded(title: str, body: str) -> str:

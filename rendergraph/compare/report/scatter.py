@@ -1,4 +1,4 @@
-"""Quality against time as an SVG picture: a point a variant, the Pareto front as a line."""
+"""Error against time as an SVG picture: a point for each variant, the Pareto front as a line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _STYLE = """
 
 @dataclass(frozen=True)
 class Point:
-    """A variant: its name and a short one, milliseconds with their spread, its error; `best` ones form the front."""
+    """A variant: its name and a short one, its time with the spread, its error; the `best` ones form the front."""
 
     name: str
     label: str
@@ -35,12 +35,7 @@ class Point:
 
 
 def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
-    """Points as a stand-alone SVG document, for light and dark pages; nearer to the lower left is better.
-
-    Args:
-        points: one a variant; those without a number are left out.
-        time, error: what the axes show.
-    """
+    """Return points as a stand-alone SVG document for light and dark pages, with titles of the axes; without NaN."""
     points = [p for p in points if math.isfinite(p.ms) and math.isfinite(p.error)]
     right, up = _ceiling(max((p.high for p in points), default=1)), _ceiling(max((p.error for p in points), default=1))
 
@@ -73,7 +68,7 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         path = f"M{x(front[0].ms):.1f} {y(front[0].error):.1f}"
         path += "".join(f"H{x(p.ms):.1f}V{y(p.error):.1f}" for p in front[1:])
         parts.append(f'<path class="front" d="{path}" stroke-width="1.5" stroke-dasharray="5 4"/>')
-    # Labels go where neither a point, a line nor another label is; those of the front choose first.
+    # Labels avoid points, lines and other labels; those of the front are placed first.
     taken = [_Spot(min(x(p.ms) - 7, x(p.low)), max(x(p.ms) + 7, x(p.high)), y(p.error)) for p in points]
     for a, b in itertools.pairwise(front):
         taken.append(_Spot(x(a.ms), x(b.ms), y(a.error)))
@@ -81,10 +76,10 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
         taken += [_Spot(x(b.ms) - 1, x(b.ms) + 1, y(a.error) + _LINE * step) for step in range(1, steps)]
     for point in sorted(points, key=lambda p: (not p.best, p.ms)):
         spread = f"{_plain(point.low)}–{_plain(point.high)}"
-        told = f"{point.name}: {_plain(point.ms)} ms ({spread}), {_plain(point.error)}"
+        tooltip = f"{point.name}: {_plain(point.ms)} ms ({spread}), {_plain(point.error)}"
         at, height = x(point.ms), y(point.error)
         parts.append(
-            f'<g><title>{escape(told)}</title><path d="M{x(point.low):.1f} {height:.1f}H{x(point.high):.1f}" '
+            f'<g><title>{escape(tooltip)}</title><path d="M{x(point.low):.1f} {height:.1f}H{x(point.high):.1f}" '
             f'stroke="#7d8590" stroke-opacity=".6"/>'
             f'<circle class="{"best" if point.best else "dot"}" cx="{at:.1f}" cy="{height:.1f}" r="5"/>'
         )
@@ -96,7 +91,7 @@ def scatter_svg(points: Sequence[Point], time: str, error: str) -> str:
 
 @dataclass(frozen=True)
 class _Spot:
-    """A place that is taken: from left to right, around a height."""
+    """An occupied rectangle, one label high."""
 
     left: float
     right: float
@@ -107,7 +102,7 @@ class _Spot:
 
 
 def _label(text: str, x: float, y: float, taken: list[_Spot]) -> str:
-    """The text beside a point, nothing where there is no room."""
+    """Return the text beside a point, or nothing if there is no room."""
     width = 6.8 * len(text)
     for shift in (0, -14, 14, -28, 28, -42, 42):
         for left in (x + 10, x - width - 10):
@@ -128,12 +123,12 @@ def _tick(x: float, y: float, text: str, *, upright: bool) -> str:
 
 
 def _plain(value: float) -> str:
-    """Three digits without an exponent: `1200`, `0.00015`."""
+    """Return three digits without an exponent: `1200`, `0.00015`."""
     return f"{float(f'{value:.3g}'):.12f}".rstrip("0").rstrip(".")
 
 
 def _ceiling(value: float) -> float:
-    """The next number of 1, 1.5, 2, 3, 5 times a power of ten, so that ticks are round."""
+    """Return the next round number, so that ticks are round."""
     if not value > 0 or not math.isfinite(value):
         return 1.0
     power = 10.0 ** math.floor(math.log10(value))
