@@ -170,13 +170,15 @@ def test_metadata_comes_back(tmp_path: Path, name: str) -> None:
     assert found["device"] == "llvmpipe"
 
 
-@pytest.mark.parametrize("name", ["a.exr", "a.png", "a.jpg", "a.hdr"])
-def test_equal_pictures_are_equal_files(tmp_path: Path, name: str) -> None:
-    write(tmp_path / name, ramp(8, 8, 3), metadata={"pipeline": TEXT})
-    first = (tmp_path / name).read_bytes()
-    time.sleep(1.1)
-    write(tmp_path / name, ramp(8, 8, 3), metadata={"pipeline": TEXT})
-    assert (tmp_path / name).read_bytes() == first
+def test_equal_pictures_are_equal_files(tmp_path: Path) -> None:
+    """Also a second later: some formats store the time."""
+    files: list[dict[str, bytes]] = []
+    for pause in (1.1, 0):
+        for name in ("a.exr", "a.png", "a.jpg", "a.hdr"):
+            write(tmp_path / name, ramp(8, 8, 3), metadata={"pipeline": TEXT})
+        files.append({path.name: path.read_bytes() for path in tmp_path.iterdir()})
+        time.sleep(pause)
+    assert files[0] == files[1]
 
 
 # --- whole or not at all ---------------------------------------------------------------------------------------------
@@ -602,7 +604,7 @@ def test_limits_can_be_set(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_bomb_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "a.png").write_bytes(png(8000, 8000, bytes(8000 * 32001)))
+    (tmp_path / "a.png").write_bytes(png(4500, 4500, bytes(4500 * 18001)))
     assert "the limit is 1,000; --limit scene-image-ratio=N" in refused(tmp_path / "a.png", capfd)
 
 

@@ -392,6 +392,7 @@ HOSTILE = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", HOSTILE)
+@pytest.mark.nightly(keep=5)
 def test_hostile_text_ends_soon(tmp_path: Path, case: str) -> None:
     start = time.process_time()
     problems: tuple[Problem, ...] = ()

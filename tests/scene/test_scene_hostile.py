@@ -27,7 +27,7 @@ from rendergraph.scene.load import load
 from rendergraph.scene.reading import Reading, inside
 
 CALM = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )
 
 
@@ -91,9 +91,11 @@ WORDS = st.sampled_from(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("part", range(3))
 @CALM
 @given(words=st.lists(WORDS, max_size=60))
-def test_any_obj_text(tmp_path: Path, words: list[str]) -> None:
+def test_any_obj_text(tmp_path: Path, part: int, words: list[str]) -> None:
     path = tmp_path / "a.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + " ".join(words))
     survives(path)
@@ -102,8 +104,10 @@ def test_any_obj_text(tmp_path: Path, words: list[str]) -> None:
 @pytest.mark.slow
 @CALM
 @given(data=st.binary(max_size=200))
+@pytest.mark.parametrize("part", range(3))
 @pytest.mark.parametrize("name", ["a.obj", "a.gltf", "a.glb", "a.yaml"])
-def test_any_bytes(tmp_path: Path, name: str, data: bytes) -> None:
+@pytest.mark.nightly(keep=4)
+def test_any_bytes(tmp_path: Path, part: int, name: str, data: bytes) -> None:
     path = tmp_path / name
     path.write_bytes(data)
     survives(path)
@@ -164,9 +168,11 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("part", range(3))
 @CALM
 @given(data=st.data())
-def test_any_change_to_a_gltf(tmp_path: Path, data: st.DataObject) -> None:
+def test_any_change_to_a_gltf(tmp_path: Path, part: int, data: st.DataObject) -> None:
     top = json.loads(json.dumps(BASE))
     for _ in range(data.draw(st.integers(1, 3))):
         path = data.draw(st.sampled_from(places(top)))
@@ -211,9 +217,11 @@ SCENE_LINES = st.sampled_from(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("part", range(3))
 @CALM
 @given(lines=st.lists(SCENE_LINES, max_size=5, unique=True))
-def test_any_scene_file(tmp_path: Path, lines: list[str]) -> None:
+def test_any_scene_file(tmp_path: Path, part: int, lines: list[str]) -> None:
     path = tmp_path / "a.yaml"
     path.write_text("\n".join(["scene: 1", *lines]))
     survives(path)
@@ -372,6 +380,7 @@ BALLOONS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", BALLOONS)
+@pytest.mark.nightly(keep=2)
 def test_a_small_file_does_not_balloon(tmp_path: Path, case: str) -> None:
     (tmp_path / "a.bin").write_bytes(bytes(48))
     (tmp_path / "a.gltf").write_text(json.dumps(BALLOONS[case]))
