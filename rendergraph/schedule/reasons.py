@@ -73,7 +73,8 @@ def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versio
         if not ids:
             culled[node] = "it writes nothing"
         elif readers:
-            culled[node] = f"only {_listed(sorted(readers))} would read {_listed(ids)}, which does not run"
+            be, do = "is" if len(ids) == 1 else "are", "does" if len(readers) == 1 else "do"
+            culled[node] = f"{_listed(ids)} {be} read only by {_listed(sorted(readers))}, which {do} not run"
         else:
             culled[node] = f"nothing reads {_listed(ids)}"
     return culled
