@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rendergraph.catalog import Catalog, NodeType
+from rendergraph.catalog import NodeType
 from rendergraph.errors import InputError
 from rendergraph.reference import (
     describe_node,
-    describe_program,
+    describe_programs,
     example_text,
     find_node_of_type,
     input_facts,
@@ -24,17 +24,16 @@ from rendergraph.session import Selection
 
 from .api import signature
 from .markdown import block, code, folded, listing, page, prose, table
-from .pictures import Studio, View, example_and_base, exhibit
+from .pictures import Studio, View, catalog, example_and_base, exhibit
 
 STEPS = {"param": "uniform", "define": "compiled in", "structural": "plan"}
 
 
 def pages(studio: Studio) -> Iterator[tuple[str, str]]:
     """The index and every page."""
-    catalog = Catalog.discover()
     families = {
-        family: [found for found in map(catalog.get, names) if found.plugin == "builtin"]
-        for family, names in catalog.families().items()
+        family: [found for found in map(catalog().get, names) if found.plugin == "builtin"]
+        for family, names in catalog().families().items()
     }
     described = {found.name: describe_node(found) for members in families.values() for found in members}
     yield "nodes/index.md", _index(families)
@@ -99,7 +98,7 @@ def _page(found: NodeType, described: dict[str, dict[str, Any]], studio: Studio)
         prose(rest.strip()),
         _extends(found),
         _pictures(found, node["outputs"], studio),
-        f"## In a file\n\n{block(example_text(found, Catalog.discover()), 'yaml')}",
+        f"## In a file\n\n{block(example_text(found, catalog()), 'yaml')}",
         f"## Inputs\n\n{inputs}" if inputs else "",
         f"## Outputs\n\n{outputs}",
         f"## Parameters\n\n{parameters}" if parameters else "",
@@ -170,9 +169,8 @@ def _first(function: Any) -> str:
 def _in_scope(found: NodeType) -> str:
     """What the shaders of its steps may use in the pipeline above, folded; nothing where it has no program there."""
     try:
-        linked, node = find_node_of_type(found, Catalog.discover(), Selection)
-        first = describe_program(linked, node, None)
-        others = [describe_program(linked, node, step["step"]) for step in first["steps"][1:]]
+        linked, node = find_node_of_type(found, catalog(), Selection)
+        programs = describe_programs(linked, node)
     except InputError:
         return ""
     tables = [
@@ -180,7 +178,7 @@ def _in_scope(found: NodeType) -> str:
             f"step {step['step']}: " + ", ".join(f"<code>{name}</code>" for name in step["shaders"].values()),
             table(("in scope", "from"), [(code(one["name"]), prose(one["source"])) for one in step["scope"]]),
         )
-        for step in (first, *others)
+        for step in programs
     ]
     return "## In scope of its shaders\n\n" + "\n\n".join(tables)
 

@@ -123,6 +123,12 @@ def shipped(scenes: bool = False) -> list[Path]:
     return sorted(files, key=lambda file: "\nextends:" in file.read_text(encoding="utf-8"))
 
 
+@cache
+def catalog() -> Catalog:
+    """Every node type, looked up once."""
+    return Catalog.discover()
+
+
 SCENES = ("shadow_study", "cornell_box", "many_lights", "glass")
 """Scenes for the pictures of nodes; the first one unless another shows more."""
 
@@ -145,9 +151,10 @@ def exhibit(found: NodeType, port: str) -> tuple[View, View | None] | None:
     return None
 
 
+@cache
 def example_and_base(found: NodeType) -> list[tuple[rg.Pipeline, rg.Pipeline]]:
     """The example on a type's page, and the shipped pipeline that it is a patch on; one such pair or none."""
-    text = example_file(found, Catalog.discover())
+    text = example_file(found, catalog())
     patch = yaml.safe_load(text) if text else {}
     if "extends" not in patch:
         return []

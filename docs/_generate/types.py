@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rendergraph.catalog import Catalog, NodeType
+from rendergraph.catalog import NodeType
 from rendergraph.textures import FORMATS, SEMANTICS, SIGNATURES
 
 from .markdown import code, prose, table
+from .pictures import catalog
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """A part of a page for each table."""
-    catalog = Catalog.discover()
-    types = [found for found in map(catalog.get, catalog.names()) if found.plugin == "builtin"]
+    types = [found for found in map(catalog().get, catalog().names()) if found.plugin == "builtin"]
     semantics = [
         (
             code(s.name),

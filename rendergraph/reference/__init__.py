@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rendergraph.reference.assets import describe_pipeline, describe_scene, kind_of
     from rendergraph.reference.examples import example_file, example_text
     from rendergraph.reference.node_types import describe_node, input_facts, meaning, output_facts, summary
-    from rendergraph.reference.programs import describe_program, find_node_of_type
+    from rendergraph.reference.programs import describe_program, describe_programs, find_node_of_type
     from rendergraph.reference.topics import FILE_KINDS, error_codes, error_page, file_keys, table_of
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "describe_node",
     "describe_pipeline",
     "describe_program",
+    "describe_programs",
     "describe_scene",
     "error_codes",
     "error_page",
@@ -43,7 +44,7 @@ __getattr__ = lazy_exports(
         "assets": ("describe_pipeline", "describe_scene", "kind_of"),
         "examples": ("example_file", "example_text"),
         "node_types": ("describe_node", "input_facts", "meaning", "output_facts", "summary"),
-        "programs": ("describe_program", "find_node_of_type"),
+        "programs": ("describe_program", "describe_programs", "find_node_of_type"),
         "topics": ("FILE_KINDS", "error_codes", "error_page", "file_keys", "table_of"),
     },
 )

@@ -15,6 +15,7 @@ from rendergraph.session import stages
 
 if TYPE_CHECKING:
     from rendergraph.catalog import Catalog, NodeType
+    from rendergraph.expand import Expansion
     from rendergraph.session import Selection
     from rendergraph.session.values import Linked
     from rendergraph.steps import Step
@@ -60,11 +61,26 @@ def describe_program(linked: Linked, node: str, number: int | None) -> dict[str,
         InputError: no such node, or it has no program of its own.
         UsageError: no such step, or it has no program.
     """
-    from rendergraph.program import stage_texts  # most topics need no GLSL
-    from rendergraph.program.scope import annotated, in_scope  # likewise
-    from rendergraph.program.variants import variants  # likewise
-    from rendergraph.scene.pack import pack  # likewise
+    expansion, steps = _steps_with_program(linked, node)
+    step = next((one for one in steps if number in (one.index, None)), None)
+    if step is None:
+        listed = ", ".join(_step_name(one) for one in steps)
+        text = f"--step: '{node}' has no step {number} with a program; available: {listed}"
+        raise UsageError(Problem("RG500", text))
+    return _describe(linked, expansion, steps, step)
 
+
+def describe_programs(linked: Linked, node: str) -> list[dict[str, Any]]:
+    """Return `describe_program` of every step that has a program.
+
+    Raises:
+        InputError: as from `describe_program`.
+    """
+    expansion, steps = _steps_with_program(linked, node)
+    return [_describe(linked, expansion, steps, step) for step in steps]
+
+
+def _steps_with_program(linked: Linked, node: str) -> tuple[Expansion, list[Step]]:
     types = {one.id: one.type for one in linked.graph.nodes}
     if node not in types:
         text = f"pipeline '{linked.graph.name}' has no node '{node}'{suggestion(node, types)}"
@@ -77,19 +93,24 @@ def describe_program(linked: Linked, node: str, number: int | None) -> dict[str,
         reason = f" here: {idle}" if idle else " here"
         reason = f": its function is compiled into that of '{callers[0]}'" if callers else reason
         raise InputError(Problem("RG511", f"{node_named(node, types[node].name)} has no program{reason}"))
-    step = next((one for one in steps if number in (one.index, None)), None)
-    if step is None:
-        listed = ", ".join(_step_name(one) for one in steps)
-        text = f"--step: '{node}' has no step {number} with a program; available: {listed}"
-        raise UsageError(Problem("RG500", text))
+    return expansion, steps
+
+
+def _describe(linked: Linked, expansion: Expansion, steps: list[Step], step: Step) -> dict[str, Any]:
+    from rendergraph.program import stage_texts  # most topics need no GLSL
+    from rendergraph.program.scope import annotated, in_scope  # likewise
+    from rendergraph.program.variants import variants  # likewise
+    from rendergraph.scene.pack import pack  # likewise
+
+    types = {one.id: one.type for one in linked.graph.nodes}
     found = variants(step, linked.scene, pack(linked.scene), expansion.views)
     macros = (found or [{}])[0]
     texts = stage_texts(step, types, expansion.resources, expansion.views, defines=macros)
     scope = in_scope(step, types, expansion.resources, expansion.views, macros, texts)
     return {
         "pipeline": linked.graph.name,
-        "node": node,
-        "type": types[node].name,
+        "node": step.node,
+        "type": types[step.node].name,
         "step": step.index,
         "shaders": dict(step.shaders),
         "steps": [
