@@ -294,7 +294,12 @@ def topological_orders(steps: tuple[Step, ...], expansion: Expansion) -> Iterato
 # --- properties ------------------------------------------------------------------------------------------------------
 
 
+in_shares = pytest.mark.parametrize("share", [0, *(pytest.param(n, marks=pytest.mark.nightly) for n in range(1, 5))])
+"""A fifth of the random examples runs in `make check`, the rest in `make nightly`."""
+
+
 @pytest.mark.slow
+@in_shares
 @given(
     expansions(),
     st.sampled_from(["best", "shuffled", "program"]),
@@ -303,9 +308,9 @@ def topological_orders(steps: tuple[Step, ...], expansion: Expansion) -> Iterato
     st.booleans(),
     st.booleans(),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_orders_are_legal_and_plans_valid(
-    base: Expansion, way: str, seed: int, alias: bool, views: bool, heap: bool
+    share: int, base: Expansion, way: str, seed: int, alias: bool, views: bool, heap: bool
 ) -> None:
     found = schedule(base, shuffle=seed if way == "shuffled" else None, keep_order=way == "program")
     assert_legal(base, found)
@@ -317,9 +322,10 @@ def test_orders_are_legal_and_plans_valid(
 
 
 @pytest.mark.slow
+@in_shares
 @given(expansions(most=8))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_the_least_peak_is_that_of_all_orders(base: Expansion) -> None:
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_the_least_peak_is_that_of_all_orders(share: int, base: Expansion) -> None:
     found = schedule(base)
     peaks = [peak_of(order, base) for order in itertools.islice(topological_orders(found.steps, base), 50_000)]
     assert found.proven
@@ -327,9 +333,10 @@ def test_the_least_peak_is_that_of_all_orders(base: Expansion) -> None:
 
 
 @pytest.mark.slow
+@in_shares
 @given(expansions(most=8), st.sampled_from([0.0, 1e-5, 1e-4]))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_no_order_is_below_the_bound_whatever_the_budget(base: Expansion, budget_s: float) -> None:
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_no_order_is_below_the_bound_whatever_the_budget(share: int, base: Expansion, budget_s: float) -> None:
     found = schedule(base, budget_s=budget_s)
     peaks = [peak_of(order, base) for order in itertools.islice(topological_orders(found.steps, base), 50_000)]
     assert found.lower_bound_bytes <= min(peaks) <= found.least_peak_bytes
@@ -337,9 +344,10 @@ def test_no_order_is_below_the_bound_whatever_the_budget(base: Expansion, budget
 
 
 @pytest.mark.slow
+@in_shares
 @given(expansions(most=7))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_what_is_allocated_is_near_the_least_of_all_orders(base: Expansion) -> None:
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_what_is_allocated_is_near_the_least_of_all_orders(share: int, base: Expansion) -> None:
     found = schedule(base)
     allocated = allocate(found).memory.allocated_bytes
     orders = itertools.islice(topological_orders(found.steps, base), 300)
@@ -348,9 +356,12 @@ def test_what_is_allocated_is_near_the_least_of_all_orders(base: Expansion) -> N
 
 
 @pytest.mark.slow
+@in_shares
 @given(expansions(), st.randoms(use_true_random=False))
-@settings(max_examples=100, deadline=None)
-def test_results_do_not_depend_on_the_order_of_nodes_and_keys(base: Expansion, chooser: random.Random) -> None:
+@settings(max_examples=20, deadline=None)
+def test_results_do_not_depend_on_the_order_of_nodes_and_keys(
+    share: int, base: Expansion, chooser: random.Random
+) -> None:
     nodes = list(dict.fromkeys(step.node for step in base.steps))
     chooser.shuffle(nodes)
     steps = tuple(step for node in nodes for step in base.steps if step.node == node)
@@ -364,9 +375,10 @@ def test_results_do_not_depend_on_the_order_of_nodes_and_keys(base: Expansion, c
 
 
 @pytest.mark.slow
+@in_shares
 @given(expansions(), st.integers(0, 1000))
-@settings(max_examples=100, deadline=None)
-def test_a_forgotten_reader_is_caught(base: Expansion, seed: int) -> None:
+@settings(max_examples=20, deadline=None)
+def test_a_forgotten_reader_is_caught(share: int, base: Expansion, seed: int) -> None:
     """The validator itself: cut a lifetime short, and it says so wherever that can be seen."""
     plan = allocate(schedule(base))
     chooser = random.Random(seed)
