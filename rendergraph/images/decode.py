@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NoReturn, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -29,12 +29,6 @@ def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits:
     encoding (`srgb` ones are uploaded to an sRGB format); images of more than 8 bits that are not sRGB become floats
     0…1. HDR and EXR values are linear light, whatever `srgb` says; NaN becomes 0 and what is beyond the largest half
     float becomes 65504, with a warning that counts the pixels.
-
-    Args:
-        source: a file, or the bytes of one.
-        srgb: whether the values are sRGB encoded.
-        warn: receives a warning where values were replaced.
-        limits: what the header may claim.
 
     Returns:
         (height, width, 4), top row first, uint8 or float16.
@@ -68,8 +62,9 @@ def decode_light(
         colors = from_srgb(pixels[..., :3])
         return np.concatenate([colors, pixels[..., 3:] / np.float32(255)], axis=-1).astype(np.float16)
     negative = (pixels[..., :3] < 0).any(axis=-1)
-    if negative.any():
-        _warn(warn, "RG355", f"{_counted(int(negative.sum()))} negative, replaced by 0", source)
+    if not negative.any():
+        return pixels
+    _warn(warn, "RG355", f"{_counted(int(negative.sum()))} negative, replaced by 0", source)
     return np.maximum(pixels, 0)
 
 
@@ -106,11 +101,11 @@ def _opened(source: ImageSource, limits: SceneLimits) -> Iterator[ImageFile]:
         with open_image(source, limits) as image:
             yield image
     except ImageError as error:
-        _refuse(source, error.code, f"the image {error.reason}")
+        raise _error(source, error.code, f"the image {error.reason}") from None
 
 
-def _refuse(source: ImageSource, code: str, text: str) -> NoReturn:
-    raise InputError(Problem(code, text, Place(_name_of(source)))) from None
+def _error(source: ImageSource, code: str, text: str) -> InputError:
+    return InputError(Problem(code, text, Place(_name_of(source))))
 
 
 def _name_of(source: ImageSource) -> str:
@@ -179,7 +174,7 @@ def _decode_by_plugin(
     try:
         data = source.path.read_bytes()
     except OSError as error:
-        _refuse(source, "RG350", f"the image cannot be read: {error.strerror}")
+        raise _error(source, "RG350", f"the image cannot be read: {error.strerror}") from None
     what = f"image '{source.label}'"
     pixels = loader.run("RG497", f"{what} cannot be read", data)
     mistake = _plugin_mistake(pixels, limits)

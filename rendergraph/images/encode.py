@@ -54,11 +54,11 @@ def write(
     and HDR hold linear light: `display` values are decoded first. `data` is written as it is everywhere.
 
     Args:
-        path: `.png`, `.jpg`, `.jpeg`, `.exr` or `.hdr`.
+        path: the file.
         pixels: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
         channels: names for EXR; by default `Y`, `R,G`, `R,G,B` or `R,G,B,A`. Layers put `000.` and so on before them.
-        encoding: what the values are.
-        metadata: texts kept in EXR and PNG files; `read_metadata` gives them back.
+        encoding: of the values.
+        metadata: texts in EXR and PNG files; `read_metadata` returns them.
         half: 16-bit floats in EXR; values beyond ±65504 become that.
     """
     write_all([(Path(path), pixels, channels, encoding, half)], metadata or {})
@@ -85,7 +85,10 @@ def write_all(jobs: Sequence[Job], metadata: Mapping[str, str]) -> None:
                 elif shaped.ndim == 4:
                     names = tuple(f"{layer:03d}.{name}" for layer in range(len(shaped)) for name in names)
                     shaped = np.moveaxis(shaped, 0, 2).reshape(*shaped.shape[1:3], -1)
-            _write_file(path, part, shaped, names, kind, metadata)
+            try:
+                _write_file(path, part, shaped, names, kind, metadata)
+            except OSError as error:
+                raise failed(path, error.strerror or str(error)) from error
 
 
 def _eight_bits(path: Path, pixels: Pixels, encoding: Encoding) -> Pixels:
@@ -129,11 +132,8 @@ def _write_file(
 ) -> None:
     texts = {key if key.startswith(PREFIX) else PREFIX + key: text for key, text in metadata.items()}
     if kind == "uint8" and path.suffix.lower() == ".png":
-        try:
-            with open(part, "wb") as file:
-                file.writelines(_png(pixels, texts))
-        except OSError as error:
-            raise failed(path, error.strerror or str(error)) from error
+        with open(part, "wb") as file:
+            file.writelines(_png(pixels, texts))
         return
     import OpenImageIO as oiio  # loaded with the first picture that is no PNG
 
@@ -167,10 +167,10 @@ def _write_file(
 
 @contextlib.contextmanager
 def _safe_place(path: Path, part: Path) -> Iterator[str]:
-    """The name to give to OpenImageIO.
+    """A path for OpenImageIO.
 
-    On a full disk the Radiance writer reports success and libjpeg ends the process, so these write to memory
-    first; OpenEXR says what happened. So does a picture whose name is no text, which it cannot be given.
+    On a full disk the Radiance writer reports success and libjpeg ends the process, so these write to memory first;
+    OpenEXR reports the failure. A picture whose name is not text is written to memory, too.
     """
     if (path.suffix.lower() == ".exr" and is_text(str(part))) or not hasattr(os, "memfd_create"):
         yield str(part)
@@ -178,12 +178,9 @@ def _safe_place(path: Path, part: Path) -> Iterator[str]:
     memory = os.memfd_create("picture")
     try:
         yield f"/proc/self/fd/{memory}"
-        try:
-            with open(memory, "rb", closefd=False) as source, open(part, "wb") as target:
-                while bytes_read := source.read(1 << 20):
-                    target.write(bytes_read)
-        except OSError as error:
-            raise failed(path, error.strerror or str(error)) from error
+        with open(memory, "rb", closefd=False) as source, open(part, "wb") as target:
+            while bytes_read := source.read(1 << 20):
+                target.write(bytes_read)
     finally:
         os.close(memory)
 

@@ -72,10 +72,7 @@ def heat_map(values: Pixels) -> Bytes:
 def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) -> Bytes:
     """Return a picture of a texture; the module's table lists how each semantic is shown.
 
-    Args:
-        array: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
-        semantic: what the texels mean, a name in `textures.SEMANTICS` or a plugin's own.
-        encoding: `linear` for linear light, `display` for sRGB-encoded colours, else None.
+    The array is (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
 
     Returns:
         uint8, (height, width, 1) grey or (height, width, 3).
@@ -158,14 +155,9 @@ def _grid(layers: Bytes) -> Bytes:
 
 
 def contact_sheet(pictures: Sequence[tuple[Bytes, str, str]]) -> Bytes:
-    """Pictures in rows, as many columns as make the sheet about as wide as high, each as large as 320×180 takes it.
+    """Arrange pictures in rows on a sheet about as wide as high, each fitted into 320×180; (height, width, 3).
 
-    Args:
-        pictures: (height, width, 1 or 3) each, with a name and a note that are written beneath. Where OpenImageIO has
-            no font they stand there without words.
-
-    Returns:
-        (height, width, 3).
+    A picture is (height, width, 1 or 3), with a name and a note beneath, which are missing if OpenImageIO has no font.
     """
     import OpenImageIO as oiio  # loaded with the first picture written
 

@@ -22,22 +22,14 @@ _BLOCK = 1 << 16
 
 
 def view_matrices(camera: Camera, size: tuple[int, int]) -> ViewMatrices:
-    """The view of a camera drawn at a size in texels; the aspect is the size's.
-
-    An off-centre `frustum` keeps its own left, right, bottom and top.
-    """
+    """Return the view of a camera at a size in texels; an off-centre `frustum` keeps its own aspect."""
     width, height = size
     view = projection.inverse_rigid(camera.transform)
     return ViewMatrices(view, projection_matrix(camera, width / height), size, camera.near, camera.far)
 
 
 def projection_matrix(camera: Camera, aspect: float) -> Matrix:
-    """View space to OpenGL clip space (z in -w…w) as (4, 4).
-
-    Args:
-        camera: what is projected.
-        aspect: width over height of the picture.
-    """
+    """Return the matrix (4, 4) from view space to OpenGL clip space (z in -w…w); aspect is width over height."""
     near, far = camera.near, camera.far
     if camera.type == "orthographic":
         top = camera.height / 2
@@ -54,13 +46,13 @@ def bounding_sphere(scene: Scene) -> tuple[Vec3, float]:
 
 
 def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = 1 << 24) -> Camera:
-    """Everything drawn seen from (1, 0.6, 1.5), 45° high, from as near as its own points allow.
+    """Frame everything drawn from (1, 0.6, 1.5), 45° high, from as near as its own points allow.
 
-    The camera looks along that direction, aside of the middle where that brings it nearer. What each side of the view
-    has to keep inside is one number, the farthest that any point reaches against the side's plane.
+    The camera looks along that direction, off-centre if that brings it nearer. Each side of the view is determined by
+    one number, the farthest extent of any point towards the side's plane.
 
     Args:
-        scene: what is seen.
+        scene: its objects, without hidden ones, are framed.
         aspect: width over height of the picture.
         most_points: number of placed vertices above which the boxes of their meshes are framed.
     """

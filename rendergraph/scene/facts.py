@@ -18,7 +18,7 @@ Corners: TypeAlias = npt.NDArray[np.float64]
 
 
 def selected(scene: Scene, name: str) -> list[int]:
-    """Indices of the objects that a selection takes in, in the scene's order."""
+    """Indices of the objects in a selection, in the scene's order."""
     takes = SELECTIONS[name]
     return [
         number
@@ -28,7 +28,7 @@ def selected(scene: Scene, name: str) -> list[int]:
 
 
 def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
-    """What is known of the objects, in the scene's order."""
+    """Facts of the objects, in the scene's order."""
     facts = []
     for placed in scene.objects:
         mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
@@ -54,16 +54,16 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
 
 
 def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
-    """What is known of every light before the schedule, in the scene's order."""
+    """Facts of the lights, in the scene's order."""
     return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)
 
 
 def environment_facts(scene: Scene) -> TextureDesc | None:
-    """The texture that a scene's environment becomes; None where it has none."""
+    """The texture of a scene's environment, if it has one."""
     if scene.environment is None:
         return None
     size = scene.environment.size
-    assert size is not None  # whoever reads a scene has seen to that
+    assert size is not None  # readers of scenes measure it
     return TextureDesc("texture2d", "rgba16f", *size, mips=full_mip_count(*size))
 
 

@@ -29,20 +29,16 @@ def face_normals(positions: npt.ArrayLike, triangles: npt.NDArray[np.integer]) -
 def mean_normals(
     normals: Doubles, corners: npt.NDArray[np.integer], faces: npt.NDArray[np.integer], count: int
 ) -> Doubles:
-    """The mean of the adjacent face normals, `N = Σ Ni / n`, not weighted by area (techniques.md §1), unit length.
+    """The unit mean of the adjacent face normals (f, 3), `N = Σ Ni / n`, not weighted by area (techniques.md §1).
 
-    Args:
-        normals: (f, 3) unit face normals.
-        corners: vertex of each corner, (k,).
-        faces: face of each corner, (k,).
-        count: number of vertices.
+    `corners` and `faces`, (k,), are vertex and face of each corner; there are `count` vertices.
     """
     total = np.stack([np.bincount(corners, weights=normals[faces, axis], minlength=count) for axis in range(3)], axis=1)
     return unit(total)
 
 
 def filled_normals(positions: Floats, triangles: Indices, normals: Doubles) -> tuple[Floats, int]:
-    """Normals of unit length, where zero ones are replaced by the mean of the adjacent faces'; and how many were."""
+    """Unit normals, zero ones replaced by the mean of the adjacent faces', and the number of replaced ones."""
     result = unit(normals)
     zero = ~result.any(axis=1)
     missing = int(zero.sum())
@@ -55,19 +51,13 @@ def filled_normals(positions: Floats, triangles: Indices, normals: Doubles) -> t
 
 
 def flat(mesh: Mesh) -> Mesh:
-    """The same triangles with a vertex of its own for each corner and the face's normal; tangents are dropped."""
+    """The same triangles with a separate vertex for each corner and the face's normal, without tangents."""
     corners = mesh.indices.reshape(-1)
     normals = face_normals(mesh.positions, mesh.indices)
     normals[~normals.any(axis=1)] = (0.0, 0.0, 1.0)
     split = {name: None if (v := getattr(mesh, name)) is None else v[corners] for name in ("uv0", "uv1", "colors")}
-    return Mesh(
-        mesh.name,
-        mesh.positions[corners],
-        np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
-        np.repeat(normals, 3, axis=0).astype(np.float32),
-        None,
-        **split,
-    )
+    indices = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+    return Mesh(mesh.name, mesh.positions[corners], indices, np.repeat(normals, 3, axis=0).astype(np.float32), **split)
 
 
 def strip_triangles(indices: Indices) -> Indices:
@@ -99,11 +89,7 @@ def translation(at: npt.ArrayLike) -> Matrix:
 
 
 def quaternion_matrix(x: float, y: float, z: float, w: float) -> Matrix:
-    """Rotation matrix (3, 3) of a quaternion, normalised first.
-
-    Raises:
-        ValueError: all of it is zero.
-    """
+    """Rotation matrix (3, 3) of a quaternion, normalised first; a zero one is a ValueError."""
     length = math.hypot(x, y, z, w)
     if not length:
         raise ValueError("a rotation of zero length")
@@ -159,11 +145,11 @@ def triangulate(positions: Doubles, corners: Ints, sizes: Ints) -> tuple[Ints, I
 
     Args:
         positions: (n, 3).
-        corners: vertex of each corner, all polygons behind each other.
+        corners: vertex of each corner, one polygon after the other.
         sizes: corners of each polygon, at least 3.
 
     Returns:
-        (m, 3) places in `corners`, and (m,) the polygon of each triangle.
+        (m, 3) indices into `corners`, and (m,) the polygon of each triangle.
 
     Raises:
         ValueError: a concave polygon has more than `MOST_CORNERS` corners; the argument is its number.

@@ -32,11 +32,11 @@ def load(
     """Load the scene in a file and check all of it; the extension chooses the reader.
 
     Args:
-        path: a scene file (.yaml), or a mesh (.obj, .gltf, .glb, or what a plugin reads).
-        check_path: the root rule for every path the file names: returns it resolved or raises InputError. By default
-            paths stay under the file's own folder, links followed.
+        path: a scene file (.yaml), or a mesh (.obj, .gltf, .glb, or a plugin's format).
+        check_path: the root rule for every path in the file: returns it resolved or raises InputError. By default paths
+            stay under the file's own folder, links followed.
         limits: how much the file may ask for.
-        extensions: what plugins read.
+        extensions: formats of plugins.
 
     Returns:
         The scene as the file has it: `animate.complete` adds a camera and a light if there are none. What a reader
@@ -60,14 +60,7 @@ def load(
 
 
 def read_mesh(path: Path, reading: Reading, unknown: Problem, known: tuple[str, ...] = MESHES) -> Scene:
-    """Read the scene in a mesh file.
-
-    Args:
-        path: the file.
-        reading: of that file.
-        unknown: the mistake if there is no reader for such files; the extensions that are read are appended.
-        known: the extensions that are read without plugins.
-    """
+    """Read the scene in a mesh file; `unknown` is the mistake if it has none of the `known` or plugins' extensions."""
     extension = path.suffix.lower()
     if extension == ".obj":
         from rendergraph.scene.obj import read_obj  # each reader comes with its first file
@@ -125,11 +118,7 @@ def _unusable(loader: Added[MeshLoader], what: str, text: str) -> InputError:
 
 
 def _mesh(name: str, part: MeshData) -> Mesh:
-    """A loader's mesh.
-
-    Raises:
-        ValueError: a mistake, as a sentence that begins with the part's name.
-    """
+    """A loader's mesh; a mistake is a ValueError whose text begins with the attribute's name."""
     arrays = {key: _floats(key, getattr(part, key)) for key in _WIDTHS}
     positions = arrays.pop("positions")
     if positions is None or not len(positions):

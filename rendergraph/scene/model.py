@@ -89,7 +89,7 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     @cached_property
     def solid(self) -> bool:
-        """Whether it is closed and encloses a volume: seen from outside, its front faces hide its back faces."""
+        """Whether it is closed and encloses a volume, so that from outside its front faces hide its back faces."""
         return is_solid(self.positions, self.indices)
 
     @cached_property
@@ -354,10 +354,7 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     @cached_property
     def bounds(self) -> tuple[Vec3, Vec3]:
-        """Least and greatest corner of what is drawn; a unit cube where nothing is.
-
-        Boxes of meshes are transformed, so a turned object's box may be larger than the object.
-        """
+        """Least and greatest corner of the transformed boxes of everything drawn; a unit cube if nothing is."""
         shown = [entry for entry in self.objects if not entry.hidden]
         if not shown:
             return (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)
@@ -372,15 +369,15 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return (x, y, z), (u, v, w)
 
     def has_grain(self, material: Material) -> bool:
-        """Whether a material is rougher along one direction than across, now or at another time."""
+        """Whether a material is anisotropic at any time."""
         return material.anisotropy_strength > 0 or self._changes(material, "anisotropy_strength")
 
     def emits(self, material: Material) -> bool:
-        """Whether a material emits light, now or at another time."""
+        """Whether a material emits light at any time."""
         return any(material.emissive) or self._changes(material, "emissive")
 
     def reflects(self, material: Material) -> bool:
-        """Whether what is not metal of a material reflects other than 4 % along its normal, now or at another time."""
+        """Whether the dielectric part of a material has a reflectance other than 4 % at any time."""
         usual = material.ior == 1.5 and material.specular == 1.0 and material.specular_color == (1.0, 1.0, 1.0)
         textured = not material.textures.keys().isdisjoint(("specular", "specular_color"))
         return textured or not usual or any(map(partial(self._changes, material), _REFLECTANCE))
@@ -389,9 +386,8 @@ class Scene(Struct, frozen=True, eq=False, dict=True, weakref=True):
         return f"materials.{material.name}.{key}" in self.keyframes
 
     def __repr__(self) -> str:
-        return (
-            f"<Scene {self.name}: {len(self.objects)} objects, {len(self.lights)} lights, {len(self.cameras)} cameras>"
-        )
+        counts = f"{len(self.objects)} objects, {len(self.lights)} lights, {len(self.cameras)} cameras"
+        return f"<Scene {self.name}: {counts}>"
 
 
 def changed_objects(before: Scene, scene: Scene) -> list[int]:
