@@ -149,7 +149,8 @@ def checked(document: Document, *, keep_going: bool = False, patch: bool = False
 def entries(value: Value | None, *path: str) -> dict[str, Value]:
     """Return the non-null entries of a mapping at a path; empty where it does not exist."""
     found = value.get(*path) if value is not None else None
-    return {key: child for key, child in found.items() if child.data is not None} if found is not None else {}
+    data = found.data if found is not None else None
+    return {key: child for key, child in data.items() if child.data is not None} if isinstance(data, dict) else {}
 
 
 def flag(value: Value | None, *path: str) -> bool:

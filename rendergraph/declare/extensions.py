@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from rendergraph.declare.blame import describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
@@ -192,7 +191,7 @@ class Extensions:
     @property
     def warnings(self) -> tuple[Problem, ...]:
         """The same as warnings, for lists of everything, which leave out what is broken."""
-        return tuple(replace(problem, severity="warning") for problem in self.problems)
+        return tuple(problem.as_warning() for problem in self.problems)
 
     def semantic(self, name: str) -> Semantic | None:
         """A meaning by name, the framework's or a plugin's."""

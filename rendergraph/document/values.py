@@ -77,7 +77,8 @@ class Value(Struct, eq=False):
 
     @property
     def key_place(self) -> Place:
-        return Place(self.source.origin, *(self.key or (self.line, self.column)))
+        line, column = self.key or (self.line, self.column)
+        return Place(self.source.origin, line, column)
 
     @property
     def kind(self) -> str:

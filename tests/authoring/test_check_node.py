@@ -528,7 +528,9 @@ def test_numbers_that_shape_the_plan_are_tried_at_their_ends(check: Check) -> No
     )
     answer = check(ENDS, shader)
     missing, failing = answer.messages
-    assert re.match(r"glow.py:12:5: RG204 output 'color' .* never drawn: .*no step \(with times=1\)", missing), missing
+    assert re.match(r"glow.py:12:5: RG204 output 'color' .* never rendered: .*no step \(with times=1\)", missing), (
+        missing
+    )
     assert re.match(r"glow.py:21:1: RG420 .*ZeroDivisionError: .* \(with times=16\)", failing), failing
     mended = ENDS.replace("if self.times > 1:", "if self.times > 0:").replace("        1 / (16 - self.times)\n", "")
     assert check(mended, shader).messages == []  # nothing waits for a picture of 16384 × 16384
