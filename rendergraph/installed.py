@@ -1,8 +1,8 @@
 """Installed packages: their versions and entry points, read from the folders of metadata beside their code.
 
-`importlib.metadata` tells the same of every kind of archive, and its parsers of e-mails take longer to import than a
-pipeline takes to plan; here a package is a folder of `sys.path` that ends in `.dist-info` (PyPA, "Recording installed
-projects") or `.egg-info`, or an unpacked egg. What lies in a zip archive is not found.
+`importlib.metadata` can do the same for every kind of archive, but importing its e-mail parsers takes longer than
+planning a pipeline. Here a package is a folder of `sys.path` that ends in `.dist-info` (PyPA, "Recording installed
+projects") or `.egg-info`, or an unpacked egg. Packages in zip archives are not found.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ from msgspec import Struct
 
 from rendergraph.errors import Problem, UsageError
 
-_ENDINGS = (".dist-info", ".egg-info")
-
 
 class Package(Struct, frozen=True):
     """An installed package, by the folder of its metadata."""
@@ -29,24 +27,21 @@ class Package(Struct, frozen=True):
 
     @property
     def name(self) -> str:
-        """As it calls itself, which need not be how indexes compare it."""
-        return self._said("Name") or _parts(self.folder)[0]
+        """The name that its metadata gives, not normalised."""
+        return self._field("Name") or _name_and_version(self.folder)[0]
 
     @property
     def version(self) -> str:
-        """As its folder is called, or as it says where that has none: one that is worked on."""
-        return _parts(self.folder)[1] or self._said("Version")
+        """The version in the folder's name; from the metadata where an editable installation has none."""
+        return _name_and_version(self.folder)[1] or self._field("Version")
 
-    def _said(self, word: str) -> str:
-        for file in ("METADATA", "PKG-INFO"):
-            for line in _lines(self.folder, file):
-                if line.startswith(f"{word}:"):
-                    return line.partition(":")[2].strip()
-        return ""
+    def _field(self, name: str) -> str:
+        lines = (line for file in ("METADATA", "PKG-INFO") for line in _lines(self.folder, file))
+        return next((line.partition(":")[2].strip() for line in lines if line.startswith(f"{name}:")), "")
 
 
 class EntryPoint(Struct, frozen=True):
-    """A name under which a package offers something to others, written `name = module:attribute [extra]`."""
+    """A name under which a package offers an object to others, written `name = module:attribute [extra]`."""
 
     group: str
     name: str
@@ -55,7 +50,6 @@ class EntryPoint(Struct, frozen=True):
 
     @property
     def module(self) -> str:
-        """The module to import."""
         return self._target[0].strip()
 
     def load(self) -> Any:
@@ -69,39 +63,38 @@ class EntryPoint(Struct, frozen=True):
 
 
 def plain(name: str) -> str:
-    """A package's name as indexes compare them (PEP 503)."""
+    """Return a package's name as indexes compare them (PEP 503)."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def packages() -> dict[str, Package]:
-    """What is installed by its plain name; where two folders of `sys.path` have one, the first counts."""
+    """Return the installed packages by their plain names; the first folder of `sys.path` that has one counts."""
     found: dict[str, Package] = {}
     for root in dict.fromkeys(sys.path):
         try:
-            inside = sorted(name for name in os.listdir(root or ".") if name.endswith(_ENDINGS))
+            names = sorted(name for name in os.listdir(root or ".") if name.endswith((".dist-info", ".egg-info")))
         except OSError:
             continue
-        if root.endswith(".egg"):
-            inside.append("EGG-INFO")
-        for folder in (os.path.join(root, name) for name in inside):
-            found.setdefault(plain(_parts(folder)[0]), Package(folder))
+        for name in [*names, *(["EGG-INFO"] if root.endswith(".egg") else [])]:
+            folder = os.path.join(root, name)
+            found.setdefault(plain(_name_and_version(folder)[0]), Package(folder))
     return found
 
 
 def version(name: str) -> str | None:
-    """The version of a package; None where it is not installed."""
+    """Return the version of a package; None where it is not installed."""
     return versions([name])[name]
 
 
 def versions(names: Iterable[str]) -> dict[str, str | None]:
-    """The versions of packages by their names; None of those that are not installed."""
+    """Return the versions of packages by their names; None for those that are not installed."""
     known = packages()
     found = {name: known.get(plain(name)) for name in names}
     return {name: package.version if package is not None else None for name, package in found.items()}
 
 
 def entry_points(*groups: str) -> Iterator[EntryPoint]:
-    """What all packages offer under names such as `rendergraph.nodes`; nothing is imported."""
+    """Yield the entry points of all packages in groups such as `rendergraph.nodes`; nothing is imported."""
     for package in packages().values():
         group = ""
         for line in map(str.strip, _lines(package.folder, "entry_points.txt")):
@@ -113,17 +106,12 @@ def entry_points(*groups: str) -> Iterator[EntryPoint]:
 
 
 def require(feature: str, extra: str, *modules: str) -> None:
-    """Check that the packages of an extra are installed.
-
-    Args:
-        feature: what needs them, for the message.
-        extra: as in `pip install 'rendergraph[extra]'`.
-        modules: the modules that they provide.
+    """Check that the `modules` of an extra are installed, which a feature needs.
 
     Raises:
-        UsageError: one is missing.
+        UsageError: one is missing; the message says how to install the extra.
     """
-    from importlib.util import find_spec  # where an extra is used alone
+    from importlib.util import find_spec  # only features with an extra need it
 
     missing = [name.replace("_", "-") for name in modules if find_spec(name) is None]
     if missing:
@@ -131,8 +119,8 @@ def require(feature: str, extra: str, *modules: str) -> None:
         raise UsageError(Problem("RG500", text))
 
 
-def _parts(folder: str) -> tuple[str, str]:
-    """Name and version that a folder of metadata has in its own name, or an egg in its."""
+def _name_and_version(folder: str) -> tuple[str, str]:
+    """What the name of a metadata folder says, or for `EGG-INFO` that of the egg."""
     home, name = os.path.split(folder)
     project, _, rest = (os.path.basename(home) if name == "EGG-INFO" else name).rpartition(".")[0].partition("-")
     return project, rest.partition("-")[0]
