@@ -1,4 +1,4 @@
-"""`rendergraph check-node`: does a node keep its word?"""
+"""`rendergraph check-node`: validate a node."""
 
 from __future__ import annotations
 
@@ -14,25 +14,27 @@ _LIMITS = ("import-seconds", "pass-seconds", "memory")
 
 @click.command("check-node", no_args_is_help=True)
 @click.argument("file", type=options.NamedPath())
-@click.option("--scene", metavar="FILE", help="Draw this: a shipped name, a scene file, .obj, .gltf, .glb.")
+@click.option(
+    "--scene", metavar="FILE", help="Scene for geometry nodes: a shipped name, a scene file, .obj, .gltf, .glb."
+)
 @click.option(
     "--limit",
     "limits",
     multiple=True,
     type=options.LIMIT,
-    help="Allow it more or less: import-seconds (10), pass-seconds (30), memory in MiB (2048).",
+    help="Change a limit: import-seconds (10), pass-seconds (30), memory in MiB (2048).",
 )
 @options.plugin_option
 @options.json_option
 def command(
     file: Path, scene: str | None, limits: tuple[tuple[str, int], ...], plugins: tuple[Path, ...], as_json: bool
 ) -> None:
-    """Try a node of your own in every variant.
+    """Validate a node of your own in every variant.
 
-    FILE is a Python module or a shader file. Looks at its docs and ranges, compiles its shaders with every choice and
-    with inputs connected and not, and draws it: it must write all that it declares, touch nothing else, and leave
-    nothing behind. All of it happens in a process with limits. Exits 0 where all is well; exits 3 with every mistake
-    and its line where not.
+    FILE is a Python module or a shader file. Checks docs and ranges, compiles the shaders with every choice and with
+    inputs connected and not, and renders them: the node must write all outputs that it declares, change nothing else,
+    and leak nothing. This happens in a process with limits. Exits with code 0 if the node is valid, else with code 3
+    and every mistake with its line.
 
     \b
     Examples:
@@ -44,7 +46,7 @@ def command(
     given = dict(limits)
     for name in given:
         if name not in _LIMITS:
-            raise UsageError(Problem("RG500", f"there is no limit '{name}'{suggestion(name, _LIMITS)}"))
+            raise UsageError(Problem("RG500", f"unknown limit '{name}'{suggestion(name, _LIMITS)}"))
     default = CheckLimits()
     allowed = CheckLimits(
         given.get("import-seconds", default.import_seconds),

@@ -11,13 +11,13 @@ _KINDS = ("fullscreen", "compute", "geometry", "shader-only")
 
 @click.command("new-node", no_args_is_help=True)
 @click.argument("name")
-@click.option("--kind", type=click.Choice(_KINDS), default=_KINDS[0], show_default=True, help="What it starts as.")
-@click.option("--package", is_flag=True, help="Make a folder that can be installed and given to others.")
+@click.option("--kind", type=click.Choice(_KINDS), default=_KINDS[0], show_default=True, help="The template.")
+@click.option("--package", is_flag=True, help="Write a folder that can be installed and shared.")
 @options.json_option
 def command(name: str, kind: str, package: bool, as_json: bool) -> None:
     """Write a working node into the current folder.
 
-    A module, its shader, a pipeline that uses it and a test that passes; change them into yours. No file is ever
+    A module, its shader, a pipeline that uses it and a test that passes, for you to change. No file is ever
     overwritten.
 
     \b
@@ -28,16 +28,10 @@ def command(name: str, kind: str, package: bool, as_json: bool) -> None:
     """
     from rendergraph.authoring import new_node
 
-    made = new_node(name, kind, package=package)  # type: ignore[arg-type]  # click has checked the word
+    node = new_node(name, kind, package=package)  # type: ignore[arg-type]  # click has checked the word
+    files = [path.as_posix() for path in node.files]
     if as_json:
-        emit_json(
-            {
-                "node": made.name,
-                "kind": made.kind,
-                "files": [path.as_posix() for path in made.files],
-                "commands": list(made.commands),
-            }
-        )
+        emit_json({"node": node.name, "kind": node.kind, "files": files, "commands": list(node.commands)})
     else:
-        emit("\n".join(path.as_posix() for path in made.files))
-    say("next:\n" + "\n".join(f"  {line}" for line in made.commands))
+        emit("\n".join(files))
+    say("next:\n" + "\n".join(f"  {line}" for line in node.commands))

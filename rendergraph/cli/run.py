@@ -108,9 +108,9 @@ def command(
     if watch:
         if executor is not None:
             raise UsageError(Problem("RG500", "--watch renders in this process; leave out --executor"))
-        from rendergraph.cli.watching import keep_drawing
+        from rendergraph.cli.watching import watch_and_render
 
-        keep_drawing(lambda gpu: draw(*read(), gpu), device, as_json=as_json)
+        watch_and_render(lambda gpu: draw(*read(), gpu), device, as_json=as_json)
         return
     with track_reads() as files:
         expanded, targets = read()

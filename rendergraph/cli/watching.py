@@ -1,4 +1,4 @@
-"""`run --watch`: what is said while pictures follow their files."""
+"""`run --watch`: reports while pictures follow their files."""
 
 from __future__ import annotations
 
@@ -18,30 +18,26 @@ if TYPE_CHECKING:
     from rendergraph.session.watch import Turn
 
 Draw: TypeAlias = "Callable[[Gpu], dict[str, Any]]"
-"""Reads, draws and writes everything; returns the document of `run --json`."""
+"""Reads, renders and writes everything; returns the document of `run --json`."""
 
 _SHIPPED = ("rendergraph.pipelines", "rendergraph.shaders", "rendergraph.nodes")
 _MOST_NAMES = 3
 
 
-def keep_drawing(draw: Draw, device: int | None, *, as_json: bool) -> None:
-    """Draw, and again after every change; ends with the program.
-
-    Raises:
-        RendergraphError: the first picture failed, and no file of the user's could mend it.
-    """
+def watch_and_render(draw: Draw, device: int | None, *, as_json: bool) -> None:
+    """Render now and after every change; raises where the first picture fails and no edit of a file could fix it."""
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.watch import turns
 
-    told: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
     with Gpu(device) as gpu:
         for number, turn in enumerate(turns(partial(_attempt, draw), gpu)):
             if turn.error is not None:
-                if number == 0 and not _can_be_mended(turn.error, turn):
+                if number == 0 and not _is_fixable(turn.error, turn):
                     raise turn.error
-                told = _say_error(turn.error, turn.changed, told)
+                reported = _report_error(turn.error, turn.changed, reported)
             else:
-                told = ()
+                reported = ()
                 if number == 0:
                     say_summary(turn.value or {})
                 else:
@@ -52,11 +48,11 @@ def keep_drawing(draw: Draw, device: int | None, *, as_json: bool) -> None:
             if as_json:
                 emit_json(_document(turn), line=True)
             if (stream := data_stream()) is not None:
-                stream.flush()  # whoever reads a pipe waits for this picture, not for a full buffer
+                stream.flush()  # the reader of a pipe waits for this picture
 
 
 def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
-    """Draw; a mistake of the program's own is said like any other, and the next edit tried."""
+    """Render; internal errors are reported like any other, and the next edit is tried."""
     try:
         return draw(gpu)
     except (RendergraphError, OSError):
@@ -67,28 +63,28 @@ def _attempt(draw: Draw, gpu: Gpu) -> dict[str, Any]:
         raise RenderError(unexpected(error)) from error
 
 
-def _can_be_mended(error: RendergraphError, turn: Turn[Any]) -> bool:
-    """Whether the user has a file in this at all: a misspelt name on the command line is better said at once."""
+def _is_fixable(error: RendergraphError, turn: Turn[Any]) -> bool:
+    """Return whether a file of the user's is involved: a misspelt name on the command line ends the program instead."""
     shipped = [folder(package) for package in _SHIPPED]
-    there = [Path(name) for name, found in turn.files.items() if found is not None]
-    own = (path for path in there if path.is_file() and not any(path.is_relative_to(place) for place in shipped))
+    existing = [Path(name) for name, found in turn.files.items() if found is not None]
+    own = (path for path in existing if path.is_file() and not any(path.is_relative_to(place) for place in shipped))
     return isinstance(error, InputError) and any(own)
 
 
-def _say_error(error: RendergraphError, changed: tuple[Path, ...], told: tuple[str, ...]) -> tuple[str, ...]:
-    """Say what is wrong, each mistake once while it lasts; what has been said."""
+def _report_error(error: RendergraphError, changed: tuple[Path, ...], before: tuple[str, ...]) -> tuple[str, ...]:
+    """Report each mistake once while it lasts, and return those that have been reported."""
     now = tuple(str(problem) for problem in error.problems)
-    warn([problem for problem in error.problems if str(problem) not in told])
+    warn([problem for problem in error.problems if str(problem) not in before])
     if changed:
-        say(f"{_names(changed)}: not drawn, the last picture stays" + ("; the same mistake" if now == told else ""))
+        say(f"{_names(changed)}: not rendered, keeping the last picture" + ("; same mistake" if now == before else ""))
     return now
 
 
 def _line(turn: Turn[Any]) -> str:
-    made = [f"{count} {name if count != 1 else name[:-1]}" for name, count in turn.made.items() if count]
+    rebuilt = [f"{count} {name if count != 1 else name[:-1]}" for name, count in turn.made.items() if count]
     frame_ms = (turn.value or {})["frame_ms"]["median"]
-    what = f"made {', '.join(made)}" if made else "nothing made anew"
-    return f"{_names(turn.changed)}: drawn again in {turn.ms:.0f} ms ({frame_ms:.1f} ms a frame), {what}"
+    what = f"rebuilt {', '.join(rebuilt)}" if rebuilt else "nothing rebuilt"
+    return f"{_names(turn.changed)}: rendered in {turn.ms:.0f} ms ({frame_ms:.1f} ms per frame), {what}"
 
 
 def _names(paths: tuple[Path, ...]) -> str:

@@ -15,18 +15,7 @@ from uuid import uuid4
 
 from rendergraph.errors import InputError, Problem, RenderError, UsageError
 from rendergraph.farm.bundle import Bundle, make_bundle
-from rendergraph.farm.tasks import (
-    ATTEMPTS,
-    Event,
-    Executor,
-    Handle,
-    Task,
-    TaskFailed,
-    TaskFinished,
-    TaskOutput,
-    TaskRetried,
-    is_retryable,
-)
+from rendergraph.farm.tasks import Event, Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, is_retryable
 from rendergraph.installed import require, version
 
 Client: TypeAlias = Any  # an extra, of which most is not typed
@@ -97,6 +86,7 @@ class Dask(Executor):
         owned: bool = False,
     ) -> None:
         """Use a client, which is closed at the end where it is `owned`, like a cluster that was started for it."""
+        super().__init__()
         workers = _workers(client)
         self._resources = {"GPU": 1} if any("GPU" in each["resources"] for each in workers.values()) else None
         self.workers = max(1, sum(self._resources is None or "GPU" in each["resources"] for each in workers.values()))
@@ -111,8 +101,6 @@ class Dask(Executor):
         self._done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         self._tasks: dict[str, Task] = {}
         self._futures: dict[str, Future] = {}
-        self._tried: dict[Task, int] = {}
-        self._inputs_lost: dict[Task, int] = {}  # how often a task's uploaded inputs were lost with workers
         self._upload_of: dict[Task, int] = {}  # the upload that a task was submitted with
 
     def upload_inputs(self, make: Callable[[], Bundle]) -> None:
@@ -235,12 +223,12 @@ class Dask(Executor):
             if self._upload_of[task] == self._uploads:  # most likely its inputs are lost, too
                 self._upload_again()
             error = RenderError(Problem("RG640", "the cluster lost the task"))
-            yield from self._retry(task, "scheduler", error, self._inputs_lost, self.workers + 1)
+            yield self.retry(task, "scheduler", error, inputs_lost=True)
             return
         if future.status == "error":
             error = future.exception()
             text = f"worker lost: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
-            yield from self._retry(task, "cluster", RenderError(Problem("RG640", text)))
+            yield self.retry(task, "cluster", RenderError(Problem("RG640", text)))
             return
         worker, messages = future.result()
         for kind, value in messages:
@@ -249,21 +237,9 @@ class Dask(Executor):
             elif kind == "finished":
                 yield TaskFinished(task, worker, value)
             elif kind == "lost" or is_retryable(value):
-                yield from self._retry(task, worker, value)
+                yield self.retry(task, worker, value)
             else:
                 yield TaskFailed(task, worker, value)
-
-    def _retry(
-        self, task: Task, worker: str, error: Any, tried: dict[Task, int] | None = None, most: int = ATTEMPTS
-    ) -> Iterator[Event]:
-        """Begin a task again, unless that was too often; where its inputs were lost, each worker counts."""
-        tried = self._tried if tried is None else tried
-        tried[task] = tried.get(task, 0) + 1
-        if tried[task] < most:
-            self.submit(task)
-            yield TaskRetried(task, worker, tuple(error.problems))
-        else:
-            yield TaskFailed(task, worker, error, lost=True)
 
     def close(self) -> None:
         """Leave the cluster: our tasks there end, and so does a cluster that was started here."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rendergraph.errors import Problem, UsageError
@@ -25,7 +25,6 @@ _NAME = re.compile(r"serial|(processes|dask)(?::([1-9][0-9]{0,3}))?|dask://[^\s/
 _MOST_WORKERS = 1024
 
 
-@contextmanager
 def make_executor(
     choice: ExecutorChoice = None,
     session: Gpu | None = None,
@@ -35,8 +34,8 @@ def make_executor(
     devices: Sequence[int] = (),
     timeout: float | None = None,
     travels: bool = True,
-) -> Iterator[Executor]:
-    """Provide the chosen executor; one that was given is left open.
+) -> AbstractContextManager[Executor]:
+    """Return the chosen executor, to be closed by a `with` statement, which leaves open one that was given.
 
     The default is this process, or for several tasks as many processes as the machine has devices, or cores where it
     has a software rasteriser alone. Work with in-memory node classes does not travel to other processes.
@@ -46,21 +45,8 @@ def make_executor(
         RenderError: the cluster cannot be reached.
     """
     if isinstance(choice, Executor):
-        yield choice
-        return
-    with _make(choice, session, device, tasks, tuple(devices), timeout or TIMEOUT, travels) as executor:
-        yield executor
-
-
-def _make(
-    choice: ExecutorChoice,
-    session: Gpu | None,
-    device: int | None,
-    tasks: int,
-    devices: tuple[int, ...],
-    timeout: float,
-    travels: bool,
-) -> Executor:
+        return nullcontext(choice)
+    timeout = timeout or TIMEOUT
     if choice == "serial" or (choice is None and (session is not None or tasks < 2 or not travels)):
         return Serial(session, devices[0] if devices and device is None else device)
     if choice is None:
@@ -104,10 +90,10 @@ def cores() -> int:
         return os.cpu_count() or 1
 
 
-def _machine(device: int | None, devices: tuple[int, ...]) -> tuple[int, tuple[int | None, ...]]:
+def _machine(device: int | None, devices: Sequence[int]) -> tuple[int, tuple[int | None, ...]]:
     """Return how many processes this machine takes, and the devices they share."""
     if devices:
-        return len(devices), devices
+        return len(devices), tuple(devices)
     if device is not None:
         return 1, (device,)
     from rendergraph.gl.egl import hardware  # asks the driver

@@ -11,37 +11,23 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from rendergraph.errors import DeviceError, RenderError, RendergraphError
-from rendergraph.farm.tasks import (
-    ATTEMPTS,
-    Event,
-    Executor,
-    Handle,
-    Task,
-    TaskFailed,
-    TaskFinished,
-    TaskOutput,
-    TaskRetried,
-    is_retryable,
-)
+from rendergraph.farm.tasks import Event, Executor, Handle, Task, TaskFailed, TaskFinished, TaskOutput, is_retryable
 from rendergraph.farm.worker_process import TIMEOUT, WorkerProcess
 
 
 class Processes(Executor):
     """Processes on this machine, which read files in place."""
 
-    def __init__(
-        self, count: int, devices: Sequence[int | None] = (None,), *, timeout: float = TIMEOUT, attempts: int = ATTEMPTS
-    ) -> None:
+    def __init__(self, count: int, devices: Sequence[int | None] = (None,), *, timeout: float = TIMEOUT) -> None:
         """Describe the processes, which are started for tasks; they get the devices in turns."""
+        super().__init__()
         self.workers = count
-        self._attempts = attempts
         self._idle = [
             WorkerProcess(f"process-{number}", devices[number % len(devices)], timeout=timeout)
             for number in range(count)
         ]
         self._busy: dict[WorkerProcess, Task] = {}
         self._waiting: deque[Task] = deque()
-        self._tried: dict[Task, int] = {}
         self._values: dict[str, bytes] = {}
         threads = str(max(1, (os.cpu_count() or 1) // count))  # else each software rasteriser takes all cores
         self._environment = {"LP_NUM_THREADS": os.environ.get("LP_NUM_THREADS", threads)}
@@ -104,12 +90,7 @@ class Processes(Executor):
     def _retry(self, worker: WorkerProcess, error: RendergraphError) -> Event:
         """End a process that is of no more use; its task is begun again, or has failed."""
         worker.kill()
-        task = self._free(worker)
-        self._tried[task] = self._tried.get(task, 0) + 1
-        if self._tried[task] < self._attempts:
-            self._waiting.append(task)
-            return TaskRetried(task, worker.name, tuple(error.problems))
-        return TaskFailed(task, worker.name, error, lost=True)
+        return self.retry(self._free(worker), worker.name, error)
 
     def close(self) -> None:
         self._waiting.clear()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
@@ -124,6 +124,9 @@ class Executor(AbstractContextManager["Executor"], ABC):
 
     workers: int
 
+    def __init__(self) -> None:
+        self._lost: Counter[tuple[Task, bool]] = Counter()
+
     @abstractmethod
     def submit(self, task: Task) -> None:
         """Add a task; also while events are taken."""
@@ -147,6 +150,14 @@ class Executor(AbstractContextManager["Executor"], ABC):
 
     def upload_inputs(self, make: Callable[[], Bundle]) -> None:
         """Send the input files to workers that do not share a disk with this process, and check their packages."""
+
+    def retry(self, task: Task, worker: str, error: RendergraphError, *, inputs_lost: bool = False) -> Event:
+        """Submit a task again whose worker was lost, unless that was too often; its inputs may go with every worker."""
+        self._lost[task, inputs_lost] += 1
+        if self._lost[task, inputs_lost] < (self.workers + 1 if inputs_lost else ATTEMPTS):
+            self.submit(task)
+            return TaskRetried(task, worker, tuple(error.problems))
+        return TaskFailed(task, worker, error, lost=True)
 
     def __enter__(self) -> Self:
         return self

@@ -253,13 +253,13 @@ def test_searches_that_cannot_be_are_told(cli: Any, words: tuple[str, ...], code
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (("export", "study.yaml", "-o", "job.yaml"), 2, "RG500 say which kind of job: --openjd"),
+        (("export", "study.yaml", "-o", "job.yaml"), 2, "RG500 farm export needs the kind of job: --openjd"),
         (("export", "missing.yaml", "--openjd", "-o", "job.yaml"), 3, "RG011 there is no file 'missing.yaml'"),
         (("export", "wrong.yaml", "--openjd", "-o", "job.yaml"), 3, "wrong.yaml:3:8: RG103"),
-        (("measure", "study.yaml", "-o", "out"), 2, "RG500 farm measure draws some runs: --runs 1-16"),
+        (("measure", "study.yaml", "-o", "out"), 2, "RG500 farm measure needs --runs, such as --runs 1-16"),
         (("measure", "study.yaml", "--runs", "3", "-o", "out"), 2, "there is no run 3; the sweep has 2 runs"),
         (("measure", "study.yaml", "--runs", "2-1", "-o", "out"), 2, "'2-1' is not N or A-B"),
-        (("frames", "study.yaml", "--runs", "1", "-o", "out"), 2, "RG500 farm frames draws some frames: --frames 1-24"),
+        (("frames", "study.yaml", "--runs", "1", "-o", "out"), 2, "RG500 farm frames needs --frames, such as --frames 1-24"),
     ],
 )
 def test_jobs_that_cannot_be_are_told(

@@ -85,7 +85,7 @@ class Watched:
         """What is said after a change, up to the line that ends it."""
         seen = len(self.err)
         change()
-        self.wait(lambda: any(": drawn again in" in line or ": not drawn" in line for line in self.err[seen:]))
+        self.wait(lambda: any(": rendered in" in line or ": not rendered" in line for line in self.err[seen:]))
         return "".join(self.err[seen:])
 
     def stop(self, number: int = signal.SIGINT) -> int:
@@ -139,23 +139,23 @@ def test_every_kind_of_file_is_followed_and_only_what_it_touches_is_made(folder:
     assert shade(folder / "a.png") == pytest.approx(0.2, abs=0.01)
 
     said = child.after(lambda: edit(folder / "my.yaml", "gain: 1.0", "gain: 2.0"))
-    assert "my.yaml: drawn again in" in said
-    assert said.endswith(", nothing made anew\n")
+    assert "my.yaml: rendered in" in said
+    assert said.endswith(", nothing rebuilt\n")
     assert shade(folder / "a.png") == pytest.approx(0.4, abs=0.01)
 
     said = child.after(lambda: edit(folder / "inner.glsl", "0.2", "0.3"))  # an include of an include
-    assert "inner.glsl: drawn again in" in said
-    assert "made 1 program, " in said
+    assert "inner.glsl: rendered in" in said
+    assert "rebuilt 1 program, " in said
     assert shade(folder / "a.png") == pytest.approx(0.6, abs=0.01)
 
     said = child.after(lambda: edit(folder / "flat.frag", "* gain)", "* gain * 0.5)", rename=False))
-    assert "made 1 program, " in said
+    assert "rebuilt 1 program, " in said
     assert shade(folder / "a.png") == pytest.approx(0.3, abs=0.01)
 
     said = child.after(
         lambda: edit(folder / "base.yaml", "size: [8, 8]", "size: [8, 16]")
     )  # extended by what we extend
-    assert "made " in said
+    assert "rebuilt " in said
     assert "program" not in said
     assert images.read(folder / "a.png").shape[:2] == (16, 8)
 
@@ -175,15 +175,15 @@ def test_a_mistake_is_said_once_and_the_last_picture_stays(folder: Path, start: 
     said = child.after(lambda: edit(folder / "inner.glsl", "0.2", "0.2 +"))
     assert "outer.glsl:2:" in said
     assert "RG410" in said
-    assert "the last picture stays" in said
-    assert child.after(lambda: edit(folder / "inner.glsl", "0.2 +", "0.2 + ")).endswith("; the same mistake\n")
+    assert "keeping the last picture" in said
+    assert child.after(lambda: edit(folder / "inner.glsl", "0.2 +", "0.2 + ")).endswith("; same mistake\n")
     said = child.after(lambda: edit(folder / "my.yaml", "gain", "gian"))
     assert "my.yaml:3:" in said
     assert "did you mean 'gain'?" in said
     assert (folder / "a.png").read_bytes() == before
     child.after(lambda: edit(folder / "inner.glsl", "0.2 + ", "0.4"))
     said = child.after(lambda: edit(folder / "my.yaml", "gian", "gain"))
-    assert ": drawn again in" in said
+    assert ": rendered in" in said
     assert shade(folder / "a.png") == pytest.approx(0.4, abs=0.01)
     assert sum("RG410" in line for line in child.err) == 1
     assert child.stop(signal.SIGTERM) == 143
@@ -193,10 +193,10 @@ def test_a_file_that_vanishes_is_waited_for(folder: Path, start: Start) -> None:
     child = start("-o", "a.png")
     (folder / "inner.glsl").rename(folder / "away")
     threading.Timer(0.3, lambda: (folder / "inner.glsl").write_text("#define VALUE 0.8\n")).start()
-    assert ": drawn again in" in child.after(lambda: None)  # never seen to be missing
+    assert ": rendered in" in child.after(lambda: None)  # never seen to be missing
     assert shade(folder / "a.png") == pytest.approx(0.8, abs=0.01)
     said = child.after((folder / "my.yaml").unlink)
-    assert said == "RG011 there is no file 'my.yaml'\nmy.yaml: not drawn, the last picture stays\n"
+    assert said == "RG011 there is no file 'my.yaml'\nmy.yaml: not rendered, keeping the last picture\n"
     child.after(lambda: (folder / "my.yaml").write_text(FILES["my.yaml"].replace("1.0", "0.5")))
     assert shade(folder / "a.png") == pytest.approx(0.4, abs=0.01)
 
@@ -243,7 +243,7 @@ def test_settings_and_a_python_node_with_its_helper_are_followed(folder: Path, s
     child.after(lambda: (folder / "rendergraph.toml").write_text('plugins = ["fx"]\n'))
     assert shade(folder / "a.png") == pytest.approx(0.5, abs=0.01)
     said = child.after(lambda: edit(folder / "fx/_help.py", "0.5", "0.7"))
-    assert said.endswith(", nothing made anew\n")
+    assert said.endswith(", nothing rebuilt\n")
     assert shade(folder / "a.png") == pytest.approx(0.7, abs=0.01)
     said = child.after(lambda: edit(folder / "fx/bright.py", "param(default", "param(defualt"))
     assert "bright.py:9:" in said
