@@ -68,9 +68,9 @@ class Served:
         with connect(address, origin=found, max_size=None, proxy=None) as socket:  # type: ignore[arg-type]
             yield Tab(socket)
 
-    def reset(self, opened: rg.Selection | None = None) -> None:
+    def reset(self, opened: rg.Selection = FORWARD) -> None:
         """The state as of a server that was started now, with its picture."""
-        self.state.__init__(opened or self.state.opened, self.folder)
+        self.state.__init__(opened, self.folder)
         with self.tab() as tab:
             for number in (2, 1):  # the first message may be of a picture from before
                 tab.say(do="frame", number=number)

@@ -17,6 +17,12 @@ ConnectionClosed = pytest.importorskip("websockets").ConnectionClosed
 pytestmark = pytest.mark.slow
 
 
+@pytest.fixture(scope="module", autouse=True)
+def fresh(served: Any) -> None:
+    """Other modules show other pipelines on the same page."""
+    served.reset()
+
+
 def get(served: Any, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
     connection = http.client.HTTPConnection("127.0.0.1", served.port, timeout=10)
     try:
