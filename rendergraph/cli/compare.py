@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 BEYOND = 4
 """Exit code of a comparison that exceeds a threshold."""
 _LIMITED = ("flip", "rmse", "radiance_rmse")
-SOFTWARE = "times of a software rasteriser say nothing about GPUs"
+SOFTWARE = "times on a software rasteriser: no measure of a GPU"
 
 
 class Threshold(Struct, frozen=True):

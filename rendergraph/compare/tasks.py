@@ -318,7 +318,7 @@ def _rendered(
 
 def _encoded(run: RunSpec, graph: Graph, pixels: Pixels) -> bytes:
     """Return the file of a run's picture."""
-    from rendergraph.images import PictureInfo, Saved, encoded
+    from rendergraph.images import PictureInfo, Saved, encoded  # a sweep is checked without OpenImageIO
 
     info = graph.textures[graph.outputs[run.output]]
     picture = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)

@@ -82,7 +82,7 @@ def render_frames(
         InputError, RenderError: as from rendering.
     """
     from rendergraph.images import Saved, numbered, save_outputs  # exporting a job needs no OpenImageIO
-    from rendergraph.session import RenderOptions, stages
+    from rendergraph.session import RenderOptions, stages  # nor this
 
     for run in prepare(base, axes, out, None, metric=metric, only=only).runs:
         linked = run.planned.linked

@@ -14,12 +14,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from rendergraph.compare.results import Comparison
 from rendergraph.compare.timing import Spread
-from rendergraph.images import heat_map, viewable, write
+from rendergraph.images import viewable, write
 from rendergraph.metrics import Encoding, Pixels
 
-MOST_NOTEBOOK_PICTURES = 6
 SOFTWARE = "software rasteriser: no measure of a GPU"
 
 
@@ -114,41 +112,22 @@ def section(identity: str, title: str, *parts: str) -> Section:
     return Section(identity, title, "\n".join(part for part in parts if part))
 
 
-def notebook_html(comparison: Comparison) -> str:
-    """Return pictures in a row above a table; their styles are inline, because the page around them has its own."""
-    reference = comparison.reference
-    figures = []
-    if reference.kind != "variant":
-        picture = eight_bit(reference.pixels, reference.encoding)
-        figures.append(_notebook_figure(f"{reference.name}, the reference", picture))
-    rendered = [result for result in comparison.results if result.pixels is not None]
-    for result in rendered[:MOST_NOTEBOOK_PICTURES]:
-        assert result.pixels is not None
-        figures.append(_notebook_figure(result.name, eight_bit(result.pixels, result.encoding)))
-        if result.flip_map is not None:
-            caption = f"FLIP of {result.name}: {number(result.metrics.flip)}"
-            figures.append(_notebook_figure(caption, heat_map(result.flip_map)))
-    times = "GPU ms" if all(result.times.gpu_ms for result in comparison.results) else "ms"
-    rows = [_notebook_row("th", ("", "FLIP", "RMSE", "PSNR dB", "SSIM", times))]
-    for result in comparison.results:
-        m, ms = result.metrics, number(result.times.headline.median, 2)
-        psnr = "∞" if m.psnr is None else number(m.psnr, 2)
-        rows.append(_notebook_row("td", (result.name, number(m.flip), number(m.rmse), psnr, number(m.ssim), ms)))
-    scene = f"{comparison.scene}, " if comparison.scene else ""
-    software = f"; {SOFTWARE}" if comparison.software else ""
-    about = f"{scene}{comparison.size[0]}×{comparison.size[1]}, against {reference.name}{software}"
-    return (
-        f'<div style="display:flex;flex-wrap:wrap;gap:12px">{"".join(figures)}</div>'
-        f"<table>{''.join(rows)}</table><div>{escape(about)}</div>"
-    )
+def notebook_html(
+    pictures: Sequence[tuple[str, npt.NDArray[np.uint8]]], rows: Sequence[Sequence[str]], about: str
+) -> str:
+    """Return pictures with captions above a table, whose first row has the headings, and a line of text.
 
-
-def _notebook_row(cell: str, texts: Sequence[str]) -> str:
-    return f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in texts)}</tr>"
-
-
-def _notebook_figure(caption: str, pixels: npt.NDArray[np.uint8]) -> str:
-    return (
+    Styles are inline, because the page of a notebook has its own.
+    """
+    figures = "".join(
         f'<figure style="margin:0;max-width:320px"><img src="{png(pixels)}" alt="{escape(caption)}" '
         f'style="width:100%;border:1px solid #7d8590"><figcaption>{escape(caption)}</figcaption></figure>'
+        for caption, pixels in pictures
+    )
+    lines = []
+    for row, cell in zip(rows, ("th", *("td",) * len(rows)), strict=False):
+        lines.append(f"<tr>{''.join(f'<{cell}>{escape(text)}</{cell}>' for text in row)}</tr>")
+    return (
+        f'<div style="display:flex;flex-wrap:wrap;gap:12px">{figures}</div>'
+        f"<table>{''.join(lines)}</table><div>{escape(about)}</div>"
     )
