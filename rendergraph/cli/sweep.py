@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -229,6 +228,8 @@ def _space(file: SweepFile | None, axes: tuple[Axis, ...], **sampling: Any) -> S
     named = {axis.path for axis in axes}
     merged = (*(axis for axis in base.axes if axis.path not in named), *axes)
     given = {name: value for name, value in sampling.items() if value not in (None, ())}
+    import dataclasses
+
     return dataclasses.replace(base, axes=merged, **given)
 
 

@@ -259,7 +259,11 @@ def test_searches_that_cannot_be_are_told(cli: Any, words: tuple[str, ...], code
         (("measure", "study.yaml", "-o", "out"), 2, "RG500 farm measure needs --runs, such as --runs 1-16"),
         (("measure", "study.yaml", "--runs", "3", "-o", "out"), 2, "there is no run 3; the sweep has 2 runs"),
         (("measure", "study.yaml", "--runs", "2-1", "-o", "out"), 2, "'2-1' is not N or A-B"),
-        (("frames", "study.yaml", "--runs", "1", "-o", "out"), 2, "RG500 farm frames needs --frames, such as --frames 1-24"),
+        (
+            ("frames", "study.yaml", "--runs", "1", "-o", "out"),
+            2,
+            "RG500 farm frames needs --frames, such as --frames 1-24",
+        ),
     ],
 )
 def test_jobs_that_cannot_be_are_told(

@@ -19,7 +19,7 @@ from rendergraph.resources import folder
 
 SMALL = ("--size", "64x36")
 SMALLEST = {  # what is added to the examples of a verb: of options that are given twice the last one counts
-    "run": SMALL,
+    "run": (*SMALL, "-s", "sun.resolution=128"),
     "bench": (*SMALL, "-n", "2"),
     "compare": (*SMALL, "-n", "1"),
     "sweep": (*SMALL, "-n", "1"),
@@ -105,28 +105,58 @@ def test_test_modes_change_no_pixel(cli: Any) -> None:
 
 
 def test_taps_keep_values_and_are_viewable(cli: Any) -> None:
-    words = ["--tap", "sun.shadow_map=s.exr", "--tap", "light.surface_depth=d.exr", "--tap", "display.color=c.exr"]
+    words = [
+        "-s",
+        "sun.resolution=256",
+        "--tap",
+        "sun.shadow_map=s.exr",
+        "--tap",
+        "light.surface_depth=d.exr",
+        "--tap",
+        "display.color=c.exr",
+    ]
     assert cli("run", "forward", *SMALL, *words, "--tap", "sun.shadow_map=s.png").code == 0
-    assert images.read("s.exr").shape == (1, 2048, 2048, 1)
+    assert images.read("s.exr").shape == (1, 256, 256, 1)
     assert images.read("d.exr").shape == (36, 64, 1)
     assert images.read("c.exr").shape == (36, 64, 4)
-    assert images.read("s.png").shape == (2048, 2048, 1)
+    assert images.read("s.png").shape == (256, 256, 1)
 
 
 def test_taps_of_parts_become_pictures_and_keep_values(cli: Any) -> None:
     words = ["bloom.glow[mip=1]=g.exr", "sun.shadow_map[0]=s.png", "sun.shadow_map[0]=s.exr"]
     assert (
-        cli("run", "bloom", "--scene", "cornell_box", *SMALL, *(word for tap in words for word in ("--tap", tap))).code
+        cli(
+            "run",
+            "bloom",
+            "--scene",
+            "cornell_box",
+            *SMALL,
+            "-s",
+            "sun.resolution=256",
+            *(word for tap in words for word in ("--tap", tap)),
+        ).code
         == 0
     )
     assert images.read("g.exr").shape == (9, 16, 4)
-    assert images.read("s.png").shape == (2048, 2048, 1)
-    assert images.read("s.exr").shape == (2048, 2048, 1)
+    assert images.read("s.png").shape == (256, 256, 1)
+    assert images.read("s.exr").shape == (256, 256, 1)
 
 
 @pytest.mark.slow
 def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_path: Path) -> None:
-    result = cli("run", "bloom", "--scene", "cornell_box", *SMALL, "--tap-all", "a/inside", "-o", "b.exr")
+    result = cli(
+        "run",
+        "bloom",
+        "--scene",
+        "cornell_box",
+        *SMALL,
+        "-s",
+        "sun.resolution=64",
+        "--tap-all",
+        "a/inside",
+        "-o",
+        "b.exr",
+    )
     assert result.code == 0
     names = [line.removeprefix("a/inside/") for line in result.out.splitlines()[1:]]
     assert [name.partition("-")[0] for name in names[:-1]] == [f"{n:02d}" for n in range(1, len(names))]
@@ -141,7 +171,7 @@ def test_all_ports_become_pictures_in_order_and_a_sheet_of_them(cli: Any, tmp_pa
 
 @pytest.mark.slow
 def test_all_ports_of_several_frames_are_numbered(cli: Any, tmp_path: Path) -> None:
-    assert cli("run", "forward", "--scene", "spheres", *SMALL, "--tap-all", "in", "--frames", "1-2").code == 0
+    assert cli("run", "forward", *SMALL, "-s", "sun.resolution=64", "--tap-all", "in", "--frames", "1-2").code == 0
     assert {"contact.0001.png", "contact.0002.png"} < {path.name for path in (tmp_path / "in").iterdir()}
     assert not (tmp_path / "forward.png").exists()
 
