@@ -78,8 +78,6 @@ class FrameScene:
     def __init__(self, scene: Scene, before: FrameScene | None = None) -> None:
         """Share with the scene of the frames until now what has not changed."""
         self.scene = self.placed = scene
-        self.lights, self.objects = scene.lights, scene.objects
-        self.materials, self.meshes = scene.materials, scene.meshes
         if before is None or "corners" not in vars(before) or before.placed.meshes is not scene.meshes:
             return
         moved = changed_objects(before.placed, scene)
@@ -87,6 +85,12 @@ class FrameScene:
         self.corners[moved] = corners_of(self.meshes, [self.objects[number] for number in moved])
         if all(_flags(before.placed.objects[number]) == _flags(self.objects[number]) for number in moved):
             self.shown, self.casting = before.shown, before.casting
+
+    # `scene` is replaced while no object moves; lights may have changed nevertheless.
+    lights = property(attrgetter("scene.lights"))
+    objects = property(attrgetter("scene.objects"))
+    materials = property(attrgetter("scene.materials"))
+    meshes = property(attrgetter("scene.meshes"))
 
     @cached_property
     def corners(self) -> Corners:

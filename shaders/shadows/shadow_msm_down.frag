@@ -1,5 +1,5 @@
-// The first four moments of depth in one layer of a shadow map, averaged along columns, and the share of covered texels.
-// Depth is mapped to z from -1 to 1: there the moments are far better conditioned in float32 than from 0 to 1.
+// The first four moments of depth in one layer of a shadow map, averaged along columns, and the share of covered
+// texels. Depth is mapped to z from -1 to 1: there the moments are far better conditioned in float32 than from 0 to 1.
 #include "range_fraction.glsl"
 
 uniform sampler2D shadow_map;

@@ -419,14 +419,14 @@ outputs: {image: c.color}
 """
     pipeline = bench.pipeline(text, Table, Continues, shaders=SHADERS)
     with pytest.raises(
-        InputError, match=r"RG439 node 'c' .* goes on with 'a.table', which is kept from frame to frame"
+        InputError, match=r"RG439 node 'c' .* continues 'a.table', which is kept from frame to frame"
     ):
         pipeline.check()
 
 
 def test_a_kept_value_has_no_last_frame(bench: Any) -> None:
     pipeline = bench.pipeline(TEXT.replace("a.doubled", "a.doubled@previous"), Table, Show, shaders=SHADERS)
-    with pytest.raises(InputError, match=r"RG127 'a.doubled@previous' means last frame's value, but it is kept"):
+    with pytest.raises(InputError, match=r"RG127 'a.doubled@previous' has no effect: the texture is kept"):
         pipeline.check()
 
 
