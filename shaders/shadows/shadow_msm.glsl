@@ -9,7 +9,7 @@ uniform float light_bleeding;
 // Lower bound of the fraction of a distribution with moments b that lies before t. Of all distributions with these
 // moments, the one with the least mass before t has three points: t and the two roots of an orthogonal polynomial.
 float share_before(vec4 b, float t) {
-    // Towards the moments of a spread-out distribution, away from the limit of what is possible (Peters and Klein 2015).
+    // Towards the moments of a spread-out distribution, away from the limits of the possible (Peters and Klein 2015).
     b = mix(b, vec4(0.0, 0.375, 0.0, 0.375), moment_bias);
     // Solve the Hankel matrix (1 b1 b2; b1 b2 b3; b2 b3 b4) for (1, t, t^2) by a Cholesky decomposition.
     float variance = b.y - b.x * b.x;
