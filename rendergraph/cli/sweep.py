@@ -222,6 +222,8 @@ def at_its_lines(file: SweepFile | None) -> Iterator[None]:
 
 def _space(file: SweepFile | None, axes: tuple[Axis, ...], **sampling: Any) -> Space:
     """Return the axes of a file and of the options, which override those of the file."""
+    import dataclasses  # --help needs none
+
     from rendergraph.compare import Space
 
     base = Space(()) if file is None else file.space

@@ -106,7 +106,7 @@ def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
     if path.suffix.lower() not in (".yaml", ".yml") and path.is_file():
         import shlex  # what has another ending is rare
 
-        from rendergraph.scene.load import MESHES  # likewise
+        from rendergraph.scene.mesh_files import MESHES  # likewise
 
         if path.suffix.lower() in MESHES:
             way = f"rendergraph run forward --scene {shlex.quote(shown_file(path))}"

@@ -20,7 +20,7 @@ from rendergraph.keys import Key, Validator, plain
 from rendergraph.scene import scene_keys, scene_values
 from rendergraph.scene.environments import named
 from rendergraph.scene.geometry import rigid
-from rendergraph.scene.load import MESHES, read_mesh
+from rendergraph.scene.mesh_files import MESHES, read_mesh
 from rendergraph.scene.model import (
     Camera,
     Environment,

@@ -418,9 +418,7 @@ nodes:
 outputs: {image: c.color}
 """
     pipeline = bench.pipeline(text, Table, Continues, shaders=SHADERS)
-    with pytest.raises(
-        InputError, match=r"RG439 node 'c' .* continues 'a.table', which is kept from frame to frame"
-    ):
+    with pytest.raises(InputError, match=r"RG439 node 'c' .* continues 'a.table', which is kept from frame to frame"):
         pipeline.check()
 
 
