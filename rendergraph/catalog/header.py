@@ -29,11 +29,9 @@ class Header(Struct, frozen=True, eq=False):
     """A header as it is written, without what is wrong in it.
 
     Attributes:
-        doc: the node's docs; None where there are none.
-        inputs, outputs, params: by name the keys of each entry.
-        names: by name the entry, for its place.
-        threads: how many threads a compute shader runs; None where it is not said.
-        problems: everything that is wrong.
+        inputs, outputs, params: the keys of each entry by its name.
+        names: the entries themselves, for their places.
+        threads: the thread counts of a compute shader.
     """
 
     doc: str | None = None
@@ -51,41 +49,30 @@ def is_in(text: str) -> bool:
 
 
 def read_header(text: str, file: Path, name: str) -> Header:
-    """The header of a shader's text.
-
-    Args:
-        text: all of the file.
-        file: the file.
-        name: how messages name it.
-
-    Raises:
-        InputError: it has no end, or is no YAML at all.
-    """
+    """Return the header of a shader's text; an error if it has no end or is not YAML."""
     begin = _BEGIN.search(text)
     lines = text.split("\n")
     if begin is None:
         almost = next((number for number, line in enumerate(lines) if _ALMOST.match(line)), None)
         if almost is not None and any(line.strip() == END for line in lines[almost:]):
-            raise InputError(_problem(name, lines, almost, f"a header begins with a line '{BEGIN}', without blanks"))
+            raise InputError(_problem(name, lines, almost, f"a header begins with a line '{BEGIN}', without spaces"))
         return Header()
     first = text.count("\n", 0, begin.start()) + 1  # the line behind the fence, counted from 0
     last = next((number for number in range(first, len(lines)) if "*/" in lines[number]), None)
     if last is None or lines[last].strip() != END:
         at = first - 1 if last is None else last
         what = "has no end" if last is None else "is ended by '*/' here"
-        text = f"the header {what}; it ends with a line '{END}'"
-        raise InputError(_problem(name, lines, at, text))
-    # The YAML keeps its lines: what stands above is blank.
-    found = _checked(parse("\n" * first + "\n".join(lines[first:last]) + "\n", name, path=file, keep_going=True))
-    again = next((number for number in range(last, len(lines)) if _BEGIN.match(lines[number])), None)
-    if again is None:
-        return found
-    text = f"a file has one header, and this one has begun another in line {first}; put both into one"
-    return replace(found, problems=(*found.problems, _problem(name, lines, again, text)))
+        raise InputError(_problem(name, lines, at, f"the header {what}; it ends with a line '{END}'"))
+    # Blank lines in place of the text above keep the YAML's line numbers.
+    header = _checked(parse("\n" * first + "\n".join(lines[first:last]) + "\n", name, path=file, keep_going=True))
+    second = next((number for number in range(last, len(lines)) if _BEGIN.match(lines[number])), None)
+    if second is None:
+        return header
+    text = f"a file has one header; put this one into the header that begins in line {first}"
+    return replace(header, problems=(*header.problems, _problem(name, lines, second, text)))
 
 
 def _problem(name: str, lines: list[str], number: int, text: str) -> Problem:
-
     line = lines[number]
     column = len(line) - len(line.lstrip()) + 1
     return Problem("RG440", text, Place(name, number + 1, column), line)
@@ -183,22 +170,23 @@ _CODES = Codes(unknown="RG440", wrong="RG440", name="RG440", file="RG440")
 
 
 def _checked(document: Document) -> Header:
-    """A header without what is wrong in it."""
     validator = Validator(_CODES, document.problems)
     root = document.root
     if root.data is not None:
         root = validator.file(root, HEADER, "doc, inputs, outputs, params") or root.with_data(None)
+    given = {key: value for key, value in root.items() if value.data is not None}
     names: dict[str, Value] = {}
-    parts: dict[str, dict[str, dict[str, Value]]] = {"inputs": {}, "outputs": {}, "params": {}}
-    for section, found in parts.items():
-        for name, entry in (root.get(section) or root.with_data(None)).items():
+    sections: dict[str, dict[str, dict[str, Value]]] = {"inputs": {}, "outputs": {}, "params": {}}
+    for section, entries in sections.items():
+        for name, entry in given[section].items() if section in given else ():
             if name in names:
-                line = names[name].key_place.line
-                text = f"'{name}' stands in line {line} too; no port or parameter has the name of another"
+                text = (
+                    f"'{name}' is also in line {names[name].key_place.line}; ports and parameters need distinct names"
+                )
                 validator.report(entry, _CODES.name, text, key=True)
                 continue
             names[name] = entry
-            found[name] = {key: value for key, value in entry.items() if value.data is not None}
-    given = {key: value for key, value in root.items() if value.data is not None}
+            entries[name] = {key: value for key, value in entry.items() if value.data is not None}
     doc = str(given["doc"].data).strip() if "doc" in given else None
-    return Header(doc, **parts, names=names, threads=given.get("threads"), problems=tuple(validator.problems))
+    threads = given.get("threads")
+    return Header(doc, **sections, names=names, threads=threads, problems=tuple(validator.problems))

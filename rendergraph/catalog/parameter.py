@@ -3,169 +3,162 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from typing import Any, Literal
 
 from rendergraph.declare import Parameter
 from rendergraph.document import Value
-from rendergraph.errors import Problem, suggestion
+from rendergraph.errors import suggestion
 from rendergraph.glsl.globals import Global, literal
-from rendergraph.typecheck import Range, fits
+from rendergraph.typecheck import Range, fits, words_for
 
 _SCALAR: dict[str, type] = {"float": float, "int": int, "uint": int, "bool": bool}
 _VECTOR = re.compile(r"([iu]?)vec([234])\Z")
-_WORDS = {bool: "true or false", int: "a whole number", float: "a number"}
+Report = Callable[[str, str, "Value | None"], None]
 
 
-class HeaderParameter:
-    """Makes one parameter and collects what is wrong with it.
+def uniform_names(declared: Iterable[Global]) -> list[str]:
+    """Return the uniforms that may be parameters."""
+    return [
+        one.name for one in declared if one.storage == "uniform" and (one.type in _SCALAR or _VECTOR.match(one.type))
+    ]
+
+
+class ParameterReader:
+    """Makes one parameter.
 
     Attributes:
-        problems: mistakes in the header.
-        said: code and text of mistakes in the declaration.
-        lacks_range: it is a number, and neither its least nor its greatest value is said.
+        lacks_range: it is a number with neither a least nor a greatest value.
     """
 
     def __init__(
-        self,
-        name: str,
-        entry: Mapping[str, Value],
-        named: Value | None,
-        found: Global | None,
-        words: Set[str],
+        self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, report: Report
     ) -> None:
-        """Args are the name, the header's keys, its entry where there is one, the declaration, and all words of
-        the text.
+        """Take the keys of the header, the entry's value, the declaration, and what reports code and text.
+
+        `report` is given the value of the header that is wrong, None for the declaration.
         """
         self.name = name
         self.entry = entry
         self.named = named
         self.found = found
-        self.words = words
-        self.problems: list[Problem] = []
-        self.said: list[tuple[str, str]] = []
+        self.report = report
         self.lacks_range = False
 
-    def parameter(self, uniforms: Sequence[str]) -> Parameter | None:
-        """The parameter, None where it is wrong.
+    def parameter(self, uniforms: Sequence[str], words: Callable[[], Set[str]]) -> Parameter | None:
+        """Return the parameter, None if it is wrong.
 
         Args:
             uniforms: those that the header does not mention, in case its name is misspelt.
+            words: gives all words of the shader's text.
         """
         found, entry = self.found, self.entry
-        role: Any = self._word("role") or ("param" if found is not None else "define")
-        if not self._agrees(role, uniforms):
+        role: Any = self._text("role") or ("param" if found is not None else "define")
+        if mismatch := self._mismatch(role, uniforms, words):
+            if self.named is not None:
+                self.report("RG444", mismatch, self.named)
             return None
-        made = self._of_uniform(found) if found is not None else self._of_header()
-        if made is None:
+        if found is not None and (found.array or not (found.type in _SCALAR or _VECTOR.match(found.type))):
+            what = f"an array of {found.type}" if found.array else found.type
+            kinds = "bool, int, uint, float and their vectors can be"
+            self.report("RG441", f"'{self.name}' is {what}, which is not a parameter; {kinds}", None)
             return None
-        annotation, default = made
+        typed = self._of_uniform(found) if found is not None else self._of_header()
+        if typed is None:
+            return None
+        annotation, default = typed
         low, high = self._limit("min"), self._limit("max")
         if low is None and found is not None and found.type.startswith("u"):
             low = 0
         self._check_range(Range(low, high), default)
         self.lacks_range = not {"min", "max", "choices"} & entry.keys() and annotation is not bool
-        return Parameter(role, default, self._word("doc"), self._word("unit"), Range(low, high), type=annotation)
+        return Parameter(role, default, self._text("doc"), self._text("unit"), Range(low, high), type=annotation)
 
-    def _word(self, key: str) -> str:
+    def _text(self, key: str) -> str:
         return str(self.entry[key].data) if key in self.entry else ""
 
     def _limit(self, key: str) -> float | None:
         data = self.entry[key].data if key in self.entry else None
         return data if isinstance(data, int | float) else None
 
-    def _wrong(self, code: str, key: str, text: str) -> None:
-        """A mistake at a value of the header, or at the declaration where the header does not say it."""
-        if key in self.entry:
-            self.problems.append(self.entry[key].problem(code, text))
-        else:
-            self.said.append((code, text))
-
-    def _agrees(self, role: str, uniforms: Sequence[str]) -> bool:
-        """Whether header and declaration speak of the same thing."""
+    def _mismatch(self, role: str, uniforms: Sequence[str], words: Callable[[], Set[str]]) -> str:
+        """Report in words that header and declaration disagree; empty if they agree."""
         found, name = self.found, self.name
-        text = ""
-        if found is None and role == "param":
+        if found is not None:
+            if role == "param" and found.storage == "uniform":
+                return ""
+            what = f"'{found.storage} {found.type} {name};'" + (f", not a {role}" if role != "param" else "")
+            return f"the header has parameter '{name}', which the shader declares as {what}"
+        if role == "param":
             text = f"the header has parameter '{name}', but the shader declares no 'uniform float {name};'"
-            text += suggestion(name, uniforms)
-        elif found is None and "role" not in self.entry and self.words.isdisjoint(self._macros()):
+        elif "role" not in self.entry and words().isdisjoint(self._macros()):
             text = f"the header has parameter '{name}', but the shader has neither 'uniform float {name};' nor "
-            text += f"{name.upper()}, as which it would be compiled in{suggestion(name, uniforms)}"
-        elif found is not None and (role != "param" or found.storage != "uniform"):
-            what = f"'{found.storage} {found.type} {name};'" + (f", no {role}" if role != "param" else "")
-            text = f"the header has parameter '{name}', which the shader declares as {what}"
-        if text and self.named is not None:
-            self.problems.append(self.named.problem("RG444", text, key=True))
-        if not text and found is not None:
-            text = self._unfit(found)
-            self.said += [("RG441", text)] if text else []
-        return not text
+            text += f"{name.upper()}, as which it would be compiled in"
+        else:
+            return ""
+        return text + suggestion(name, uniforms)
 
     def _macros(self) -> list[str]:
-        """What it is in the text where it is compiled in."""
         choices = self.entry["choices"].plain() if "choices" in self.entry else []
-        words = [self.name, *(f"{self.name}_{choice}" for choice in choices)]
-        return [word.upper().replace("-", "_") for word in words]
-
-    def _unfit(self, found: Global) -> str:
-        if not found.array and (found.type in _SCALAR or _VECTOR.match(found.type)):
-            return ""
-        what = f"an array of {found.type}" if found.array else found.type
-        return f"'{self.name}' is {what}, which is no parameter; bool, int, uint, float and their vectors can be"
+        names = [self.name, *(f"{self.name}_{choice}" for choice in choices)]
+        return [name.upper().replace("-", "_") for name in names]
 
     def _of_uniform(self, found: Global) -> tuple[Any, Any]:
         """Type and default of a uniform: the header's default, else its initialiser, else 0."""
         vector = _VECTOR.match(found.type)
-        part: type = (int if vector[1] else float) if vector else _SCALAR[found.type]
+        kind: type = (int if vector[1] else float) if vector else _SCALAR[found.type]
         count = int(vector[2]) if vector else 1
-        value: Any = part(0)
+        given, value = self.entry.get("default"), kind(0)
         if "choices" in self.entry:
             text = f"'{self.name}' is a uniform; choices are for parameters with the role define or structural"
-            self._wrong("RG444", "choices", text)
-        if "default" in self.entry:
-            value = self.entry["default"].plain()
+            self.report("RG444", text, self.entry["choices"])
+        if given is not None:
+            value = given.plain()
         elif found.initialiser:
             try:
                 value = literal(found.initialiser)
             except ValueError as error:
-                text = f"the initialiser of '{self.name}': {error}; write a number, or say its default in the header"
-                self.said.append(("RG442", text))
-        parts = list(value) if isinstance(value, list | tuple) else [value] * count
-        if len(parts) != count or not all(fits(number, part) and Range().accepts(number) for number in parts):
-            words = f"{count} numbers" if vector else _WORDS[part]
-            text = f"the default of '{self.name}' ({found.type}) is {words}, not {_text(value)}"
-            self._wrong("RG442", "default", text)
-            parts = [part(0)] * count
-        converted = tuple(part(number) for number in parts)
+                text = f"the initialiser of '{self.name}': {error}; write a number, or give its default in the header"
+                self.report("RG442", text, None)
+        numbers = list(value) if isinstance(value, list | tuple) else [value] * count
+        if len(numbers) != count or not all(fits(number, kind) and Range().accepts(number) for number in numbers):
+            expected = f"{count} numbers" if vector else words_for(kind, file=True)
+            text = f"the default of '{self.name}' ({found.type}): expected {expected}, got {_text(value)}"
+            self.report("RG442", text, given)
+            numbers = [kind(0)] * count
+        converted = tuple(map(kind, numbers))
         if vector:
-            return tuple[(part,) * count], converted  # type: ignore[misc]  # made at run time
-        return part, converted[0]
+            return tuple[(kind,) * count], converted  # type: ignore[misc]  # made at run time
+        return kind, converted[0]
 
     def _of_header(self) -> tuple[Any, Any] | None:
-        """Type and default of a parameter that is no uniform; None where it is wrong."""
+        """Type and default of a parameter that is not a uniform; None if they are wrong."""
         default = self.entry["default"].plain() if "default" in self.entry else None
         if "choices" in self.entry:
-            choices = tuple(str(choice) for choice in self.entry["choices"].plain())
+            choices = tuple(map(str, self.entry["choices"].plain()))
             if default is not None and default not in choices:
-                text = f"the default of '{self.name}' is one of {', '.join(choices)}, not {_text(default)}"
-                self._wrong("RG442", "default", text)
+                text = f"the default of '{self.name}': expected one of {', '.join(choices)}, got {_text(default)}"
+                self.report("RG442", text, self.entry["default"])
                 default = None
             return Literal[choices], choices[0] if default is None else default
         if isinstance(default, bool | int | float):
             return type(default), default
-        text = f"'{self.name}' is no uniform of the shader; it needs choices, or a number or a switch as default"
+        text = (
+            f"'{self.name}' is not a uniform of the shader; it needs choices, or a default that is a number or a switch"
+        )
         if self.named is not None:
-            self.problems.append(self.named.problem("RG444", text, key=True))
+            self.report("RG444", text, self.named)
         return None
 
     def _check_range(self, limits: Range, default: Any) -> None:
         if limits.empty:
-            self._wrong("RG442", "min", f"'{self.name}' has a min of {limits.low:g} above its max of {limits.high:g}")
+            text = f"'{self.name}' has a min of {limits.low:g} above its max of {limits.high:g}"
+            self.report("RG442", text, self.entry.get("min"))
             return
         for number in default if isinstance(default, tuple) else (default,):
             if fits(number, float) and not limits.accepts(number):
-                key = next((key for key in ("default", "min", "max") if key in self.entry), "")
-                self._wrong("RG442", key, f"the default of '{self.name}' is {number:g}, outside of its own range")
+                where = next((self.entry[key] for key in ("default", "min", "max") if key in self.entry), None)
+                self.report("RG442", f"the default of '{self.name}' is {number:g}, outside its range", where)
                 return
 
 

@@ -1,4 +1,4 @@
-"""A shader file as a node type: a class made of its header and of what its text declares. No GL, no Python of anyone's.
+"""A shader file as a node type: a class made of its header and of its declarations, without GL and without Python code.
 
 The class is like any author's: checking, schema, docs and expansion see no difference.
 """
@@ -6,82 +6,153 @@ The class is like any author's: checking, schema, docs and expansion see no diff
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
-from rendergraph.catalog.entries import Entries
+from msgspec import Struct
+
+from rendergraph.catalog.entries import Entries, number_rule
 from rendergraph.catalog.header import Header, read_header
-from rendergraph.catalog.threads import Record, compute, fullscreen
 from rendergraph.catalog.types import Listed, NodeType
-from rendergraph.declare import Extensions, Node, declaration_mistakes
+from rendergraph.declare import Extensions, Input, Node, Port, WrittenPort, declaration_mistakes
 from rendergraph.errors import InputError, Problem, shown_file
-from rendergraph.glsl import Includes, SourceText, read_text
+from rendergraph.glsl import Includes, read_text
 from rendergraph.resources import folder
+from rendergraph.steps import Steps
 from rendergraph.textures import SEMANTICS, SIGNATURES
 
-_KEPT = 256
-_MADE: dict[tuple[object, ...], _ShaderType] = {}
-"""Types made so far: a file is one class in all pipelines, which then share its passes."""
+Record: TypeAlias = "Callable[[Any, Steps], None]"
+Threads: TypeAlias = "Callable[[Node, Steps], tuple[int, ...]]"
 
 
-@dataclass(frozen=True)
-class _ShaderType:
+class _ShaderType(Struct, frozen=True):
     cls: type[Node]
     warnings: tuple[Problem, ...]
     text: str
 
 
+_MOST_TYPES = 256
+_TYPES: dict[tuple[object, ...], _ShaderType] = {}
+"""By all that a type is made of: a file is one class in all pipelines, which then share its passes."""
+
+
 def load(name: str, listed: Listed, extensions: Extensions) -> NodeType:
-    """The node type of a shader file.
-
-    Args:
-        name: the type's name.
-        listed: the file.
-        extensions: for semantics that plugins add.
-
-    Raises:
-        InputError: the file cannot be read, or something in it can be no node's; with all mistakes.
-    """
+    """Return the node type of a shader file; `extensions` have the semantics that plugins add."""
     file = listed.file
     raw = read_text(file)
-    shown = shown_file(file)
-    header = read_header(raw, file, shown)
+    header = read_header(raw, file, shown_file(file))
     source = Includes(folder("rendergraph.shaders") / "include").expand(file, versions=True)
-    key = (file, shown, raw, source, tuple(semantic.value for semantic in _plugged(header, extensions)))
-    made = _MADE.get(key)
-    if made is None:
-        made = _make(file, shown, raw, header, source, extensions)
-        if len(_MADE) >= _KEPT:
-            _MADE.clear()
-        _MADE[key] = made
-    return NodeType(name, listed.family, made.cls, file, file.parent, listed.plugin, made.warnings, text=made.text)
+    semantics = tuple(semantic.value for semantic in _plugin_semantics(header, extensions))
+    key = (file, shown_file(file), raw, source, semantics)
+    found = _TYPES.get(key)
+    if found is None:
+        found = _make(Entries(file, raw, header, source, extensions))
+        if len(_TYPES) >= _MOST_TYPES:
+            _TYPES.clear()
+        _TYPES[key] = found
+    return NodeType(name, listed.family, found.cls, file, file.parent, listed.plugin, found.warnings, text=found.text)
 
 
-def _plugged(header: Header, extensions: Extensions) -> list[Any]:
-    """The plugins' semantics, where the header has a word of theirs: part of what the class is made of."""
+def _plugin_semantics(header: Header, extensions: Extensions) -> list[Any]:
+    """The plugins' semantics if the header uses one: no plugin is imported for others."""
     entries = [*header.inputs.values(), *header.outputs.values()]
-    own = {semantic.name for semantic in SEMANTICS} | {signature.name for signature in SIGNATURES}
+    own = {known.name for known in SEMANTICS} | {known.name for known in SIGNATURES}
     foreign = any("semantic" in entry and entry["semantic"].data not in own for entry in entries)
-    return list(extensions.semantics()) if foreign else []
+    return extensions.semantics() if foreign else []
 
 
-def _make(file: Path, shown: str, raw: str, header: Header, source: SourceText, extensions: Extensions) -> _ShaderType:
-    entries = Entries(file, shown, raw, header, source, extensions)
+def _make(entries: Entries) -> _ShaderType:
+    file, header = entries.file, entries.header
     entries.collect()
     if entries.problems:
         raise InputError(entries.problems)
-    record: Record = compute(entries) if file.suffix == ".comp" else fullscreen(entries)
+    record = _compute(entries) if file.suffix == ".comp" else _fullscreen(entries)
     if entries.problems:
         raise InputError(entries.problems)
+    name = "".join(part.capitalize() for part in file.stem.replace("-", "_").split("_")) or "Shader"
     doc = header.doc or f"The shader {file.name}."
-    words = "".join(part.capitalize() for part in file.stem.replace("-", "_").split("_")) or "Shader"
     parts = {"__module__": __name__, "__doc__": doc, "shader": file.name, "record": record}
-    cls = type(words, (Node,), {**parts, **entries.ports, **entries.parameters})
-    # Docs may be missing, which a warning says; and other tools' shaders have names with capitals.
-    if problems := declaration_mistakes(cls, lenient=True):
-        who = f"shader '{file.name}'"
-        raise InputError([one.relocate(entries.place_of(one.subject), context=who) for one in problems])
-    lines = [line.rstrip() for line in source.lines if line.strip()]
-    text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", raw, re.DOTALL | re.MULTILINE)[:1], *lines])
+    cls = type(name, (Node,), {**parts, **entries.ports, **entries.parameters})
+    # Missing docs are a warning, and other tools' shaders have names with capitals.
+    if mistakes := declaration_mistakes(cls, lenient=True):
+        where = f"shader '{file.name}'"
+        raise InputError([found.relocate(entries.place_of(found.subject), context=where) for found in mistakes])
+    lines = [line.rstrip() for line in entries.source.lines if line.strip()]
+    text = "\n".join([*re.findall(r"^/\*---\n.*?\*/", entries.raw, re.DOTALL | re.MULTILINE)[:1], *lines])
     return _ShaderType(cls, tuple(entries.warnings(cls)), text)
+
+
+# --- what the node records -------------------------------------------------------------------------------------------
+
+
+def _fullscreen(entries: Entries) -> Record:
+    file = entries.file.name
+    ordered = entries.outputs_by_location()
+
+    def record(self: Node, steps: Steps) -> None:
+        if not ordered:
+            steps.fullscreen(file)
+            return
+        ports = self.ports()  # the text says which attachment is which, so none of them is left out
+        steps.fullscreen(file, out={name: ports[name] for name in ordered})
+
+    return record
+
+
+def _compute(entries: Entries) -> Record:
+    """One dispatch with as many groups as its threads need."""
+    file = entries.file.name
+    local = tuple(_local_size(entries, f"local_size_{axis}") for axis in "xyz")
+    if not any(f"local_size_{axis}" in entries.globals.input_layout for axis in "xyz"):
+        text = "a compute shader says how many threads a group has: layout(local_size_x = 8, local_size_y = 8) in;"
+        entries.report("RG443", text)
+    threads = _threads(entries)
+    outputs = [name for name, port in entries.ports.items() if isinstance(port, WrittenPort)]
+
+    def record(self: Node, steps: Steps) -> None:
+        counts = (*threads(self, steps), 1, 1)[:3]
+        x, y, z = (max(1, -(-count // size)) for count, size in zip(counts, local, strict=True))
+        ports = self.ports()
+        steps.compute(file, groups=(x, y, z), out={name: ports[name] for name in outputs})
+
+    return record
+
+
+def _local_size(entries: Entries, name: str) -> int:
+    words = entries.globals.input_layout.get(name)
+    if words is None:
+        return 1
+    try:
+        value = entries.globals.number(words)
+    except ValueError as error:
+        entries.report("RG443", f"{name}: {error}")
+        return 1
+    if 1 <= value <= 1024:
+        return value
+    entries.report("RG443", f"{name}: expected a whole number from 1 to 1024, got {value}")
+    return 1
+
+
+def _threads(entries: Entries) -> Threads:
+    """The thread counts: the size of a texture, or the numbers of the header."""
+    given = entries.header.threads
+    if given is not None and (not isinstance(given.data, str) or given.data.startswith("$")):
+        rules = [number_rule(part) for part in (given.data if isinstance(given.data, list) else [given])]
+        return lambda node, steps: tuple(rule if isinstance(rule, int) else rule(node, steps.facts) for rule in rules)
+    textures = [name for name, port in entries.ports.items() if isinstance(port, WrittenPort) and port.kind != "buffer"]
+    name = str(given.data) if given is not None else (textures[0] if textures else "")
+    port = entries.ports.get(name)
+    if not isinstance(port, Input | WrittenPort) or port.kind == "buffer":
+        if given is not None:
+            entries.problems.append(given.problem("RG443", f"'threads' names no texture of this node: '{name}'"))
+        else:
+            text = "there is no output texture whose texels give the threads; add threads: INPUT or threads: [x, y]"
+            entries.report("RG443", text)
+    return lambda node, steps: _texels(node.ports()[name], steps)
+
+
+def _texels(port: Port, steps: Steps) -> tuple[int, ...]:
+    if isinstance(port, Input) and not steps.connected(port):
+        return (1,)
+    desc = steps.desc(port)
+    return desc.width, desc.height, desc.layers

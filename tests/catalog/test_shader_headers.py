@@ -213,14 +213,14 @@ def headed(text: str) -> str:
         ),
         (
             "params: {strength: {default: [1, 2]}}",
-            ["2:30: RG442 the default of 'strength' (float) is a number, not [1, 2]"],
+            ["2:30: RG442 the default of 'strength' (float): expected a number, got [1, 2]"],
         ),
         (
             "params: {strength: {default: true}}",
-            ["2:30: RG442 the default of 'strength' (float) is a number, not true"],
+            ["2:30: RG442 the default of 'strength' (float): expected a number, got true"],
         ),
         ("params: {strength: {min: 2, max: 1}}", ["2:26: RG442 'strength' has a min of 2 above its max of 1"]),
-        ("params: {strength: {min: 2}}", ["2:26: RG442 the default of 'strength' is 0, outside of its own range"]),
+        ("params: {strength: {min: 2}}", ["2:26: RG442 the default of 'strength' is 0, outside its range"]),
         (
             "params: {strength: {role: define}}",
             [
@@ -251,15 +251,17 @@ def headed(text: str) -> str:
         ),
         (
             "params: {more: {role: define}}",
-            ["2:10: RG444 'more' is no uniform of the shader; it needs choices, or a number or a switch as default"],
+            [
+                "2:10: RG444 'more' is not a uniform of the shader; it needs choices, or a default that is a number or a switch"
+            ],
         ),
         (
             "params: {mode: {role: define, choices: [a, b], default: c}}",
-            ["2:57: RG442 the default of 'mode' is one of a, b, not 'c'"],
+            ["2:57: RG442 the default of 'mode': expected one of a, b, got 'c'"],
         ),
         (
             "inputs: {color: {}}\nparams: {color: {}}",
-            ["3:10: RG440 'color' stands in line 2 too; no port or parameter has the name of another"],
+            ["3:10: RG440 'color' is also in line 2; ports and parameters need distinct names"],
         ),
         (
             "params: {filter: {role: define, default: 1}}",
@@ -312,7 +314,7 @@ def test_a_header_ends(tmp_path: Path) -> None:
 
 def test_a_header_begins_without_blanks(tmp_path: Path) -> None:
     assert mistakes(tmp_path, "// so\n  /* ---\ndoc: x\n---*/\n" + BODY) == [
-        "2:3: RG440 a header begins with a line '/*---', without blanks"
+        "2:3: RG440 a header begins with a line '/*---', without spaces"
     ]
     assert load(tmp_path, "/* ---\nno header\n--- */\n" + BODY).cls.__doc__ == "The shader effect.frag."
 
@@ -332,7 +334,7 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
         ),
         (
             "layout(local_size_x = 0) in;\nlayout(r32f) uniform image2D a;",
-            "1:1: RG443 local_size_x is a whole number from 1 to 1024, not 0",
+            "1:1: RG443 local_size_x: expected a whole number from 1 to 1024, got 0",
         ),
         (
             "/*---\nthreads: b\n---*/\nlayout(local_size_x = 8) in;\nlayout(r32f) uniform image2D a;",
@@ -340,7 +342,7 @@ def test_a_banner_is_no_header(tmp_path: Path) -> None:
         ),
         (
             "layout(local_size_x = 8) in;\nbuffer a { uint b; };",
-            "2:8: RG441 how large is the buffer 'a'? say outputs: {a: {bytes: N}} in the header",
+            "2:8: RG441 the buffer 'a' has no size; add outputs: {a: {bytes: N}} to the header",
         ),
     ],
 )
@@ -352,7 +354,7 @@ CONTRADICTIONS = {
     "a second header": (
         "outputs: {c: {doc: C.}}\n---*/\nout vec4 c;\n/*---\ndoc: Y.",
         "",
-        "5:1: RG440 a file has one header, and this one has begun another in line 1; put both into one",
+        "5:1: RG440 a file has one header; put this one into the header that begins in line 1",
     ),
     "a limit that is none": (
         "outputs: {c: {doc: C.}}\nparams: {k: {default: 1, min: .nan, doc: K.}}",
@@ -362,7 +364,7 @@ CONTRADICTIONS = {
     "threads of a fragment shader": (
         "threads: [8, 8]\noutputs: {c: {doc: C.}}",
         "out vec4 c;",
-        "2:1: RG443 'threads' is a compute shader's; a full-screen pass runs once a texel of what it makes",
+        "2:1: RG443 'threads' is for compute shaders; a full-screen pass runs once for each texel of its target",
     ),
     "a sampler as a function": (
         "inputs: {s: {kind: function, semantic: shadow}}\noutputs: {c: {doc: C.}}",
@@ -373,17 +375,17 @@ CONTRADICTIONS = {
     "a depth as an out": (
         "outputs: {c: {format: depth32f}}",
         "out vec4 c;",
-        "2:23: RG444 format depth32f does not hold what 'out vec4 c' is; leave that out, and write gl_FragDepth",
+        "2:23: RG444 format depth32f is incompatible with 'out vec4 c'; leave that out, and write gl_FragDepth",
     ),
     "whole numbers as a vec4": (
         "outputs: {c: {format: rgba32ui}}",
         "out vec4 c;",
-        "2:23: RG444 format rgba32ui does not hold what 'out vec4 c' is; a uint format takes uvec4",
+        "2:23: RG444 format rgba32ui is incompatible with 'out vec4 c'; a uint format takes uvec4",
     ),
     "a uvec4 as fractions": (
         "outputs: {c: {format: rgba8}}",
         "out uvec4 c;",
-        "2:23: RG444 format rgba8 does not hold what 'out uvec4 c' is; that format takes float to vec4",
+        "2:23: RG444 format rgba8 is incompatible with 'out uvec4 c'; that format takes float to vec4",
     ),
 }
 

@@ -268,11 +268,11 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
     [
         (
             "uniform mat3 turn;\nout vec4 c;",
-            "1:14: RG441 'turn' is mat3, which is no parameter; bool, int, uint, float and their vectors can be",
+            "1:14: RG441 'turn' is mat3, which is not a parameter; bool, int, uint, float and their vectors can be",
         ),
         (
             "out vec4 c;\nuniform float w[4];",
-            "2:15: RG441 'w' is an array of float, which is no parameter; bool, int, uint, float and their vectors can be",
+            "2:15: RG441 'w' is an array of float, which is not a parameter; bool, int, uint, float and their vectors can be",
         ),
         (
             "uniform sampler2D s[2];\nout vec4 c;",
@@ -282,19 +282,19 @@ def test_ports_and_parameters_are_bounded(tmp_path: Path) -> None:
             "in vec2 uv;\nout vec4 c;",
             "1:9: RG441 nothing writes the varying 'uv'; a full-screen pass has v_uv, from 0 to 1",
         ),
-        ("uniform float a;\n", "1:1: RG441 the shader writes nothing; declare what it makes, as in out vec4 color;"),
-        ("out mat2 c;", "1:10: RG441 output 'c' is a mat2; float, vec2 to vec4, uint and int can be"),
+        ("uniform float a;\n", "1:1: RG441 the shader writes nothing; declare an output, as in out vec4 color;"),
+        ("out mat2 c;", "1:10: RG441 output 'c': expected float, vec2 to vec4, uint or int, got mat2"),
         ("out ivec2 c;", "1:11: RG441 no format holds the ivec2 of output 'c'; use uvec4 or int"),
         (
             "out vec4 c;\nuniform float a = other;",
-            "2:15: RG442 the initialiser of 'a': it is not a literal; write a number, or say its default in the header",
+            "2:15: RG442 the initialiser of 'a': it is not a literal; write a number, or give its default in the header",
         ),
         (
             "out vec4 c;\nuniform vec3 a = vec3(1, 2);",
-            "2:14: RG442 the initialiser of 'a': vec3 expected 1 or 3 numbers, got 2; write a number, or say its default "
+            "2:14: RG442 the initialiser of 'a': vec3 expected 1 or 3 numbers, got 2; write a number, or give its default "
             "in the header",
         ),
-        ("out vec4 c;\nuniform int a = 1.5;", "2:13: RG442 the default of 'a' (int) is a whole number, not 1.5"),
+        ("out vec4 c;\nuniform int a = 1.5;", "2:13: RG442 the default of 'a' (int): expected a whole number, got 1.5"),
         (
             "layout(location = 1 + 0) out vec4 c;",
             "1:35: RG441 the location of 'c': '1+0' is neither a number nor a macro that is one; write a number, or leave the "
@@ -336,7 +336,7 @@ def test_what_is_missing_is_one_warning(tmp_path: Path) -> None:
     (warning,) = load(tmp_path, "uniform float a;\nuniform bool b;\nout vec4 c;").warnings
     assert str(warning) == (
         f"{tmp_path}/effect.frag:1:1: warning: RG445 shader node 'effect.frag' lacks doc of the node; "
-        "doc of 'c', 'a' and 'b'; min and max of 'a'; its header can say them"
+        "doc of 'c', 'a' and 'b'; min and max of 'a'; add them to its header"
     )
 
 
