@@ -96,7 +96,7 @@ class Settings(Struct, frozen=True):
         return self.file.parent
 
 
-def nearest(folder: Path) -> Settings | None:
+def nearest_settings(folder: Path) -> Settings | None:
     """The settings file in a folder, links followed, or the nearest one above it.
 
     Raises:
@@ -129,7 +129,7 @@ def load(file: Path) -> Settings:
         raise InputError(validator.problems)
     settings = plain(root, SETTINGS)
     cache = CacheLimits(**settings.pop("cache", {}))
-    paths = {key: tuple(file.parent / at_home(path) for path in found) for key, found in settings.items()}
+    paths = {key: tuple(file.parent / expand_home(path) for path in found) for key, found in settings.items()}
     return Settings(file, **paths, cache=cache)
 
 
@@ -143,7 +143,7 @@ class Roots(Struct, frozen=True):
     folders: tuple[Path, ...]
 
     @classmethod
-    def around(cls, file: Path, extra: Iterable[Path] = (), cwd: Path | None = None) -> Roots:
+    def of_file(cls, file: Path, extra: Iterable[Path] = (), cwd: Path | None = None) -> Roots:
         """The roots of everything reached from a file that the user named.
 
         Args:
@@ -156,7 +156,7 @@ class Roots(Struct, frozen=True):
         """
         home = _resolved(file.parent)
         folders = [home]
-        project = nearest(home)
+        project = nearest_settings(home)
         if project is not None:
             folders.append(_resolved(project.folder))
             here = _resolved(cwd or Path.cwd())
@@ -214,7 +214,7 @@ class Roots(Struct, frozen=True):
         return "RG011", f"there is no {'folder' if folder else 'file'} '{name}'{_neighbour(resolved)}"
 
 
-def at_home(text: str) -> Path:
+def expand_home(text: str) -> Path:
     """A path with `~` replaced by the user's home; as it is where nobody knows that."""
     path = Path(text)
     try:

@@ -182,9 +182,9 @@ def test_a_schema_of_somebody_else_is_left_alone(tmp_path: Path, toy_catalog: Ca
     file = tmp_path / "pipeline.yaml"
     (tmp_path / "other.json").write_text(text)
     file.write_text("# $schema=other.json\nextends: forward\n")
-    assert outdated(file, Roots.around(file), toy_catalog) is None
+    assert outdated(file, Roots.of_file(file), toy_catalog) is None
     file.write_text("# $schema=https://example.org/schema.json\n")
-    assert outdated(file, Roots.around(file), toy_catalog) is None
+    assert outdated(file, Roots.of_file(file), toy_catalog) is None
 
 
 def test_a_schema_outside_is_not_read(tmp_path: Path, toy_catalog: Catalog) -> None:
@@ -193,5 +193,5 @@ def test_a_schema_outside_is_not_read(tmp_path: Path, toy_catalog: Catalog) -> N
     (tmp_path / "s.json").write_text(json.dumps(schema(Catalog({}))))
     file = inside / "pipeline.yaml"
     file.write_text("# yaml-language-server: $schema=../s.json\n")
-    assert outdated(file, Roots.around(file), toy_catalog) is None
-    assert outdated(file, Roots.around(file, [tmp_path]), toy_catalog) is not None
+    assert outdated(file, Roots.of_file(file), toy_catalog) is None
+    assert outdated(file, Roots.of_file(file, [tmp_path]), toy_catalog) is not None

@@ -7,21 +7,21 @@ from pathlib import Path
 import pytest
 
 from rendergraph.errors import InputError, Place
-from rendergraph.settings import CacheLimits, Roots, load, nearest
+from rendergraph.settings import CacheLimits, Roots, load, nearest_settings
 
 
 def test_the_nearest_above(tmp_path: Path) -> None:
     inner = tmp_path / "a" / "b"
     inner.mkdir(parents=True)
-    assert nearest(inner) is None
+    assert nearest_settings(inner) is None
     (tmp_path / "rendergraph.toml").write_text('asset_roots = ["../assets", "/data"]\nplugins = ["nodes"]\n')
-    found = nearest(inner)
+    found = nearest_settings(inner)
     assert found is not None
     assert found.folder == tmp_path
     assert found.asset_roots == (tmp_path / "../assets", Path("/data"))
     assert found.plugins == (tmp_path / "nodes",)
     (tmp_path / "a" / "rendergraph.toml").touch()
-    nearer = nearest(inner)
+    nearer = nearest_settings(inner)
     assert nearer is not None
     assert nearer.folder == tmp_path / "a"
 
@@ -60,7 +60,7 @@ def test_the_home_of_nobody_is_a_path_like_any(tmp_path: Path) -> None:
 
 
 def test_roots_say_where_a_path_stands(tmp_path: Path) -> None:
-    roots = Roots.around(tmp_path / "pipeline.yaml")
+    roots = Roots.of_file(tmp_path / "pipeline.yaml")
     (tmp_path / "texture.png").touch()
     assert roots.check(tmp_path / "." / "texture.png") == (tmp_path / "texture.png").resolve()
     place = Place("scene.yaml", 3, 5)

@@ -10,7 +10,6 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from rendergraph.catalog import find, modules
-from rendergraph.catalog.configured import Named, configured, projects
 from rendergraph.catalog.extensions import GROUP as EXTENSIONS
 from rendergraph.catalog.extensions import extensions
 from rendergraph.catalog.types import Listed, NodeType
@@ -55,10 +54,10 @@ class Catalog:
         Raises:
             InputError: a path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
         """
-        named = {entry.path.resolve(): entry for entry in configured()} if installed else {}
-        named |= {path.resolve(): Named(path) for path in plugin_paths}
+        named = {entry.path.resolve(): entry for entry in find.configured()} if installed else {}
+        named |= {path.resolve(): find.PluginPath(path) for path in plugin_paths}
         listed: dict[str, list[Listed]] = {}
-        own = projects(path for path in named if path.is_dir())
+        own = find.projects(path for path in named if path.is_dir())
         offered = list(entry_points(GROUP, EXTENSIONS)) if installed else []
         if own:
             offered = [entry for entry in offered if plain(entry.package.name) not in own]
@@ -68,8 +67,7 @@ class Catalog:
         notes = []
         for plugin in named.values():
             try:
-                found = find.loose(plugin.path, plugin.place, plugin.where)
-                _add(listed, ((name, replace(one, named=plugin.words)) for name, one in found))
+                _add(listed, ((name, replace(one, named=plugin.words)) for name, one in find.loose(plugin)))
             except InputError as error:
                 if not plugin.where or plugin.path.exists():
                     raise

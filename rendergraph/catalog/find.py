@@ -1,8 +1,7 @@
-"""Listing the node types of packages, folders and files, without importing or parsing anything.
+"""Listing of the node types of packages, folders and files; nothing is imported or parsed.
 
-A module is a node type, and so is a shader file. Where Python stands in a folder or beneath it, and in a folder
-`shaders` beside `nodes`, shader files are most likely parts of those nodes; there only those with a header are types of
-their own.
+A module is a node type, and so is a shader file. In a folder with Python files, and in a folder `shaders` beside
+`nodes`, a shader file is most likely part of a node; there it is a type only if it has a header.
 """
 
 from __future__ import annotations
@@ -12,18 +11,26 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+
+from msgspec import Struct
 
 from rendergraph.catalog import header
 from rendergraph.catalog.extensions import MODULE
-from rendergraph.catalog.reload import PREFIX, fresh_package
+from rendergraph.catalog.modules import PREFIX, fresh_package, shader_folder
 from rendergraph.catalog.types import SHADERS, Listed
-from rendergraph.errors import InputError, Place, Problem
+from rendergraph.errors import InputError, Place, Problem, shown_file
+from rendergraph.installed import plain
+from rendergraph.settings import expand_home, nearest_settings
 from rendergraph.stamps import record_read
 
+OWN = "rendergraph"
+"""The distribution that no plugin replaces."""
+VARIABLE = "RENDERGRAPH_PATH"
+"""Folders and files with nodes, separated as in PATH."""
 MOST_FILES = 10_000
-"""Files of a folder that a pipeline file names; a plugin has a few dozen."""
+"""Limit of files in a folder that a pipeline file names; a plugin has a few dozen."""
 
 _NO_NODE = re.compile(r"_|test_|conftest\Z")
 """Modules that are helpers, or that pytest looks for: tests may lie beside the nodes they test."""
@@ -31,8 +38,60 @@ _STEM = re.compile(r"[A-Za-z][A-Za-z0-9_-]*\Z")
 _HEAD_BYTES = 100_000
 
 
+# --- plugins of the project and of the environment -------------------------------------------------------------------
+
+
+class PluginPath(Struct, frozen=True):
+    """A plugin by path, and where it is named: a settings file, or else in words."""
+
+    path: Path
+    place: Place | None = None
+    where: str = ""
+
+    @property
+    def words(self) -> str:
+        """Who names it, to follow its file."""
+        return self.where or (f", which {self.place.file} names" if self.place is not None else ", given as a plugin")
+
+
+def configured() -> Iterator[PluginPath]:
+    """Yield the plugins of the settings of the project around the current folder, then of the environment."""
+    project = nearest_settings(Path.cwd())
+    if project is not None:
+        for path in project.plugins:
+            yield PluginPath(path, Place(shown_file(project.file)))
+    for text in os.environ.get(VARIABLE, "").split(os.pathsep):
+        if text.strip():
+            yield PluginPath(expand_home(text.strip()), where=f", which {VARIABLE} names")
+
+
+def projects(folders: Iterable[Path]) -> frozenset[str]:
+    """Return the plain names of the distributions that folders are the projects of.
+
+    A project's folder stands in for a copy of it that was installed some time ago.
+    """
+    return frozenset({_project(folder) for folder in folders} - {"", OWN})
+
+
+def _project(folder: Path) -> str:
+    file = folder / "pyproject.toml"
+    record_read(file)
+    if not file.is_file():
+        return ""
+    import tomllib  # most folders lie in no project
+
+    try:
+        name = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["name"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+    return plain(name) if isinstance(name, str) else ""
+
+
+# --- types -----------------------------------------------------------------------------------------------------------
+
+
 def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
-    """The modules of an installed package, found without importing more than its parent."""
+    """Yield the modules of an installed package; of it only the parent is imported."""
     try:
         spec = importlib.util.find_spec(package)
     except (ImportError, ValueError, AttributeError):
@@ -43,29 +102,9 @@ def package(plugin: str, package: str) -> Iterator[tuple[str, Listed]]:
         file = Path(spec.origin or "")
         yield file.stem, Listed(package, "", file, file.parent, plugin)
         return
-    shaders = _shader_folder(package)
+    shaders = shader_folder(package)
     for folder in spec.submodule_search_locations:
         yield from _modules(Path(folder), package, plugin, shaders)
-
-
-def shader_folder(module: str, file: Path) -> Path:
-    """Where the shaders of a node's module lie: of `X.nodes.family.a` in `X.shaders/family`, else beside its file."""
-    before, nodes, family = module.rpartition(".")[0].partition(".nodes")
-    shaders = _shader_folder(before + nodes) if nodes and family[:1] in ("", ".") else None
-    return file.parent if shaders is None else shaders.joinpath(*family.split("."))
-
-
-def _shader_folder(package: str) -> Path | None:
-    """`X.shaders` beside `X.nodes`."""
-    parent, _, last = package.rpartition(".")
-    if not parent or last != "nodes":
-        return None
-    try:
-        spec = importlib.util.find_spec(f"{parent}.shaders")
-    except (ImportError, ValueError, AttributeError):
-        return None
-    folders = spec.submodule_search_locations if spec else None
-    return Path(next(iter(folders))) if folders else None
 
 
 def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> Iterator[tuple[str, Listed]]:
@@ -86,11 +125,7 @@ def _modules(folder: Path, package: str, plugin: str, shaders: Path | None) -> I
 
 
 def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str, str]]:
-    """Folder, family, stem and ending of everything that may be a node type.
-
-    Raises:
-        ValueError: there are more files than `most`, of whatever kind.
-    """
+    """Folder, family, stem and ending of everything that may be a node type; ValueError for more files than `most`."""
     seen, top = 0, os.fspath(folder)
     for where, subfolders, files in os.walk(top):
         record_read(where)
@@ -107,7 +142,7 @@ def _files(folder: Path, most: float = math.inf) -> Iterator[tuple[str, str, str
 
 
 def _has_header(file: str) -> bool:
-    if not os.path.isfile(file):  # opening a pipe would wait for somebody to write
+    if not os.path.isfile(file):  # opening a pipe would block
         return False
     try:
         with open(file, "rb") as opened:
@@ -117,13 +152,13 @@ def _has_header(file: str) -> bool:
     return header.BEGIN.encode() in text and header.is_in(text.decode("utf-8", "replace"))
 
 
-def shaders(folder: Path) -> tuple[list[tuple[str, Listed]], list[Path]]:
-    """The shader nodes of a folder that a pipeline file names, and the Python files beside them, which nobody runs.
+def shaders(folder: Path, most_files: int = MOST_FILES) -> tuple[list[tuple[str, Listed]], list[Path]]:
+    """Return the shader nodes of a folder that a pipeline file names, and the Python files there, which are not run.
 
     Raises:
-        ValueError: it has more files than any plugin.
+        ValueError: it has too many files.
     """
-    files = list(_files(folder, MOST_FILES))
+    files = list(_files(folder, most_files))
     python = [Path(where, stem + suffix) for where, _, stem, suffix in files if suffix == ".py"]
     found = [
         (stem, Listed("", family, Path(file), Path(where), folder.name))
@@ -134,28 +169,22 @@ def shaders(folder: Path) -> tuple[list[tuple[str, Listed]], list[Path]]:
 
 
 def shader(file: Path) -> Listed:
-    """One shader file that is used by its path."""
+    """Return one shader file that is used by its path."""
     return Listed("", "", file, file.parent, file.parent.name)
 
 
 def package_of(path: Path) -> str:
-    """What the package is called that stands for the folder of a plugin given by path."""
+    """Return the name of the package that stands for the folder of a plugin given by path."""
     folder = path.resolve() if path.is_dir() else path.resolve().parent
     return f"{PREFIX}{zlib.crc32(os.fsencode(folder)):08x}"
 
 
-def loose(path: Path, place: Place | None = None, where: str = "") -> Iterator[tuple[str, Listed]]:
-    """The modules of a file or folder that is not installed, as a package of their own, so that they can import
-    each other relatively.
-
-    Args:
-        path: the file or folder.
-        place: where it is named.
-        where: the same in words, for a place that is no file.
-    """
+def loose(named: PluginPath) -> Iterator[tuple[str, Listed]]:
+    """Yield the types of a file or folder that is not installed; its modules can import each other relatively."""
+    path, where = named.path, named.where
     record_read(path)
     if not path.exists():
-        raise InputError(Problem("RG011", f"there is no plugin '{path}'{where}", place))
+        raise InputError(Problem("RG011", f"there is no plugin '{path}'{where}", named.place))
     path = path.resolve()
     folder = path if path.is_dir() else path.parent
     if path.suffix in SHADERS:
@@ -163,7 +192,7 @@ def loose(path: Path, place: Place | None = None, where: str = "") -> Iterator[t
         return
     if not path.is_dir() and (path.suffix != ".py" or "." in path.stem or not path.is_file()):
         kinds = f"a folder, a Python module (a name without dots, then .py) or a shader file ({', '.join(SHADERS)})"
-        raise InputError(Problem("RG011", f"there is no plugin in '{path}'{where}; one is {kinds}", place))
+        raise InputError(Problem("RG011", f"there is no plugin in '{path}'{where}; use {kinds}", named.place))
     package = package_of(path)
     fresh_package(package, folder)
     plugin = folder.name if path.is_dir() else path.stem

@@ -1,37 +1,45 @@
-"""Importing a node module, and saying what is wrong with it."""
+"""Import of node modules; those of plugins by path are imported anew when one of the folder's files has changed.
+
+All modules of one folder are dropped together, helpers included, so that none holds on to an old class of another.
+Installed packages are imported once, as everywhere.
+"""
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import sys
+from collections.abc import Sequence
+from importlib.machinery import FileFinder, ModuleSpec, SourceFileLoader
 from pathlib import Path
+from types import CodeType, ModuleType
 
-from rendergraph.catalog import find
 from rendergraph.catalog.types import Listed, NodeType
 from rendergraph.declare import Node, declaration_mistakes
 from rendergraph.declare.blame import declaration_of, describe_error, source_location
 from rendergraph.errors import InputError, Place, Problem, is_interruption, shown_file
+from rendergraph.stamps import Stamp, modified, record_read, replay_reads, track_reads
+
+PREFIX = "rendergraph_plugin_"
+"""Start of the names of the packages that stand for folders; a number that tells them apart follows."""
+
+_FILES: dict[str, dict[str, Stamp]] = {}
+"""Package to the files that its modules in `sys.modules` were made from."""
 
 
 def load(name: str, listed: Listed) -> NodeType:
-    """The one node class of a module.
-
-    Raises:
-        InputError: the module fails, or it declares its node wrongly.
-    """
+    """Import the one node class of a module; an error if the module fails or declares its node wrongly."""
     place = Place(shown_file(listed.file))
     try:
         module = importlib.import_module(listed.module)
-    except BaseException as error:  # whatever a stranger's module raises is a mistake in that module
+    except BaseException as error:  # whatever third-party code raises is a mistake in that code
         if is_interruption(error):
             raise
-        raise InputError(_failed(name, listed, error, place)) from error
-    classes = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Node) and value.__module__ == module.__name__
-    ]
-    classes = [cls for cls in dict.fromkeys(classes) if not cls.__name__.startswith("_")]
+        text = f"node type '{name}' cannot be imported: {describe_error(error)}"
+        where = source_location(error, listed.module, listed.file.parent) or place
+        raise InputError(Problem("RG491", text, where)) from error
+    types = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, Node)]
+    own = [cls for cls in types if cls.__module__ == module.__name__ and not cls.__name__.startswith("_")]
+    classes = list(dict.fromkeys(own))
     if len(classes) != 1:
         names = ", ".join(cls.__name__ for cls in classes) or "none"
         text = f"the module of node type '{name}' must define one Node class, it has {names}"
@@ -40,19 +48,70 @@ def load(name: str, listed: Listed) -> NodeType:
     if problems := declaration_mistakes(cls):
         who = f"node type '{name}'"
         raise InputError([p.relocate(declaration_of(cls, listed.file, p.subject), context=who) for p in problems])
-    return NodeType(
-        name, listed.family, cls, listed.file, listed.shaders, listed.plugin, inherited=_inherited(cls, listed)
-    )
+    bases = [base.__module__ for base in cls.__mro__[1:] if issubclass(base, Node) and base is not Node]
+    folders = [_shaders_of(base, Path(sys.modules[base].__file__ or "")) for base in bases]
+    inherited = tuple(dict.fromkeys(folder for folder in folders if folder != listed.shaders))
+    return NodeType(name, listed.family, cls, listed.file, listed.shaders, listed.plugin, inherited=inherited)
 
 
-def _inherited(cls: type[Node], listed: Listed) -> tuple[Path, ...]:
-    """The folders of shaders of the nodes that a class extends, the nearest first."""
-    modules = [base.__module__ for base in cls.__mro__[1:] if issubclass(base, Node) and base is not Node]
-    folders = [find.shader_folder(module, Path(sys.modules[module].__file__ or "")) for module in modules]
-    return tuple(dict.fromkeys(folder for folder in folders if folder != listed.shaders))
+def _shaders_of(module: str, file: Path) -> Path:
+    """The folder of a module's shaders: of `X.nodes.family.a` it is `X.shaders/family`, else the module's own."""
+    before, nodes, family = module.rpartition(".")[0].partition(".nodes")
+    shaders = shader_folder(before + nodes) if nodes and family[:1] in ("", ".") else None
+    return file.parent if shaders is None else shaders.joinpath(*family.split("."))
 
 
-def _failed(name: str, listed: Listed, error: BaseException, place: Place) -> Problem:
-    """The author's own line of what a module raised, or a helper that it imports."""
-    text = f"node type '{name}' cannot be imported: {describe_error(error)}"
-    return Problem("RG491", text, source_location(error, listed.module, listed.file.parent) or place)
+def shader_folder(package: str) -> Path | None:
+    """Return the folder of `X.shaders` beside `X.nodes`."""
+    parent, _, last = package.rpartition(".")
+    if not parent or last != "nodes":
+        return None
+    try:
+        spec = importlib.util.find_spec(f"{parent}.shaders")
+    except (ImportError, ValueError, AttributeError):
+        return None
+    folders = spec.submodule_search_locations if spec else None
+    return Path(next(iter(folders))) if folders else None
+
+
+# --- modules of folders ----------------------------------------------------------------------------------------------
+
+
+class _Loader(SourceFileLoader):
+    """Compiles the source each time: compiled files are told apart by whole seconds, edits may be quicker."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        with track_reads() as files:
+            record_read(Path(self.path))
+        _FILES.setdefault(fullname.partition(".")[0], {}).update(files)
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
+class _Finder:
+    """Finds the modules of the packages that `fresh_package` made, in the folder as it is now."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if path is None or not fullname.startswith(PREFIX):
+            return None
+        specs = (FileFinder(folder, (_Loader, [".py"])).find_spec(fullname) for folder in path)
+        return next((spec for spec in specs if spec is not None), None)
+
+
+_FINDER = _Finder()
+
+
+def fresh_package(name: str, folder: Path) -> None:
+    """Make a folder importable as a package; drop what has been imported from it if a file has changed."""
+    if _FINDER not in sys.meta_path:
+        sys.meta_path.insert(0, _FINDER)
+    if name in sys.modules and modified(_FILES.get(name, {})):
+        for module in [module for module in sys.modules if module == name or module.startswith(f"{name}.")]:
+            del sys.modules[module]
+        del _FILES[name]
+    if name not in sys.modules:
+        package = ModuleType(name)
+        package.__path__ = [str(folder)]
+        sys.modules[name] = package
+    replay_reads(_FILES.get(name, {}))

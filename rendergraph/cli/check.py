@@ -51,7 +51,7 @@ def command(selection: Selection, as_json: bool) -> None:
     graph, path = linked.graph, linked.spec.path
     later: list[Problem] = []
     if path and not is_picture(path):
-        stale = outdated(path, Roots.around(path, selection.asset_roots), linked.catalog, selection.plugins)
+        stale = outdated(path, Roots.of_file(path, selection.asset_roots), linked.catalog, selection.plugins)
         later = [stale] if stale else []
     warn(later)
     width, height = graph.size

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from rendergraph.catalog.configured import OWN, VARIABLE, configured
+from rendergraph.catalog.find import OWN, VARIABLE, configured
 from rendergraph.errors import InputError, Place, Problem, RendergraphError
 from rendergraph.installed import version
 from rendergraph.resources import folder

@@ -17,7 +17,7 @@ from rendergraph.errors import InputError, Problem, is_interruption, nearest, no
 from rendergraph.glsl.source import needs, needs_place
 from rendergraph.keys import MOST_PROBLEMS
 from rendergraph.resolve import NodeSpec, PipelineSpec
-from rendergraph.settings import nearest as nearest_settings
+from rendergraph.settings import nearest_settings
 from rendergraph.textures import Any as AnyTexture
 
 

@@ -46,7 +46,7 @@ def resolve(
     document = _entry(source, limits)
     is_shipped = document.path is not None and shipped_pipelines().get(document.path.stem) == document.path
     home = Path() if is_shipped or document.path is None else document.path.parent  # where the resolved file will stand
-    roots = Roots.around(home / "x", files.asset_roots)
+    roots = Roots.of_file(home / "x", files.asset_roots)
     files.plugins.start(home, roots)
     files.own(document, None if is_shipped else roots)
     tree = files.chain(document)
@@ -161,7 +161,7 @@ def _scene(tree: Value, files: Files, typed: str | Path | None) -> tuple[Path | 
     if typed is not None and not is_name(str(value.data)):
         # Named by the user, so the file itself is beyond question; what it refers to is not.
         path = Path(typed)
-        roots = Roots.around(path, files.asset_roots)
+        roots = Roots.of_file(path, files.asset_roots)
         found: tuple[Path, Roots] | None = (path, roots)
         resolved = Roots((*roots.folders, path.resolve().parent)).mistake(path, str(typed))
         if resolved:

@@ -47,12 +47,12 @@ class Files:
 
     def roots_of(self, value: Value) -> Roots:
         """Where the file that contains a value may read from."""
-        return self._roots.get(value.source) or Roots.around(Path("x"), self.asset_roots)
+        return self._roots.get(value.source) or Roots.of_file(Path("x"), self.asset_roots)
 
     def own(self, document: Document, roots: Roots | None = None) -> None:
         """Register where a file may read from: its own surroundings if the user named it."""
         around = document.path or Path("x")
-        self._roots[document.source] = roots or Roots.around(around, self.asset_roots)
+        self._roots[document.source] = roots or Roots.of_file(around, self.asset_roots)
         self.dropped |= document.dropped
         self.bring(document.root)
 
@@ -67,7 +67,7 @@ class Files:
 
     def typed_roots(self, value: Value) -> Roots:
         """Where a `type` may lead; a path typed on the command line may be anywhere."""
-        return self._roots.get(value.source) or Roots.around(self.beside(value), self.asset_roots)
+        return self._roots.get(value.source) or Roots.of_file(self.beside(value), self.asset_roots)
 
     def beside(self, value: Value) -> Path:
         path = value.source.path

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Self
 from rendergraph.errors import Problem, RenderError
 from rendergraph.gl.device import Device, borrow_device, open_device
 from rendergraph.session.gpu_cache import GpuCache
-from rendergraph.settings import CacheLimits, nearest
+from rendergraph.settings import CacheLimits, nearest_settings
 
 if TYPE_CHECKING:
     import moderngl
@@ -46,7 +46,7 @@ class Gpu:
             InputError: the settings file is malformed.
         """
         if cache is None:
-            settings = nearest(Path.cwd())
+            settings = nearest_settings(Path.cwd())
             cache = CacheLimits() if settings is None else settings.cache
         self._thread, self._process = threading.get_ident(), os.getpid()
         self.device: Device = open_device(device) if ctx is None else borrow_device(ctx)

@@ -88,7 +88,7 @@ def _environment(selection: Selection, picture: Made) -> Path | None:
     """The environment that a picture names: whoever draws it again has not typed that."""
     path = picture.environment
     if path is not None:
-        Roots.around(Path("x"), selection.asset_roots).check(path, Place(str(selection.source)))
+        Roots.of_file(Path("x"), selection.asset_roots).check(path, Place(str(selection.source)))
     return path
 
 

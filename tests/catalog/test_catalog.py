@@ -96,7 +96,7 @@ def test_unknown_names_and_paths(plugin: Path) -> None:
 @pytest.mark.parametrize("name", ["notes.txt", "tone.vert", "my.node.py", "pipe.py"])
 def test_files_that_are_no_plugins(tmp_path: Path, name: str) -> None:
     os.mkfifo(tmp_path / name) if name == "pipe.py" else (tmp_path / name).touch()
-    with pytest.raises(InputError, match=r"RG011 there is no plugin in '.*'; one is a folder, a Python module"):
+    with pytest.raises(InputError, match=r"RG011 there is no plugin in '.*'; use a folder, a Python module"):
         Catalog.discover([tmp_path / name], installed=False)
 
 

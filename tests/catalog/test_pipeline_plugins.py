@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import rendergraph as rg
-from rendergraph.catalog import Catalog
+from rendergraph.catalog import Catalog, find
 from rendergraph.cli import main
 from rendergraph.errors import InputError, Problem
 from rendergraph.link import link
@@ -368,13 +368,11 @@ def test_wrong_plugins(write: Write, plugins: str, text: str) -> None:
     assert any(message.startswith(text) for message in messages(folder / "in" / "p.yaml"))
 
 
-def test_a_folder_has_a_plugins_size(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = write({**{f"fx/deep/{n}.txt": "" for n in range(30)}, "p.yaml": pipeline("tonemap", "plugins: [./fx]\n")})
-    monkeypatch.setattr("rendergraph.catalog.find.MOST_FILES", 30)
-    (message, *_) = messages(folder / "p.yaml")
-    assert message == (
-        "2:11: RG131 './fx' is not a folder of plugins: it has more than 30 files; name the folder of the effects itself"
-    )
+def test_a_folder_has_a_plugins_size(write: Write) -> None:
+    folder = write({f"fx/deep/{n}.txt": "" for n in range(30)})
+    assert find.shaders(folder / "fx", 31) == ([], [])
+    with pytest.raises(ValueError, match="it has more than 30 files; name the folder of the effects itself"):
+        find.shaders(folder / "fx", 30)
 
 
 def test_a_pipe_in_a_folder_is_not_waited_for(write: Write) -> None:
