@@ -13,7 +13,6 @@ from rendergraph.compare.results import Comparison, Reference, Result, objective
 from rendergraph.compare.store import Failure, RunRecord, SweepFolder, find_record, restored_result
 from rendergraph.compare.tasks import (
     ComparisonTask,
-    DifferenceResult,
     PassCount,
     ReferenceResult,
     ReferenceTask,
@@ -23,7 +22,6 @@ from rendergraph.compare.tasks import (
     TimingResult,
     VariantTask,
 )
-from rendergraph.diff import diff
 from rendergraph.errors import Problem, RendergraphError
 from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOutput, TaskRetried
 
@@ -100,8 +98,9 @@ class Runner:
         return [list(numbers)] if workers == 1 else [[number] for number in numbers]
 
     def _progress(self) -> tuple[int, int]:
-        """Return the number of outputs so far, and of all: three for each run."""
-        return min(self._outputs, 3 * len(self.prepared.runs)), 3 * len(self.prepared.runs)
+        """Return the number of outputs so far, and of all: two for each run."""
+        total = 2 * len(self.prepared.runs)
+        return min(self._outputs, total), total
 
     def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
         base = RunSpec.of(self.prepared.base, -1 if self.prepared.other else 0)
@@ -141,11 +140,6 @@ class Runner:
                 self._rendered(output)
         elif isinstance(output, TimingResult):
             self._timed(output, worker)
-        elif isinstance(output, DifferenceResult):
-            number, base = output.number, self.prepared.base.planned.linked.graph
-            graph = self.prepared.runs[number].planned.linked.graph
-            result = replace(self.results[number], first=output.first, difference=diff(base, graph))
-            self.results[number] = result
 
     def _rendered(self, output: RenderedResult) -> None:
         run = self.prepared.runs[output.number]

@@ -126,30 +126,19 @@ class Space:
     chosen: tuple[Mapping[str, str], ...] | None = field(default=None, compare=False)
 
     @classmethod
-    def of(
-        cls,
-        axes: Axes,
-        *,
-        zipped: Sequence[Sequence[str]] = (),
-        samples: int | None = None,
-        sampling: Sampling = "latin",
-        seed: int = 0,
-    ) -> Space:
+    def of(cls, axes: Axes, *, zipped: Sequence[Sequence[str]] = (), **sampling: Any) -> Space:
         """Make a space from plain Python values.
 
         Args:
             axes: axes, texts as `-x` takes them, or a mapping from paths to lists of values or to ranges as text.
-            zipped, samples, sampling, seed: see the attributes.
-
-        Raises:
-            InputError: a text is not an axis.
+            zipped, sampling: the attributes `zipped`, `samples`, `sampling` and `seed`.
         """
         if isinstance(axes, Space):
             return axes
         if isinstance(axes, str):
             axes = [axes]
         given = [_from_python(path, values) for path, values in axes.items()] if isinstance(axes, Mapping) else axes
-        return cls(tuple(map(_axis, given)), tuple(map(tuple, zipped)), samples, sampling, seed)
+        return cls(tuple(map(_axis, given)), tuple(map(tuple, zipped)), **sampling)
 
     @property
     def groups(self) -> list[tuple[Axis, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -12,7 +12,6 @@ from rendergraph.compare.divergence import every_output, first_difference
 from rendergraph.compare.fingerprint import worker_digest
 from rendergraph.compare.prepare import Run
 from rendergraph.compare.results import (
-    Difference,
     Pixels,
     Reference,
     light_error,
@@ -129,14 +128,6 @@ class TimingResult:
 
 
 @dataclass(frozen=True, eq=False)
-class DifferenceResult:
-    """The first pass of a run that differs from the base has been found, or there is none."""
-
-    number: int
-    first: Difference | None
-
-
-@dataclass(frozen=True, eq=False)
 class TaskError:
     """A run cannot be rendered or compared, on any worker."""
 
@@ -151,7 +142,7 @@ class PassCount:
     count: int
 
 
-TaskEvent: TypeAlias = "ReferenceResult | RenderedResult | TimingResult | DifferenceResult | TaskError | PassCount"
+TaskEvent: TypeAlias = "ReferenceResult | RenderedResult | TimingResult | TaskError | PassCount"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -234,7 +225,7 @@ class ComparisonTask(VariantTask):
     base: RunSpec
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
-        """Yield the pictures of all runs, then their times, then their first differences."""
+        """Yield the pictures of all runs with their first differences, then their times."""
         gpu = worker.gpu
         planned = [run.plan(worker) for run in self.runs]
         reference = self.reference(worker)
@@ -243,26 +234,24 @@ class ComparisonTask(VariantTask):
             if reference is None:
                 reference = _reference(run, frame.arrays, self.encoding)
                 yield ReferenceResult(reference, frame.device)
-            yield _rendered(run, each, frame.arrays, reference, frame.device, worker, warnings=frame.warnings)
+            rendered = _rendered(run, each, frame.arrays, reference, frame.device, worker, warnings=frame.warnings)
+            yield replace(rendered, measured={**rendered.measured, **self._difference(run, each, worker)})
         for run, each, times in zip(self.runs, planned, _take_turns(gpu, planned, self.frames), strict=True):
             device = gpu.device.as_json()
             yield TimingResult(run.number, times_of(times, node_types(each)), device, _machine(worker))
-        for run, each in zip(self.runs, planned, strict=True):
-            first = None
-            if run.number != self.base.number:
-                graph, base_frame = self._base(worker)
-                frame = every_output(gpu, each, self.frame)
-                own = each.linked.graph
-                first = first_difference(base_frame, frame, each.plan, own, diff(graph, own))
-            yield DifferenceResult(run.number, first)
 
-    def _base(self, worker: Worker) -> tuple[Graph, Any]:
-        key = "outputs", self.base.digest, self.frame
+    def _difference(self, run: RunSpec, planned: Planned, worker: Worker) -> dict[str, Any]:
+        graph, key = planned.linked.graph, ("outputs", self.base.digest, self.frame)
+        if run.number == self.base.number:
+            return {"difference": diff(graph, graph)}
         if key not in worker.cache:
-            planned = self.base.plan(worker)
-            worker.cache[key] = planned.linked.graph, every_output(worker.gpu, planned, self.frame)
-        graph, frame = worker.cache[key]
-        return graph, frame
+            base = self.base.plan(worker)
+            worker.cache[key] = base.linked.graph, every_output(worker.gpu, base, self.frame)
+        base_graph, base_frame = worker.cache[key]
+        difference = diff(base_graph, graph)
+        frame = every_output(worker.gpu, planned, self.frame)
+        first = first_difference(base_frame, frame, planned.plan, graph, difference)
+        return {"difference": difference, "first": first}
 
 
 @dataclass(frozen=True, eq=False)

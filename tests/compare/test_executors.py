@@ -335,7 +335,7 @@ def test_64_variants_are_the_same_by_dask_though_a_worker_is_killed_and_no_disk_
         assert not list(tmp_path.glob("cluster/b/**/make.frag"))  # nor is anything left there
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("changed", [False, True])
 def test_what_was_lost_with_all_workers_is_sent_to_the_next(
     base: rg.Pipeline, gl: rg.Session, cluster: Cluster, tmp_path: Path, changed: bool
@@ -402,7 +402,7 @@ class Halo(Node):
 '''
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_plugin_that_a_worker_lacks_is_told_before_anything_runs_and_a_lost_scheduler_keeps_what_is_there(
     base: rg.Pipeline, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -133,7 +133,7 @@ def test_too_many_groups_are_an_error(tmp_path: Path) -> None:
         template(found, tmp_path / "study.yaml", tmp_path, frames=None, chunk=1, most_tasks=2)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_reference_tools_check_and_run_the_job(gl: rg.Session, tmp_path: Path) -> None:
     """Each task in a process of its own, as on a farm; what comes out is what one process draws."""
     programs = Path(sys.executable).parent

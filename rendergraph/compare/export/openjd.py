@@ -48,7 +48,10 @@ def template(
         raise InputError(Problem("RG524", text))
     steps = [_step("Measure", [{"name": "Runs", "type": "STRING", "range": groups}], _MEASURE)]
     if frames is not None:
-        steps.append(_step("Frames", _chunks(len(listing.prepared.runs)), _FRAMES))
+        chunks = {"defaultTaskCount": "{{Param.Chunk}}", "rangeConstraint": "CONTIGUOUS"}
+        run = {"name": "Run", "type": "INT", "range": f"1-{len(listing.prepared.runs)}"}
+        frame = {"name": "Frame", "type": "CHUNK[INT]", "range": "{{Param.Frames}}", "chunks": chunks}
+        steps.append(_step("Frames", [run, frame], _FRAMES))
     after = [{"dependsOn": step["name"]} for step in steps]
     report = {"name": "Report", "dependencies": after, **_NEEDS, "script": _script(_REPORT)}
     name = listing.prepared.study["pipeline"]
@@ -111,15 +114,6 @@ def _step(name: str, parameters: Sequence[dict[str, Any]], words: Sequence[str])
 
 def _script(words: Sequence[str]) -> dict[str, Any]:
     return {"actions": {"onRun": {"command": "{{Param.Rendergraph}}", "args": list(words)}}}
-
-
-def _chunks(runs: int) -> list[dict[str, Any]]:
-    """Return the parameters of tasks: each run by itself, its frames in chunks."""
-    chunks = {"defaultTaskCount": "{{Param.Chunk}}", "rangeConstraint": "CONTIGUOUS"}
-    return [
-        {"name": "Run", "type": "INT", "range": f"1-{runs}"},
-        {"name": "Frame", "type": "CHUNK[INT]", "range": "{{Param.Frames}}", "chunks": chunks},
-    ]
 
 
 def numbers_text(numbers: Iterable[int]) -> str:
