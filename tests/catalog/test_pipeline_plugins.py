@@ -213,7 +213,7 @@ def test_a_missing_folder_says_who_names_it(write: Write, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match=r"RG011 there is no plugin 'nowhere'$"):
         Catalog.discover([Path("nowhere")])
     (folder / "nowhere").write_text("")
-    with pytest.raises(InputError, match=r"RG011 there is no plugin in '.*nowhere', which RENDERGRAPH_PATH names; one"):
+    with pytest.raises(InputError, match=r"RG011 there is no plugin in '.*nowhere', which RENDERGRAPH_PATH names; use"):
         Catalog.discover()
 
 

@@ -225,7 +225,7 @@ def headed(text: str) -> str:
             "params: {strength: {role: define}}",
             [
                 "2:10: RG444 the header has parameter 'strength', which the shader declares as 'uniform float strength;', "
-                "no define"
+                "not a define"
             ],
         ),
         (
