@@ -1,4 +1,4 @@
-"""What is known of a node's surroundings before the schedule."""
+"""What a node knows of scene and inputs before the schedule."""
 
 from __future__ import annotations
 
@@ -17,47 +17,33 @@ SELECTIONS: Mapping[str, Callable[[bool, bool], bool]] = {
     "transparent": lambda casts, blended: blended,
     "casters": lambda casts, blended: casts and not blended,
 }
-"""Which objects a geometry step draws, by the word it uses: of whether they cast a shadow, and are blended.
+"""The objects of a geometry step by its word: a test of whether they cast a shadow, and are blended.
 
-Keyframes change none of this, so that it holds for all frames.
+Keyframes change neither.
 """
 
 
 class LightFacts(Struct, frozen=True):
-    """What is known of a light before the schedule: values that move are not.
-
-    Attributes:
-        name: unique in the scene.
-        type: what kind of light it is.
-        casts_shadow: whether a node that looks for a light to cast shadows may choose it.
-    """
+    """A light without the values that keyframes change; `casts_shadow` allows nodes to choose it for shadows."""
 
     name: str
     type: Literal["directional", "point", "spot"]
     casts_shadow: bool = True
 
 
-class NamedLight(Protocol):
-    """What is asked of a light to find those that cast."""
+class _Light(Protocol):
+    @property
+    def name(self) -> str: ...
 
     @property
-    def name(self) -> str:
-        """Unique in the scene."""
-        ...
+    def type(self) -> str: ...
 
     @property
-    def type(self) -> str:
-        """`directional`, `spot` or `point`."""
-        ...
-
-    @property
-    def casts_shadow(self) -> bool:
-        """Whether it may be chosen."""
-        ...
+    def casts_shadow(self) -> bool: ...
 
 
-def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) -> tuple[int, ...]:
-    """The lights that cast, as indices into the scene's lights, in its order.
+def casting_lights(wanted: str | Sequence[str], lights: Sequence[_Light]) -> tuple[int, ...]:
+    """Return the shadow-casting lights, as indices into the scene's lights, in its order.
 
     Args:
         wanted: `auto` for the first directional, else the first spot, else the first point light, and `all`, both of
@@ -83,20 +69,18 @@ def casting_lights(wanted: str | Sequence[str], lights: Sequence[NamedLight]) ->
 
 
 class ObjectFacts(Struct, frozen=True, eq=False):
-    """What is known of an object before the schedule: where it stands is not.
+    """An object without its place, which may move.
 
     Meshes are not compared: what was worked out for one object holds for another that is equal in all else.
 
     Attributes:
-        name: unique in the scene.
-        triangles, vertices: of its mesh.
-        casts_shadow: whether it does.
-        blended: its material is laid over what is behind it (`alpha_mode: blend`).
-        double_sided: its material shows from both sides.
-        hidden: it is drawn only where a step names it.
-        grain: its material is rougher along one direction than across (`anisotropy_strength`), at some time at least.
-        emissive: its material emits light, at some time at least.
-        reflective: its material reflects other than 4 % at normal incidence where it is not metal, at some time.
+        triangles, vertices: counts of its mesh.
+        blended: its material is blended with what is behind it (`alpha_mode: blend`).
+        double_sided: its material is visible from both sides.
+        hidden: only steps that name it draw it.
+        grain: its material is anisotropic (`anisotropy_strength`) in some frame.
+        emissive: its material emits light in some frame.
+        reflective: its material reflects other than 4 % at normal incidence where it is not metal, in some frame.
         mesh: the name of its mesh.
     """
 
@@ -141,10 +125,9 @@ class ObjectFacts(Struct, frozen=True, eq=False):
 
     @property
     def most_layers(self) -> int:
-        """How many of its surfaces, as they are drawn, a line of sight can meet: a bound, from its shape.
+        """A bound of how many of its drawn surfaces a line of sight can meet.
 
-        One of what is flat, one of what is convex and shows its outside alone, two where it shows both sides; else as
-        many as it has triangles.
+        One for a flat mesh, one for a convex mesh and two if it is double-sided; else its number of triangles.
         """
         if self.flat:
             return 1
@@ -158,13 +141,13 @@ class ObjectFacts(Struct, frozen=True, eq=False):
 
 
 class TextureInfo(Struct, frozen=True, gc=False):
-    """What an output has turned out to be.
+    """What inference found out about an output.
 
     Attributes:
         desc: what it is allocated from (None for a buffer, view or function).
-        semantic: what it means, after `any` and `like` are followed.
-        view: the id of the view table it was drawn with (`camera`, or `node.port`), None if not drawn.
-        lights: the scene's light index of each layer or view, empty where those are not lights'.
+        semantic: its meaning, after `any` and `like` are followed.
+        view: the id of the view table it is drawn with (`camera`, or `node.port`), None if not drawn.
+        lights: the scene's light index of each layer or view, empty if they belong to no lights.
         bytes: size of a buffer, 0 for textures.
         views: number of views of a table of views, 0 for everything else.
     """
@@ -183,14 +166,12 @@ class TextureInfo(Struct, frozen=True, gc=False):
 
 
 class Facts(Struct, frozen=True):
-    """What is known of a node's surroundings before the schedule.
+    """What a node knows before the schedule; lights and objects are in the scene's order.
 
     Attributes:
         viewport: width and height of the picture.
-        lights: the scene's lights in its order.
         inputs: what each connected input carries; a `many` input has one entry a link.
-        objects: the scene's objects in its order.
-        environment: the picture around the scene as it is uploaded; None where the scene has none.
+        environment: the environment map as it is uploaded; None if the scene has none.
     """
 
     viewport: tuple[int, int]
@@ -201,15 +182,11 @@ class Facts(Struct, frozen=True):
 
     @property
     def of_scene(self) -> tuple[TextureInfo, ...]:
-        """What an input of an environment carries that nothing is linked to; empty where the scene has none."""
+        """What an unconnected input of an environment carries; empty if the scene has none."""
         return (TextureInfo(self.environment, EnvironmentMap),) if self.environment is not None else ()
 
     def casting(self, wanted: str | Sequence[str]) -> tuple[int, ...]:
-        """The lights that cast, as indices: `auto`, `all`, a light's name or several; see `casting_lights`.
-
-        Raises:
-            SceneError: no light has that name.
-        """
+        """The shadow-casting lights, as indices: `auto`, `all`, a light's name or several; see `casting_lights`."""
         return casting_lights(wanted, self.lights)
 
     def drawn(self, objects: str | Sequence[str]) -> tuple[ObjectFacts, ...]:
@@ -221,13 +198,9 @@ class Facts(Struct, frozen=True):
         return tuple(one for one in self.objects if one.name in names)
 
     def connected(self, name: str) -> bool:
-        """Whether anything is linked to the input, or it takes the scene's environment and there is one."""
+        """Whether the input is connected, or takes the scene's environment and there is one."""
         return bool(self.inputs.get(name))
 
     def input(self, name: str) -> TextureInfo:
-        """What the input carries.
-
-        Raises:
-            KeyError: nothing is linked to it.
-        """
+        """What a connected input carries; KeyError for others."""
         return self.inputs[name][0]

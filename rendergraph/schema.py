@@ -36,12 +36,12 @@ _WORDS = {"number": "a number", "integer": "a whole number", "boolean": "true or
 
 
 def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Schema:
-    """A draft-07 schema, which is what editors read.
+    """Return a draft-07 schema, which is what editors read.
 
     A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
 
     Args:
-        catalog: the types there are.
+        catalog: the known types.
         bases: what files extend, as it is written in them, with the types of its nodes by their ids.
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())
@@ -61,20 +61,12 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Sch
 
 
 def shipped_bases(catalog: Catalog) -> dict[str, dict[str, str]]:
-    """The types of the nodes of every shipped pipeline, by name and id."""
+    """Return the types of the nodes of every shipped pipeline, by name and id."""
     return {name: _types_in(resolve(name, catalog=catalog)) for name in shipped_pipelines()}
 
 
 def base_of(file: Path, spec: PipelineSpec) -> dict[str, dict[str, str]]:
-    """The types of the nodes of what a pipeline file extends, under the name it has there; nothing where it is whole.
-
-    Args:
-        file: the file.
-        spec: what it resolves to.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """Return the types of the nodes of what a pipeline file extends, under the name it has there; see `schema`."""
     base = word(read(file, keep_going=True).root, "extends")
     return {} if base is None else {base: _types_in(spec)}
 
@@ -109,7 +101,6 @@ def _inherited(then: Schema) -> Schema:
 
 
 def _rules_of(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
-    """What the inputs and parameters of a type are."""
     return {"properties": {"inputs": _inputs(type_name, cls), "params": _params(type_name, cls, extensions)}}
 
 
@@ -169,12 +160,7 @@ def _params(type_name: str, cls: type[Node], extensions: Extensions) -> Schema:
 
 
 def _param(parameter: Parameter, extensions: Extensions) -> Schema:
-    """One parameter: its own values, null for the default, or a parameter of the pipeline.
-
-    Args:
-        parameter: the parameter.
-        extensions: where the choices come from that plugins add.
-    """
+    """One parameter: its own values, null for the default, or a parameter of the pipeline."""
     added = extensions.choices(parameter.open_name) if parameter.open_name else []
     doc = " ".join([parameter.doc, *(f"`{one.name}` ({one.plugin}): {about(one.value)}" for one in added)])
     own = json_schema(parameter.closed(tuple(one.name for one in added)))
@@ -211,16 +197,10 @@ _MOST_BYTES = 1 << 24
 
 
 def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[Path] = ()) -> Problem | None:
-    """A warning where the schema that a pipeline file's modeline names was written before its node types changed.
+    """Return a warning if the schema that a pipeline file's modeline names was written before its node types changed.
 
-    Types that the schema knows and the catalog does not are nothing to warn of: it may be for more plugins than this
-    run has.
-
-    Args:
-        pipeline: the file.
-        roots: where the schema must lie; one elsewhere is not looked at.
-        catalog: the types there are.
-        plugins: those that were named, to be named again.
+    A schema outside `roots` is not read. Types that only the schema knows are fine: it may be for more plugins than
+    this run has. `plugins` are those of the command line, for the suggested command.
     """
     text = pipeline.read_text(encoding="utf-8", errors="replace")
     found = _MODELINE.search(text)
@@ -261,7 +241,6 @@ def outdated(pipeline: Path, roots: Roots, catalog: Catalog, plugins: Iterable[P
 
 
 def _rules(found: Any) -> dict[str, Any]:
-    """What a schema says of each node type."""
     node = found["definitions"]["node"]
     rules = {entry["if"]["properties"]["type"]["const"]: entry["then"] for entry in node["allOf"]}
     about = {entry["const"]: entry for entry in node["properties"]["type"]["anyOf"] if "const" in entry}
@@ -269,5 +248,5 @@ def _rules(found: Any) -> dict[str, Any]:
 
 
 def _bases_in(found: Any) -> set[str]:
-    """What files may extend, by a schema, so that it knows the nodes of that."""
+    """The files that a schema has bases for."""
     return {entry["if"]["properties"]["extends"]["const"] for entry in found.get("allOf", ())}

@@ -76,14 +76,7 @@ _MOST_BYTES = 100_000
 
 
 class Settings(Struct, frozen=True):
-    """One `rendergraph.toml`.
-
-    Attributes:
-        file: the file.
-        asset_roots: further folders that files may be read from.
-        plugins: files and folders with node modules.
-        cache: what a session keeps.
-    """
+    """One `rendergraph.toml`; see `SETTINGS`."""
 
     file: Path
     asset_roots: tuple[Path, ...] = ()
@@ -92,16 +85,11 @@ class Settings(Struct, frozen=True):
 
     @property
     def folder(self) -> Path:
-        """The project's folder."""
         return self.file.parent
 
 
 def nearest_settings(folder: Path) -> Settings | None:
-    """The settings file in a folder, links followed, or the nearest one above it.
-
-    Raises:
-        InputError: it is malformed.
-    """
+    """Return the settings file in a folder, links followed, or the nearest one above it."""
     for candidate in (folder, *folder.parents):
         file = candidate / FILE_NAME
         record_read(file)
@@ -111,11 +99,6 @@ def nearest_settings(folder: Path) -> Settings | None:
 
 
 def load(file: Path) -> Settings:
-    """A settings file; its paths are relative to it.
-
-    Raises:
-        InputError: it is not valid TOML, or a key or value of it is wrong.
-    """
     import tomllib  # most projects have no such file
 
     source = Source(str(file), file)
@@ -134,25 +117,18 @@ def load(file: Path) -> Settings:
 
 
 class Roots(Struct, frozen=True):
-    """The folders that files may be read from, links followed.
-
-    Attributes:
-        folders: resolved.
-    """
+    """The folders that files may be read from, links followed."""
 
     folders: tuple[Path, ...]
 
     @classmethod
     def of_file(cls, file: Path, extra: Iterable[Path] = (), cwd: Path | None = None) -> Roots:
-        """The roots of everything reached from a file that the user named.
+        """Return the roots of everything reached from a file that the user named.
 
         Args:
-            file: the file; its own folder is a root, or that of the nearest settings file above it.
+            file: the file; its own folder is a root, and that of the nearest settings file above it.
             extra: folders added on the command line.
-            cwd: where the user stands; the current folder by default.
-
-        Raises:
-            InputError: the settings file is malformed.
+            cwd: the current folder by default.
         """
         home = _resolved(file.parent)
         folders = [home]
@@ -166,28 +142,19 @@ class Roots(Struct, frozen=True):
         return cls(tuple(dict.fromkeys(folders)))
 
     def check(self, path: Path, place: Place | None = None, written: str | None = None) -> Path:
-        """The file a path leads to, links followed.
-
-        Args:
-            path: joined to the folder of the file it is written in.
-            place: where it is written.
-            written: how it is written there; the path by default.
-
-        Raises:
-            InputError: it lies outside every root, or is missing, or is no regular file.
-        """
+        """Return the file a path leads to, links followed; see `mistake`."""
         mistake = self.mistake(path, written)
         if mistake:
             raise InputError(Problem(*mistake, place))
         return _resolved(path)
 
     def mistake(self, path: Path, written: str | None = None, *, folder: bool = False) -> tuple[str, str] | None:
-        """Code and text of what forbids reading a path, None where nothing does.
+        """Return code and text if a path may not be read: it is outside all roots, missing, or not a regular file.
 
         Args:
-            path: the path.
-            written: how it is written in the file.
-            folder: a folder is meant.
+            path: joined to the folder of the file it is written in.
+            written: how it is written there; the path by default.
+            folder: expect a folder.
         """
         name = shown(written or path, 120)
         record_read(path)
@@ -195,7 +162,7 @@ class Roots(Struct, frozen=True):
             return "RG012", f"'{name}' is not a file path; only local files can be loaded"
         try:
             resolved = path.resolve()
-            # Asked before whether it exists: a file outside is none of the pipeline's business.
+            # First of all: a pipeline must not learn which files exist outside.
             if not any(resolved.is_relative_to(folder) for folder in self.folders):
                 text = (
                     f"'{name}' lies outside the folder of the file it is reached from; --asset-root DIR allows DIR too"
@@ -215,7 +182,7 @@ class Roots(Struct, frozen=True):
 
 
 def expand_home(text: str) -> Path:
-    """A path with `~` replaced by the user's home; as it is where nobody knows that."""
+    """Replace `~` by the user's home, if there is one."""
     path = Path(text)
     try:
         return path.expanduser()

@@ -23,7 +23,6 @@ class Format(Struct, frozen=True):
     """One texel format.
 
     Attributes:
-        name: the word used in declarations and files, for example `rgba16f`.
         gl: the sized internal format's GL enum.
         components: channels per texel, 1 to 4.
         bytes: bytes per texel.
@@ -92,13 +91,8 @@ FORMATS: dict[str, Format] = _formats()
 
 
 class Semantic(Struct, frozen=True):
-    """What the texels of a port mean.
-
-    Attributes:
-        name: the word in files and messages.
-        doc: one line, with units and range.
-        space: the space directions or positions are in, where that matters: `view`, `world` or None.
-        encoding: `linear` or `display` for colours, None for everything else.
+    """The meaning of a port's texels: a word, a line with units and range, the space of directions or positions, and
+    the encoding of colours.
     """
 
     name: str
@@ -227,7 +221,7 @@ class TextureDesc(Struct, frozen=True, gc=False):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of mip 0 in texels."""
+        """Width and height of mip 0."""
         return self.width, self.height
 
     @property
@@ -251,9 +245,9 @@ class TextureDesc(Struct, frozen=True, gc=False):
 
     @property
     def storage_class(self) -> tuple[object, ...]:
-        """What equal ones of can share through a view: the texel class's name, and everything but the format."""
-        made = self.kind, self.width, self.height, self.layers, self.mips, self.samples
-        return FORMATS[self.format].view_class, *made
+        """Equal for textures that can share storage through views: the texel class, and everything but the format."""
+        shape = self.kind, self.width, self.height, self.layers, self.mips, self.samples
+        return FORMATS[self.format].view_class, *shape
 
 
 class BufferDesc(Struct, frozen=True):

@@ -41,18 +41,15 @@ class Catalog:
 
     @classmethod
     def discover(cls, plugin_paths: Iterable[Path] = (), *, installed: bool = True) -> Catalog:
-        """All installed node types, and those in files and folders the user named.
+        """Return all installed node types, and those in files and folders the user named.
 
         These are, in this order, packages by entry point, `plugins` of the settings of the project around the current
-        folder, `RENDERGRAPH_PATH`, and `plugin_paths`.
+        folder, `RENDERGRAPH_PATH`, and `plugin_paths`. A folder that is a package's project, as its `pyproject.toml`
+        says, replaces an installed copy of the package.
 
         Args:
             plugin_paths: node modules, shader files, or folders of them; code, so never taken from a pipeline file.
-            installed: look at more than `plugin_paths`. Where a folder is a package's project, as its `pyproject.toml`
-                says, it stands in for an installed copy of the package.
-
-        Raises:
-            InputError: a path of the settings or of `plugin_paths` does not exist, or the settings file is malformed.
+            installed: look at more than `plugin_paths`.
         """
         named = {entry.path.resolve(): entry for entry in find.configured()} if installed else {}
         named |= {path.resolve(): find.PluginPath(path) for path in plugin_paths}
@@ -99,7 +96,6 @@ class Catalog:
         return name in self._types or name in self._listed
 
     def names(self) -> list[str]:
-        """The names of all types, sorted; nothing is imported."""
         return sorted(self._types.keys() | self._listed.keys())
 
     def has_plugin(self, name: str) -> bool:
@@ -108,11 +104,9 @@ class Catalog:
         return any(plain(plugin) == plain(name) for plugin in plugins)
 
     def files(self) -> set[Path]:
-        """The files of everything that has been listed."""
         return {one.file for found in self._listed.values() for one in found}
 
     def families(self) -> dict[str, list[str]]:
-        """Family to the names of its types, both sorted; nothing is imported."""
         table: dict[str, list[str]] = {}
         for name in self.names():
             family = self._types[name].family if name in self._types else self._listed[name][0].family
@@ -120,11 +114,7 @@ class Catalog:
         return dict(sorted(table.items()))
 
     def get(self, name: str) -> NodeType:
-        """A type, imported on first use.
-
-        Raises:
-            InputError: there is none of that name, two plugins have one, its module fails, or it is declared wrongly.
-        """
+        """Return a type, imported on first use."""
         if name in self._types:
             return self._types[name]
         if name not in self._listed:
@@ -135,10 +125,7 @@ class Catalog:
         return self._loaded[key]
 
     def usable(self, names: Iterable[str] | None = None) -> tuple[list[NodeType], list[Problem]]:
-        """Types that can be had, all or of these names, and what is wrong with the others.
-
-        One plugin's mistake must not hide everybody else's types.
-        """
+        """Return the valid types, of all or of these names, and the mistakes in the others."""
         found: list[NodeType] = []
         problems: list[Problem] = []
         for name in self.names() if names is None else names:
@@ -156,7 +143,7 @@ class Catalog:
             raise InputError(Problem("RG493", text, Place(shown_file(listed.file))))
         if listed.module:
             return modules.load(name, listed)
-        from rendergraph.catalog import shader  # what reads shaders is imported where there are any
+        from rendergraph.catalog import shader  # most pipelines use no shader files
 
         return shader.load(name, listed, self.extensions)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -19,15 +18,15 @@ GROUP = "rendergraph.extensions"
 """The entry point group; an entry's value is `package.module:NAME`."""
 MODULE = "extension"
 NAME = "EXTENSION"
-"""What a plugin's folder calls it."""
+"""The extension of a plugin's folder is `EXTENSION` in `extension.py`."""
 
 
 def extensions(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Extensions:
-    """What plugins add; nothing is looked for or imported before it is asked for.
+    """Return what plugins add; nothing is imported before it is asked for.
 
     Args:
-        folders: packages that stand for the folders of plugins the user named, and the folders.
-        offered: the entry points of those that are installed.
+        folders: folders of plugins, each with the package that stands for it.
+        offered: the entry points of installed plugins.
     """
     named, entries = tuple(folders), sorted(offered, key=lambda entry: entry.value)
     return Extensions(lambda: _sources(named, entries))
@@ -48,10 +47,10 @@ def _loader(module: str) -> Callable[[], Any]:
 
 
 def _file(entry: EntryPoint) -> Path:
-    """The file an entry's module will come from, found without importing more than its parent; empty where none is."""
+    """The file of an entry's module, found without importing more than its parent; empty if there is none."""
     try:
         spec = importlib.util.find_spec(entry.module)
-    except BaseException as error:  # its parent fails to import, which loading will say
+    except BaseException as error:  # its parent fails to import, which loading will report
         if is_interruption(error):
             raise
         spec = None
@@ -63,7 +62,7 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     place = Place(shown_file(file)) if file.name else None
     try:
         found = load()
-    except BaseException as error:  # whatever a stranger's module raises is a mistake in that module
+    except BaseException as error:  # whatever third-party code raises is a mistake in that code
         if is_interruption(error):
             raise
         text = f"the extension of plugin '{plugin}' ({value}) cannot be imported: {describe_error(error)}"
@@ -75,5 +74,5 @@ def _source(plugin: str, file: Path, load: Callable[[], Any], value: str) -> Sou
     defined = sys.modules.get(value.partition(":")[0])
     file = file if file.name else Path(getattr(defined, "__file__", None) or "")
     mistakes = extension_mistakes(found, file.parent)
-    problems = tuple(one.relocate(place, code="RG495", context=f"plugin '{plugin}'") for one in mistakes)
-    return Source(plugin, file, None if problems else found, problems)
+    problems = tuple(mistake.relocate(place, code="RG495", context=f"plugin '{plugin}'") for mistake in mistakes)
+    return Source(plugin, file, None if mistakes else found, problems)

@@ -23,14 +23,13 @@ class NodeType(Struct, frozen=True, dict=True):
 
     Attributes:
         name: the word after `type:`: the stem of its file, or the path of a shader file that is used by path.
-        family: the folder it lies in (`shadows`), empty for a single file.
-        cls: the class.
-        file: its Python file, or the shader file that it is made of.
+        family: the folder of its file (`shadows`), empty for a single file.
+        file: its Python file, or its shader file.
         shaders: the folder its shaders' names are relative to.
-        inherited: those of the types it extends, the nearest first: what is not in `shaders` is looked for there.
-        plugin: the name of the entry point, or of the folder, it came by.
-        warnings: what is missing in a shader file and can be done without.
-        missing: nobody has it; it stands in a graph that is only looked at.
+        inherited: the same of the types it extends, the nearest first, for shaders that are not in `shaders`.
+        plugin: the entry point or folder it comes from.
+        warnings: what is missing in a shader file but not required.
+        missing: a placeholder for an unknown type, in a graph that is only shown.
         text: of a shader file its header and its lines with those of its includes, without comments.
     """
 
@@ -47,7 +46,7 @@ class NodeType(Struct, frozen=True, dict=True):
 
     @cached_property
     def read(self) -> Mapping[str, Input]:
-        """Those of its inputs that are read, and not continued."""
+        """Its inputs, without those that it continues."""
         return {name: port for name, port in self.cls.inputs().items() if isinstance(port, Input)}
 
     @cached_property
@@ -57,19 +56,17 @@ class NodeType(Struct, frozen=True, dict=True):
 
     @cached_property
     def views(self) -> Mapping[str, Views]:
-        """Its tables of views."""
         return {name: port for name, port in self.cls.ports().items() if isinstance(port, Views)}
 
     @property
     def is_shader(self) -> bool:
-        """Whether it is a shader file without Python."""
         return self.file.suffix in SHADERS
 
     def shader_file(self, name: str, include: Path | None = None) -> tuple[Path, Path]:
-        """The file of one of its shaders, and the folder that its includes in quotes must stay in.
+        """Return the file of one of its shaders, and the folder that its includes in quotes must stay in.
 
-        `<name>` lies in `include`, the shipped one by default; any other in the type's own folder, or in that of a type
-        it extends. One that is nowhere belongs in the first.
+        `<name>` is in `include`, the shipped one by default; any other in the type's own folder, or in that of a type
+        it extends. A missing one belongs in the first.
         """
         if name.startswith("<"):
             include = include or shared_includes()
@@ -78,15 +75,7 @@ class NodeType(Struct, frozen=True, dict=True):
         return folder / name, folder
 
     def choice_file(self, kind: str, choice: str) -> Path:
-        """The include of one of the type's own choices: `kind/choice.glsl` among its shaders or the shared includes.
-
-        Args:
-            kind: the name under which plugins add choices to the parameter.
-            choice: the word.
-
-        Raises:
-            InputError: there is no such file.
-        """
+        """Return the include of one of its own choices: `kind/choice.glsl` among its shaders or the shared includes."""
         name = f"{kind}/{choice}.glsl"
         for home in (self.shaders, *self.inherited, shared_includes()):
             if _is_there(home / name):
@@ -96,7 +85,7 @@ class NodeType(Struct, frozen=True, dict=True):
 
     @property
     def word(self) -> str:
-        """What a node of the type may be called in a file; the type's own name is a path where a shader's path is."""
+        """A node id for the type, whose own name may be a path."""
         return node_word(self.name)
 
 
