@@ -230,7 +230,6 @@ def _space(file: SweepFile | None, axes: tuple[Axis, ...], **sampling: Any) -> S
     named = {axis.path for axis in axes}
     merged = (*(axis for axis in base.axes if axis.path not in named), *axes)
     given = {name: value for name, value in sampling.items() if value not in (None, ())}
-
     return dataclasses.replace(base, axes=merged, **given)
 
 
