@@ -51,43 +51,42 @@ class Format(Struct, frozen=True):
         return self.family == "unorm" and self.bytes == self.components and self.name != "rgb10_a2"
 
 
-def _formats() -> dict[str, Format]:
-    rows: list[tuple[str, int, int, int, Family]] = [
-        ("r8", 0x8229, 1, 1, "unorm"),
-        ("rg8", 0x822B, 2, 2, "unorm"),
-        ("rgba8", 0x8058, 4, 4, "unorm"),
-        ("srgb8_a8", 0x8C43, 4, 4, "unorm"),
-        ("r16", 0x822A, 1, 2, "unorm"),
-        ("rg16", 0x822C, 2, 4, "unorm"),
-        ("rgba16", 0x805B, 4, 8, "unorm"),
-        ("rgb10_a2", 0x8059, 4, 4, "unorm"),
-        ("rgba16_snorm", 0x8F9B, 4, 8, "snorm"),
-        ("r16f", 0x822D, 1, 2, "float"),
-        ("rg16f", 0x822F, 2, 4, "float"),
-        ("rgba16f", 0x881A, 4, 8, "float"),
-        ("r11f_g11f_b10f", 0x8C3A, 3, 4, "float"),
-        ("r32f", 0x822E, 1, 4, "float"),
-        ("rg32f", 0x8230, 2, 8, "float"),
-        ("rgba32f", 0x8814, 4, 16, "float"),
-        ("r8ui", 0x8232, 1, 1, "uint"),
-        ("r16ui", 0x8234, 1, 2, "uint"),
-        ("r32ui", 0x8236, 1, 4, "uint"),
-        ("rg32ui", 0x823C, 2, 8, "uint"),
-        ("rgba32ui", 0x8D70, 4, 16, "uint"),
-        ("r32i", 0x8235, 1, 4, "int"),
-    ]
-    table = {n: Format(n, gl, c, b, f, f"{8 * b}-bit", srgb=n.startswith("srgb")) for n, gl, c, b, f in rows}
-    for name, gl, size, family in (
-        ("depth16", 0x81A5, 2, "depth"),
-        ("depth32f", 0x8CAC, 4, "depth"),
-        ("depth24_stencil8", 0x88F0, 4, "depth_stencil"),
-        ("depth32f_stencil8", 0x8CAD, 8, "depth_stencil"),
-    ):
-        table[name] = Format(name, gl, 1, size, family, name)  # type: ignore[arg-type]  # a tuple of literals widens
-    return table
+_FORMAT_ROWS: tuple[tuple[str, int, int, int, Family], ...] = (
+    ("r8", 0x8229, 1, 1, "unorm"),
+    ("rg8", 0x822B, 2, 2, "unorm"),
+    ("rgba8", 0x8058, 4, 4, "unorm"),
+    ("srgb8_a8", 0x8C43, 4, 4, "unorm"),
+    ("r16", 0x822A, 1, 2, "unorm"),
+    ("rg16", 0x822C, 2, 4, "unorm"),
+    ("rgba16", 0x805B, 4, 8, "unorm"),
+    ("rgb10_a2", 0x8059, 4, 4, "unorm"),
+    ("rgba16_snorm", 0x8F9B, 4, 8, "snorm"),
+    ("r16f", 0x822D, 1, 2, "float"),
+    ("rg16f", 0x822F, 2, 4, "float"),
+    ("rgba16f", 0x881A, 4, 8, "float"),
+    ("r11f_g11f_b10f", 0x8C3A, 3, 4, "float"),
+    ("r32f", 0x822E, 1, 4, "float"),
+    ("rg32f", 0x8230, 2, 8, "float"),
+    ("rgba32f", 0x8814, 4, 16, "float"),
+    ("r8ui", 0x8232, 1, 1, "uint"),
+    ("r16ui", 0x8234, 1, 2, "uint"),
+    ("r32ui", 0x8236, 1, 4, "uint"),
+    ("rg32ui", 0x823C, 2, 8, "uint"),
+    ("rgba32ui", 0x8D70, 4, 16, "uint"),
+    ("r32i", 0x8235, 1, 4, "int"),
+    ("depth16", 0x81A5, 1, 2, "depth"),
+    ("depth32f", 0x8CAC, 1, 4, "depth"),
+    ("depth24_stencil8", 0x88F0, 1, 4, "depth_stencil"),
+    ("depth32f_stencil8", 0x8CAD, 1, 8, "depth_stencil"),
+)
 
 
-FORMATS: dict[str, Format] = _formats()
+def _format(name: str, gl: int, components: int, size: int, family: Family) -> Format:
+    view_class = name if family.startswith("depth") else f"{8 * size}-bit"
+    return Format(name, gl, components, size, family, view_class, srgb=name.startswith("srgb"))
+
+
+FORMATS: dict[str, Format] = {row[0]: _format(*row) for row in _FORMAT_ROWS}
 
 
 class Semantic(Struct, frozen=True):
@@ -123,39 +122,19 @@ EnvironmentMap = Semantic(
 Any = Semantic("any", "Whatever is connected.")
 View = Semantic("view", "Matrices and size that geometry is drawn with.")
 
-SEMANTICS: tuple[Semantic, ...] = (
-    Radiance,
-    DisplayColor,
-    Albedo,
-    Emissive,
-    Normal,
-    Material,
-    Depth,
-    LinearDepth,
-    ShadowMap,
-    Visibility,
-    Occlusion,
-    Luminance,
-    ExposureGain,
-    IrradianceSH,
-    EnvironmentMap,
-    Any,
-    View,
-)
+SEMANTICS: tuple[Semantic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Semantic))
 
 
 class Signature(Struct, frozen=True):
     """A function that one node provides and another calls inside its shader.
 
     Attributes:
-        name: the GLSL name the caller uses, for example `shadow`.
         declaration: the GLSL declaration without a semicolon.
         arguments: the argument names in order, to forward them.
         combine: the operator that joins several providers.
         neutral: the GLSL value with no provider.
         doc: what it returns.
-        texture: name of the semantic whose textures provide the same in screen space, read at the fragment's own
-            texel, one layer a light; None where there is no such form.
+        texture: the semantic whose textures provide the same in screen space, one layer a light; None if there is none.
     """
 
     name: str

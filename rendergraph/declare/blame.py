@@ -1,4 +1,4 @@
-"""Where in its author's own files something is declared, and which of their lines an exception came through."""
+"""The places in a plugin author's files of declarations and of exceptions."""
 
 from __future__ import annotations
 
@@ -17,17 +17,10 @@ from rendergraph.errors import Misuse, Place, Problem, is_framework, is_interrup
 
 
 def source_location(error: BaseException, *own: Path | str) -> Place | None:
-    """The innermost line of an author's that an exception, or else what caused it, came through.
+    """Return the innermost line of an author's code that an exception, or else its cause, came through.
 
     A syntax error is in its own line. Helpers beside a node count as the author's; the framework, NumPy and the like
-    do not.
-
-    Args:
-        error: what was raised.
-        own: what is the author's: a file, a folder, or a module's name for all of its package.
-
-    Returns:
-        The place, None where the exception never met the author's code.
+    do not. `own` are the author's files, folders, and modules, which stand for all of their packages.
     """
     folders = [path for path in own if isinstance(path, Path)]
     packages = {module.partition(".")[0] for module in own if isinstance(module, str)}
@@ -54,12 +47,9 @@ def source_location(error: BaseException, *own: Path | str) -> Place | None:
 
 
 def declaration_of(cls: type[Node], file: Path, name: str = "") -> Place:
-    """Where a node declares a port, a parameter or a method: in its own file, or in that of a base; else its class.
+    """Return where a node declares a port, parameter or method, in its file or a base's; else the place of its class.
 
-    Args:
-        cls: the node's class.
-        file: its module, or the shader that it is made of.
-        name: what is declared; empty for the node itself.
+    `file` is its module, or the shader that it is made of; an empty name means the node itself.
     """
     if file.suffix == ".py":
         own = [base for base in cls.__mro__ if issubclass(base, Node) and base is not Node]
@@ -73,11 +63,7 @@ def declaration_of(cls: type[Node], file: Path, name: str = "") -> Place:
 
 
 def declaration_in(file: Path, name: str) -> Place:
-    """Where a file declares a name: a Python class, its attribute or method, or a shader's variable.
-
-    Returns:
-        The declaration, the first line of a shader that mentions the name, or else the file.
-    """
+    """Return where a file declares a Python class, its attribute or method, or a shader's variable; else the file."""
     try:
         text = file.read_text(encoding="utf-8", errors="replace")
         found = _in_module(text, name) if file.suffix == ".py" else _in_shader(text, name)
@@ -104,26 +90,26 @@ def _in_shader(text: str, name: str) -> tuple[int, int] | None:
     return None
 
 
-_MOST_SAID = 500
-"""Characters of an exception's text that a message repeats."""
+_MOST_CHARACTERS = 500
+"""Limit of an exception's text in a message."""
 _OF_A_STRUCT = ("Unexpected keyword argument", "Missing required argument", "Extra positional arguments")
-"""How the exceptions of msgspec's constructors begin, which do not say whose they are."""
+"""The first words of exceptions of msgspec's constructors, which do not name the class."""
 
 
 def describe_error(error: BaseException) -> str:
-    """`KeyError: 'x'` in one line; a text that is endless is cut, and one that cannot be had is left out."""
+    """Return `KeyError: 'x'` in one line; a long text is cut, and one that raises is left out."""
     try:
-        said = " ".join(str(error)[: 4 * _MOST_SAID].split())
-    except BaseException as another:  # a stranger's `__str__`
+        text = " ".join(str(error)[: 4 * _MOST_CHARACTERS].split())
+    except BaseException as another:  # the `__str__` of third-party code
         if is_interruption(another):
             raise
-        said = ""
-    said = said if len(said) <= _MOST_SAID else said[:_MOST_SAID] + "…"
-    return f"{type(error).__name__}: {_called(error) if said.startswith(_OF_A_STRUCT) else ''}{said}"
+        text = ""
+    text = text if len(text) <= _MOST_CHARACTERS else text[:_MOST_CHARACTERS] + "…"
+    return f"{type(error).__name__}: {_callee(error) if text.startswith(_OF_A_STRUCT) else ''}{text}"
 
 
-def _called(error: BaseException) -> str:
-    """`Input(): ` where a call ended with what does not name what was called itself."""
+def _callee(error: BaseException) -> str:
+    """`Input(): `, from the source line of the call that raised."""
     import traceback  # only where there is a mistake
 
     frames = traceback.extract_tb(error.__traceback__)
@@ -133,37 +119,32 @@ def _called(error: BaseException) -> str:
 
 
 def author_problem(error: BaseException, cls: type, file: Path | None = None, subject: str = "") -> Problem:
-    """`KeyError: 'x'` with the author's line, without the exception's name where the framework refused a call.
+    """Return what a node's own code raised, with the author's line; the caller relocates it and sets the code.
 
-    The caller relocates it to a place of the pipeline, with a code of its own.
-
-    Args:
-        error: what a node's own code raised.
-        cls: the node's class.
-        file: the place where the exception never met the author's code.
-        subject: see `Problem`.
+    `file` is the place if the exception never came through the author's code. Of a call that the framework refused,
+    the exception's name is left out.
     """
     place = source_location(error, cls.__module__)
     if place is None and file is not None and file.name:
         place = Place(shown_file(file))
-    text = str(error) if isinstance(error, Misuse) else f"{describe_error(error)}{_meant(error)}"
+    text = str(error) if isinstance(error, Misuse) else f"{describe_error(error)}{_attribute_hint(error)}"
     return Problem("RG420", text, subject=subject, cause=place)
 
 
-def _meant(error: BaseException) -> str:
-    """What a misspelt attribute of a node, or of what the framework hands to one, may have been."""
+def _attribute_hint(error: BaseException) -> str:
+    """A suggestion for a misspelt attribute of a node, or of a framework object that a node is given."""
     if not isinstance(error, AttributeError) or not error.name:
         return ""
-    asked = type(error.obj)
-    if issubclass(asked, Node):  # what it declares, and nothing of its base classes
-        return suggestion(error.name, [*asked.ports(), *asked.parameters()], most=99)
-    known = [name for name in dir(asked) if not name.startswith("_")] if is_framework(asked.__module__) else []
-    near = nearest(error.name, known)
+    cls = type(error.obj)
+    if issubclass(cls, Node):  # its declarations only, without methods of the base class
+        return suggestion(error.name, [*cls.ports(), *cls.parameters()], most=99)
+    names = [name for name in dir(cls) if not name.startswith("_")] if is_framework(cls.__module__) else []
+    near = nearest(error.name, names)
     return f"; did you mean '{near}'?" if near is not None else ""
 
 
 def cause_chain(error: BaseException) -> Iterator[BaseException]:
-    """An error, what it came from, and so on."""
+    """Yield an error, its cause, the cause of that, and so on."""
     found: BaseException | None = error
     while found is not None:
         yield found

@@ -55,18 +55,15 @@ _ROLES = "param(…), define(…) or structural(…)"
 
 
 _SOUND: WeakSet[type[Node]] = WeakSet()
-"""Classes that nothing is wrong with: every pipeline that is read asks, and an edited class is another one."""
+"""Classes without mistakes: every pipeline that is read asks, and an edited class is another one."""
 
 
 def declaration_mistakes(cls: type[Node], *, lenient: bool = False) -> list[Problem]:
-    """What is wrong with a node's declaration; each mistake's subject is a port, a parameter, or empty for the class.
+    """Return what is wrong with a node's declaration; the subjects are ports and parameters, empty for the class.
 
-    Checked: names are GLSL identifiers and distinct, also as macros; docs exist; types and defaults are what a shader
-    can be given and lie inside their range; formats, kinds and words exist; rules name ports of this node.
-
-    Args:
-        cls: the node's class.
-        lenient: accept names with capitals, and ports and parameters without docs, as other tools' shaders have them.
+    Names must be GLSL identifiers and distinct, also as macros; docs exist; types and defaults suit a shader and lie
+    inside their range; formats, kinds and words exist; rules name ports of this node. `lenient` accepts names with
+    capitals and missing docs, as other tools' shaders have them.
     """
     if cls in _SOUND:
         return []
@@ -139,7 +136,6 @@ def _ports(cls: type[Node]) -> Iterator[Problem]:
 
 
 def _alone(name: str, port: Port) -> Iterator[str]:
-    """Rules between the fields of one port."""
     if isinstance(port, Input):
         wanted, example = (Signature, "ShadowLookup") if port.kind == "function" else (Semantic, "Radiance")
         if not isinstance(port.semantic, wanted):
@@ -160,7 +156,7 @@ def _alone(name: str, port: Port) -> Iterator[str]:
 
 
 def _named(name: str, port: Port, ports: Mapping[str, Port]) -> Iterator[str]:
-    """Rules that name other ports of the node."""
+    """Mistakes in the names of other ports."""
     inputs, viewed = (Input, InOut), (Input, InOut, Views)
     made = isinstance(port, WrittenPort)
     size = (port.size[0] if isinstance(port.size, tuple) else port.size) if isinstance(port, WrittenPort) else None
@@ -238,7 +234,7 @@ def _limits(parameter: Parameter) -> Iterator[Problem]:
 
 
 def _defaults(cls: type[Node]) -> Iterator[Problem]:
-    """Defaults go the way of values in a file."""
+    """Check defaults like values in a file."""
     sound = True
     for name, parameter in cls.parameters().items():
         wrong = ""

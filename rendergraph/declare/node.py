@@ -28,11 +28,7 @@ class Node:
     """
 
     def __init__(self, **values: Any) -> None:
-        """Args are values of parameters; the others have their defaults.
-
-        Raises:
-            Misuse: there is no such parameter, or it cannot have such a value; with all that are wrong.
-        """
+        """Take values of parameters; the others have their defaults."""
         parameters = self.parameters()
         wrong = []
         for name in values:
@@ -90,13 +86,10 @@ class Node:
         """Compute what changes each frame on the CPU: views, buffers. Called once a frame, before any step runs."""
 
     def camera_jitter(self, frame: int) -> tuple[float, float]:
-        """How far the camera's picture is moved in a frame, in texels, each way from -1 to 1.
+        """Return the camera's subpixel jitter in texels, each way from -1 to 1, for techniques that accumulate frames.
 
-        What puts pictures of many frames together asks for each to be taken at other places within its pixels. Every
-        pass that is drawn with the camera sees it so; of several nodes the first that runs is asked.
-
-        Args:
-            frame: how many have been drawn since history began, from 0.
+        It applies to every pass drawn with the camera; the first node that runs decides. `frame` counts from 0 since
+        history began.
         """
         return 0.0, 0.0
 
@@ -143,7 +136,7 @@ class Node:
     @cache
     def parameters(cls) -> Mapping[str, Parameter]:
         """Parameters by name, in the order of declaration."""
-        hints = hints_of(cls)  # worked out now, when a type that was named before it was made is there
+        hints = hints_of(cls)  # resolved now, as annotations may name types that are defined later
         found: dict[str, Parameter] = {}
         for base in [base for base in reversed(cls.__mro__) if issubclass(base, Node)]:
             for name in {**get_annotations(base), **vars(base)}:

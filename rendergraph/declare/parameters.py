@@ -1,4 +1,4 @@
-"""Parameters: annotated fields of a node with unit, default, range and one line of doc."""
+"""Parameters: annotated fields of a node."""
 
 from __future__ import annotations
 
@@ -15,21 +15,14 @@ _is_number = test_of(float)
 
 
 class Parameter(Struct, frozen=True, dict=True):
-    """What a node declares of one parameter; `Node.parameters()` has them by name.
+    """The declaration of one parameter; see `param`, `define` and `structural`.
 
     Attributes:
-        role: how it reaches the program: as a uniform (`param`), as text (`define`) or as part of the plan
-            (`structural`). A bare value on the class is `plain`, which is a mistake.
-        default: value where the file gives none.
-        doc: one line.
-        unit: the unit's symbol, empty for a pure number.
+        role: a uniform (`param`), program text (`define`) or part of the plan (`structural`). A bare value on the class
+            is `plain`, which is a mistake.
         limits: of each number in it, inclusive.
-        glsl: the uniform's type where it is not what `type` says.
-        open_name: the name under which plugins add choices, empty where they cannot.
-        needs: what the include of such a choice may say that it needs.
-        unless: the input that takes its place where that is connected, empty for none.
-        name: the field's name.
-        type: the field's annotation.
+        open_name: the name under which plugins add choices, empty if they cannot.
+        name, type: the field's name and annotation.
     """
 
     role: Role
@@ -46,32 +39,28 @@ class Parameter(Struct, frozen=True, dict=True):
 
     @cached_property
     def choices(self) -> tuple[Any, ...]:
-        """The values that its type lists, also beside other types."""
+        """The values that its type lists, also as part of a union."""
         return tuple(_listed(self.type))
 
     @cached_property
     def words(self) -> tuple[str, ...]:
-        """Those of its choices that are words."""
+        """The choices that are words."""
         return tuple(choice for choice in self.choices if isinstance(choice, str))
 
     def closed(self, added: tuple[str, ...] = ()) -> Any:
-        """Its type; where plugins add choices a `Literal` of its own and of those added."""
+        """Its type; a `Literal` of its own choices and the added ones if plugins add choices."""
         return Literal[(*self.words, *added)] if self.open_name else self.type
 
     def takes(self, added: tuple[str, ...] = ()) -> str:
-        """What a file may give for it: `a whole number from 1 to 64`, `one of soft, hard`.
-
-        Args:
-            added: the choices that plugins add.
-        """
+        """What a file may give, in words; `added` are the choices of plugins."""
         return words_for(self.closed(added), self.limits, file=True)
 
     def convert(self, value: object) -> Any:
-        """A value as its type has it: a list of a file as a tuple, a whole number as a float.
+        """Return a file's value as its type has it: a list as a tuple, a whole number as a float.
 
         Raises:
-            TypeError: it is not what the type says: `expected a whole number`.
-            ValueError: a number in it is not finite or outside the limits: `must be at least 1`.
+            TypeError: it does not fit the type: `expected a whole number`.
+            ValueError: a number is outside the limits: `must be at least 1`.
         """
         convert, fits = self._taken
         found = convert(value)
@@ -82,7 +71,7 @@ class Parameter(Struct, frozen=True, dict=True):
         return found
 
     def violation(self, value: object) -> str | None:
-        """What a value that is not finite or outside the limits must be; None where it is fine."""
+        """What a value outside the limits must be; None for others."""
         parts: tuple[Any, ...] = value if isinstance(value, tuple) else (value,)
         for number in parts:
             if _is_number(number) and (wrong := self.limits.violation(number)):
@@ -91,7 +80,6 @@ class Parameter(Struct, frozen=True, dict=True):
 
     @cached_property
     def _taken(self) -> tuple[Callable[[Any], Any], Callable[[Any], bool]]:
-        """What makes a value of a file one of its type, and what tells whether that fits."""
         return conversion_to(self.type), test_of(self.type)
 
 
@@ -120,8 +108,8 @@ def param(
         doc: one line.
         unit: the unit's symbol, empty for a pure number.
         min, max: smallest and largest legal value, inclusive.
-        glsl: the uniform's type where it is not what the annotation says (`vec3` for a number or a colour).
-        unless: an optional input that takes its place where it is connected; who sets it then is told.
+        glsl: the uniform's type, if the annotation does not give it (`vec3` for a number or a colour).
+        unless: an optional input that replaces it when connected; setting it then is a warning.
     """
     return Parameter("param", default, doc, unit, Range(min, max), glsl, unless=unless)
 
@@ -139,18 +127,15 @@ def define(
     """A parameter that becomes program text: `#define NAME value`, and `#define NAME_CHOICE` for a choice.
 
     Numbers and switches become `#define SAMPLES 16`; a choice `smith: fast` becomes `#define SMITH SMITH_FAST`, where
-    every choice has a number, so that shaders say `#if SMITH == SMITH_FAST`.
+    every choice has a number, so that shaders can test `#if SMITH == SMITH_FAST`.
 
     Args:
-        default: value where the file gives none.
-        doc: one line.
-        unit: the unit's symbol, empty for a pure number.
-        min, max: smallest and largest legal value, inclusive.
+        default, doc, unit, min, max: see `param`.
         choices: the name under which plugins add choices, for a type such as `Literal["neutral", "aces"] | str`. Each
             choice is then an include, the node's own `curve/aces.glsl` among its shaders or the shared includes; the
-            shader takes it in by `#include <CURVE>`, and there are no numbers.
-        needs: what such an include may say that it needs (`#pragma needs(…)`), which others do without: `NEEDS_…` in
-            the shader, `steps.needs(…)` in `record`.
+            shader includes it by `#include <CURVE>`, and there are no numbers.
+        needs: what such an include may ask for (`#pragma needs(…)`) that other choices do not need: `NEEDS_…` in the
+            shader, `steps.needs(…)` in `record`.
     """
     return Parameter("define", default, doc, unit, Range(min, max), open_name=choices, needs=needs)
 
