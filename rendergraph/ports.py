@@ -1,7 +1,7 @@
 """Ports: named connection points and textures of a node.
 
-Sizes, formats, counts, samplers and first contents may be constants or functions `(node, facts)`; the two are all that
-such a function may ask, and a link asks it once.
+Sizes, formats, counts, samplers and first contents may be constants or functions `(node, facts)`, which linking calls
+once.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ SizeRule: TypeAlias = Annotated[
 
 
 class Port(Struct, frozen=True, eq=False, dict=True):
-    """One named connection point or texture of a node; its name is the class attribute's, which no copy of it has."""
+    """One named connection point or texture of a node, with the name of the class attribute."""
 
     name: ClassVar[str] = ""
     owner: ClassVar[str] = ""
@@ -75,10 +75,7 @@ class Port(Struct, frozen=True, eq=False, dict=True):
 
 
 class Part(Struct, frozen=True):
-    """A port's texture, or one mip or layer of it; `previous` is last frame's value of a history texture.
-
-    Of an input that takes a list, `link` is the number of one of them.
-    """
+    """A port's texture, or one mip or layer of it; `previous` is last frame's value, `link` the position in a list."""
 
     port: Port
     mip: Count | None = None
@@ -108,16 +105,14 @@ class Input(Port, frozen=True, eq=False):
     """Something read.
 
     Attributes:
-        semantic: what it must mean; `Any` takes everything.
-        kind: kind of port; `function` takes a `Signature` as its semantic.
+        semantic: what it must mean; `Any` takes everything, and a `function` needs a `Signature`.
         size: `same` as the pass's target, or `any`.
         filter, wrap, compare, anisotropy: the sampler.
-        samples: `single`, `multi` (a multisampled texture) or `any`; what is attached for the depth test has any.
+        samples: `single`, `multi` (a multisampled texture) or `any`; a depth-test attachment takes any.
         optional: it may stay unconnected; the shader is then compiled without `HAS_<NAME>`.
         many: it takes a list.
         use: `sample` it, attach it read-only for the `depth_test`, or load it as an `image`.
         group: the name of the group it belongs to.
-        doc: one line.
     """
 
     semantic: Meaning | Called
@@ -135,43 +130,39 @@ class Input(Port, frozen=True, eq=False):
     doc: str = ""
 
     def link(self, number: int) -> Part:
-        """One texture of an input that takes a list, counted from 0; a shader has it under a name without a number."""
+        """One texture of an input that takes a list, counted from 0; its name in the shader has no number."""
         return Part(self, link=number)
 
     @cached_property
     def sampler(self) -> Sampler | None:
-        """How it is sampled; None where a rule says its filter."""
+        """How it is sampled; None if its filter is a rule."""
         return None if callable(self.filter) else Sampler(self.filter, self.wrap, self.compare, self.anisotropy)
 
     @cached_property
     def takes_scene(self) -> bool:
-        """Whether it reads the scene's environment where nothing is linked to it."""
+        """Whether it reads the scene's environment when unconnected."""
         return self.semantic == EnvironmentMap
 
 
 class WrittenPort(Port, frozen=True, eq=False):
-    """A texture or buffer that the node makes: the shared part of `Output`, `InOut`, `Internal` and `History`.
+    """A texture or buffer that the node writes: the shared part of `Output`, `InOut`, `Internal` and `History`.
 
     Attributes:
-        semantic: what it means; None with `like`.
-        like: name of an input whose format, size, layers, semantic, view and lights it takes over, each where nothing
-            else is said.
-        kind: kind of texture, or `buffer`.
+        like: an input whose semantic, format, size, layers, view and lights it takes over, each by default.
         format: a name in `textures.FORMATS`; `rgba16f` by default.
         size: see `SizeRule`; the viewport by default.
         mips: levels; 0 means the full chain.
-        layers: array layers; a cube always has 6. By default an array has one a light, where its `lights` are a rule or
-            it is drawn with a table of views that says its own, and everything else 1.
+        layers: array layers; a cube always has 6. By default an array has one for each light, if its `lights` are a
+            rule or those of the table of views it is drawn with, else 1.
         samples: samples per texel; by default those of `like`, else of an input of the same size that is attached for
             the `depth_test`, else 1.
         bytes: size of a `buffer`.
-        clear: what it first holds; None discards, which is right where every texel is written.
-        first: value of every channel in the first frame, where somebody reads `@previous`; 0 by default, and for a
-            texture that is continued the value of whoever made it.
-        view: name of a `Views` port, a `view` input or a texture input: the view it is drawn with. By default
-            textures that a geometry step draws carry the view the step was drawn with.
-        lights: name of an input whose layer-to-light table it carries, or the table itself.
-        doc: one line.
+        clear: initial contents; None discards, for passes that write every texel.
+        first: value of every channel in the first frame for readers of `@previous`; 0 by default, and for a continued
+            texture the value of its first writer.
+        view: a `Views` port, a `view` input or a texture input: the view it is drawn with. By default textures that a
+            geometry step draws carry the step's view.
+        lights: an input whose layer-to-light table it carries, or the table itself.
     """
 
     semantic: Meaning | None = None
@@ -191,12 +182,12 @@ class WrittenPort(Port, frozen=True, eq=False):
 
 
 class Output(WrittenPort, frozen=True, eq=False):
-    """Something made for others.
+    """A result for other nodes.
 
     Attributes:
         needs: inputs that must be connected for this output to be used.
-        kept: it outlives the frame: the steps that make it run when they are new or a value they take has changed, and
-            then not again. They depend on nothing that moves, and on no texture or buffer that is not kept.
+        kept: it outlives the frame: its steps run when they are new or a value they use has changed, and then not
+            again. They must not depend on anything that moves, nor on textures or buffers that are not kept.
     """
 
     needs: tuple[str, ...] = ()
@@ -204,21 +195,16 @@ class Output(WrittenPort, frozen=True, eq=False):
 
 
 class InOut(WrittenPort, frozen=True, eq=False):
-    """A texture somebody else made, continued: each write is a new version, and readers of the old one run before.
+    """A texture of another node, continued: each write is a new version, and readers of the old one run before.
 
-    Attributes:
-        optional: not connected, the node makes the texture itself from the `WrittenPort` fields.
+    If it is `optional` and not connected, the node creates the texture from the `WrittenPort` fields.
     """
 
     optional: bool = False
 
 
 class Internal(WrittenPort, frozen=True, eq=False):
-    """A scratch texture or buffer of the node's own, aliased like any other.
-
-    Attributes:
-        kept: it outlives the frame, as an `Output` that is kept does: a table, noise.
-    """
+    """A scratch texture or buffer of the node's own, aliased like any other; `kept` like an `Output` (a table, noise)."""
 
     kept: bool = False
 
@@ -233,15 +219,14 @@ class History(WrittenPort, frozen=True, eq=False):
 
 
 class Views(Port, frozen=True, eq=False):
-    """A table of views that the node computes in `update`, one a layer of what it draws.
+    """A table of views that the node computes in `update`, one for each layer that it draws.
 
     Attributes:
-        count: number of views; by default that of its lights, 1 where it has none declared.
-        size: see `SizeRule`; the size of what is drawn with it and of what is made of that, texel by texel, where those
-            say nothing else or a factor. The viewport by default.
-        lights: the scene's light index of each view, empty where views are not lights'.
+        count: number of views; by default that of its lights, 1 without any.
+        size: see `SizeRule`; the default size, also for factors, of what is drawn with it and of what is computed from
+            that texel by texel. The viewport by default.
+        lights: the scene's light index of each view, empty if views belong to no lights.
         public: whether others may connect it (it is then an output of kind `view`).
-        doc: one line.
     """
 
     count: Ruled[Count] | None = None
@@ -255,12 +240,10 @@ class Function(Port, frozen=True, eq=False):
     """A GLSL function that another node calls inside its own shader.
 
     Attributes:
-        signature: the function it provides.
         shader: the file with the function's text, beside the node's shaders.
-        reads: the inputs, internals and outputs its text samples: names, or `port.sampled(…)`, as what is no input is
-            read unfiltered and from its first mip else. An input that is not connected and an internal that the node
-            has not written are left out, and the text goes without `HAS_<NAME>`.
-        doc: one line.
+        reads: the ports its text samples: names, or `port.sampled(…)` for internals and outputs, which are otherwise
+            read unfiltered and from their first mip. An unconnected input and an internal that is not written are left
+            out; `HAS_<NAME>` is then not defined.
     """
 
     signature: Called

@@ -363,8 +363,7 @@ def visible_part(view: ViewMatrices, box: npt.ArrayLike) -> Points:
 
 def _frustum_edges_inside(planes: Points, box: Points) -> list[Points]:
     """Where the frustum's edges lie inside the box: their ends, cut to it."""
-    axes = np.eye(3)
-    sides = np.concatenate([np.column_stack([axes, -box[0]]), np.column_stack([-axes, box[1]])])
+    sides = box_planes(box)
     middle, span = (box[0] + box[1]) / 2, float(np.linalg.norm(box[1] - box[0])) + 1e-9
     first, second = np.triu_indices(len(planes), 1)
     along = np.cross(planes[first, :3], planes[second, :3])

@@ -31,12 +31,7 @@ MOST = 1e12
 
 
 class Range(Struct, frozen=True):
-    """Limits of a finite number.
-
-    Attributes:
-        above: `low` itself lies outside.
-        infinite: infinity lies inside.
-    """
+    """Limits of a finite number; `above` excludes `low` itself, `infinite` includes infinity."""
 
     low: float | None = None
     high: float | None = None
@@ -57,7 +52,6 @@ class Range(Struct, frozen=True):
 
     @property
     def empty(self) -> bool:
-        """Whether no number lies inside."""
         return self.low is not None and self.high is not None and self.low > self.high
 
     def violation(self, value: float) -> str | None:
@@ -229,12 +223,9 @@ _JSON = {bool: "boolean", int: "integer", float: "number", str: "string", types.
 
 
 def words_for(annotation: Any, limits: Range = Range(), *, file: bool = False) -> str:
-    """Return what an annotation accepts, in words: `a whole number from 1 to 64`.
+    """Return what an annotation accepts, with limits of each number: `a whole number from 1 to 64`.
 
-    Args:
-        annotation: a type as it is written.
-        limits: of each number in it.
-        file: what a YAML file may give, instead of a Python value.
+    `file` asks for what a YAML file may give, instead of a Python value.
     """
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
@@ -343,14 +334,7 @@ def quoted(value: object) -> str:
 
 
 def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") -> Iterator[Problem]:
-    """Yield what is wrong with a value, or with each entry of a mapping.
-
-    Args:
-        what: how messages name it.
-        value: any.
-        annotation: what it should be.
-        subject: see `Problem`.
-    """
+    """Yield what is wrong with a value, or with each entry of a mapping; messages name it `what`."""
     if fits(value, annotation):
         return
     parts = list(parts_of(annotation))
@@ -378,13 +362,7 @@ def mistakes_in(what: str, value: object, annotation: Any, subject: str = "") ->
 
 
 def mistakes_of(thing: Struct, who: str, subject: str = "") -> Iterator[Problem]:
-    """Yield what is wrong with the fields of a struct.
-
-    Args:
-        thing: an instance.
-        who: how messages name it, if at all.
-        subject: see `Problem`; the field by default.
-    """
+    """Yield what is wrong with the fields of a struct; messages name it `who`, the default subject is the field."""
     for name, default, hint, _ in _fields(type(thing)):
         value = getattr(thing, name)
         if value is not default:
@@ -410,11 +388,7 @@ def _annotations_of(kind: type) -> dict[str, Any]:
 
 
 def validated(thing: T, who: str = "") -> T:
-    """Return a struct, all of whose fields are what their annotations say.
-
-    Raises:
-        Misuse: one of them is not.
-    """
+    """Return a struct whose fields all fit their annotations; `Misuse` if one does not."""
     for name, default, _, test in _fields(type(thing)):
         value = getattr(thing, name)
         if value is not default and not test(value):

@@ -223,14 +223,11 @@ def _parameters(cls: type[Node]) -> Iterator[Problem]:
 
 def _limits(parameter: Parameter) -> Iterator[Problem]:
     name, limits = parameter.name, parameter.limits
-    wrong = [
-        mistake
-        for word, limit in (("min", limits.low), ("max", limits.high))
-        for mistake in mistakes_in(f"parameter '{name}': {word}", limit, float | None, name)
-    ]
-    yield from wrong
+    wrong = [*mistakes_in(f"parameter '{name}': min", limits.low, float | None, name)]
+    wrong += mistakes_in(f"parameter '{name}': max", limits.high, float | None, name)
     if not wrong and limits.empty:
-        yield _problem(name, f"parameter '{name}' goes{limits}, which is nothing")
+        wrong = [_problem(name, f"parameter '{name}' has an empty range: min {limits.low} > max {limits.high}")]
+    yield from wrong
 
 
 def _defaults(cls: type[Node]) -> Iterator[Problem]:
@@ -239,24 +236,19 @@ def _defaults(cls: type[Node]) -> Iterator[Problem]:
     for name, parameter in cls.parameters().items():
         wrong = ""
         try:
-            written = json.dumps(parameter.default)
-        except (TypeError, ValueError):
-            wrong = "no value that a file can hold"
-        else:
-            try:
-                parameter.convert(json.loads(written))
-            except (TypeError, ValueError) as error:
-                wrong = f"wrong: {error}"
+            parameter.convert(json.loads(json.dumps(parameter.default)))
+        except (TypeError, ValueError) as error:
+            wrong = str(error)
         if wrong and parameter.role != "plain":
-            yield _problem(name, f"the default of '{name}', {quoted(parameter.default)}, is {wrong}")
+            yield _problem(name, f"the default of '{name}', {quoted(parameter.default)}, is wrong: {wrong}")
         sound = sound and not wrong
     try:
         if sound:
             cls()
-    except BaseException as error:  # what the author's own check raises
+    except BaseException as error:  # the author's own check
         if is_interruption(error):
             raise
-        yield _problem("", f"it cannot be made with its defaults: {describe_error(error)}")
+        yield _problem("", f"it cannot be instantiated with its defaults: {describe_error(error)}")
 
 
 def _not_for_a_shader(parameter: Parameter) -> str | None:

@@ -63,7 +63,7 @@ def test_a_rule_that_fails(author: Any, body: str) -> None:
 
 
 CHECKS = {
-    "raise KeyError(self.gain)  # here": "wrong.py:13:1: RG490 node type 'wrong': it cannot be made with its defaults: KeyError: 1.0",
+    "raise KeyError(self.gain)  # here": "wrong.py:13:1: RG490 node type 'wrong': it cannot be instantiated with its defaults: KeyError: 1.0",
     "self.gain == 1.0 or 1 / 0  # here": "test.yaml:4:3: RG209 node 'a' (wrong): its own checks fail: wrong.py:{line}: ZeroDivisionError: division by zero",
     "if self.gain > 1:\n        raise ValueError('gain must be at most 1')": "test.yaml:4:46: RG104 node 'a' (wrong): gain must be at most 1",
     "if self.gain > self.bias:\n        raise ValueError('gain must be at most bias')": "test.yaml:4:3: RG104 node 'a' (wrong): gain must be at most bias",
