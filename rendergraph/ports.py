@@ -204,7 +204,7 @@ class InOut(WrittenPort, frozen=True, eq=False):
 
 
 class Internal(WrittenPort, frozen=True, eq=False):
-    """A scratch texture or buffer of the node's own, aliased like any other; `kept` like an `Output` (a table, noise)."""
+    """A scratch texture or buffer of the node, aliased like any other; `kept` as for `Output` (a table, noise)."""
 
     kept: bool = False
 

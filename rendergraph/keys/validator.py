@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from msgspec import Struct
@@ -47,7 +47,9 @@ class Validator:
         self.dropped: set[tuple[str, ...]] = set()
         self._has_broken = bool(self.problems)
         self._path: list[str] = []
-        self._checks: dict[int, Any] = {}  # by identity, because hashing an annotation takes long
+        self._checks: dict[
+            int, tuple[Callable[[Any], bool], Callable[[Any], Any]]
+        ] = {}  # by identity, because hashing an annotation takes long
 
     def report(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
         """Note a mistake at a value, or at its key.
@@ -72,22 +74,25 @@ class Validator:
         return self._value(value, key, key.type, key.name)
 
     def _value(self, value: Value, key: Key, type: Type, name: str) -> Value | None:
-        size = len(value.data) if isinstance(value.data, dict) else -1
+        data = value.data
         if isinstance(type, Recursive):
-            type = type.table() if size >= 0 else type.type
-        if isinstance(type, Table) and size >= 0:
-            return self._table(value, type, name)
-        if isinstance(type, MapOf) and size >= type.least:
-            return self._map(value, key, type)
-        expected, hint = "a mapping", ""
-        if not isinstance(type, Table | MapOf):
+            type = type.table() if isinstance(data, dict) else type.type
+        if isinstance(type, Table):
+            if isinstance(data, dict):
+                return self._table(value, type, name)
+            expected, hint = "a mapping", ""
+        elif isinstance(type, MapOf):
+            if isinstance(data, dict) and len(data) >= type.least:
+                return self._map(value, key, type)
+            expected, hint = "a mapping", ""
+        else:
             if self._has_broken and _is_broken(value):
                 return None
-            found = value.plain()
-            if self._accepts(type, found):
+            plain = value.plain() if isinstance(data, list | dict) else data
+            if type is Any or self._accepts(type, plain):
                 return value
-            expected, hint = words_for(type, file=True), hint_for(found, type)
-        if value.data is not BROKEN:
+            expected, hint = words_for(type, file=True), hint_for(plain, type)
+        if data is not BROKEN:
             example = f", as in {key.example}" if key.example else ""
             text = f"'{shown(name)}': expected {expected}{example}, got {said(value)}{hint}"
             self.report(value, key.code or self.codes.wrong, text)
@@ -96,9 +101,9 @@ class Validator:
     def _accepts(self, type: Any, value: Any) -> bool:
         check = self._checks.get(id(type))
         if check is None:
-            self._checks[id(type)] = check = conversion_to(type), test_of(type)
-        convert, test = check
-        return bool(test(convert(value)))
+            self._checks[id(type)] = check = test_of(type), conversion_to(type)
+        test, convert = check
+        return test(value) or test(convert(value))  # most values fit as they are
 
     def _enter(self, valid: dict[str, Value], name: str, child: Value, key: Key, type: Type) -> None:
         """Add the valid part of a child to a mapping, or note that it was left out."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from rendergraph.typecheck import MOST, Brief, Converted, JsonSchema, Length, Matching, Range, words_for
 
-TEXT: Any = Annotated[str, Matching(r"\s*\S")]
+TEXT: Any = Annotated[str, Matching(re.compile(r"\s*\S"))]
 FILE: Any = Annotated[TEXT, "a file's name", Brief("path")]
 NUMBER: Any = Annotated[float, Range()]
 
