@@ -321,8 +321,9 @@ class Server:
         if other is not None and (response := await self._ask(messages.CompareRequest(other))) is not None:
             problems = {"problems": list(response.problems)}
             self._broadcast("against", dict(response.facts) | problems, response.files)
-        elif other is None and self._last.pop("against", None) is not None:
+        elif other is None and "against" in self._last:
             self._broadcast("against", {}, {})
+            del self._last["against"]
         if self._wake.is_set():
             return
         request = replace(request, port="", exposure=0.0, known_revision=0)

@@ -124,7 +124,9 @@ def test_a_mistake_is_said_and_the_picture_stays(served: Any) -> None:
     with served.tab() as tab:
         tab.hear("picture", still=True)
         tab.say(do="set", path="light.lookup", value="nobody.lookup")
-        problem = tab.hear("problems")[0]["problems"][0]
+        while not (problems := tab.hear("problems")[0]["problems"]):
+            pass  # none, from before
+        (problem,) = problems
         assert problem["code"] == "RG109"
         assert problem["node"] == "light"
         tab.say(do="undo")
@@ -319,7 +321,8 @@ def test_connections_that_send_nothing_are_closed(limited: Any) -> None:
         silent[0].sendall(b"GET / HTTP/1.1\r\nHost:")
         time.sleep(1.5)
         silent[0].settimeout(5.0)
-        assert silent[0].recv(10) == b""
+        with contextlib.suppress(ConnectionResetError):
+            assert silent[0].recv(10) == b""
     alive(limited)
 
 
