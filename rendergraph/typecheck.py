@@ -300,6 +300,8 @@ def json_schema(annotation: Any) -> Schema:
         return found
     if origin in (Union, types.UnionType):
         return {"anyOf": [json_schema(part) for part in arguments]}
+    if origin is Literal and len(arguments) == 1:
+        return {"const": arguments[0]}
     if origin is Literal:
         kinds = {type(choice) for choice in arguments}
         return {"enum": list(arguments), **({"type": _JSON[kinds.pop()]} if len(kinds) == 1 else {})}

@@ -267,7 +267,7 @@ def test_nothing_shipped_is_underlined(editor: Editor, desk: Path, file: Path) -
     [
         ("taps: 5", "tips: 5", "'shadow_pcf' has no such param."),
         ("taps: 5", "taps: 99", "Value is above the maximum of 16."),
-        ("taps: 5", "taps: many", "This is a whole number, or $name for a parameter of the pipeline."),
+        ("taps: 5", "taps: many", "expected a whole number, or $name for a parameter of the pipeline"),
         ("ambient: 0.1", "ambient: -1", "Value is below the minimum of 0."),
         ("ambient: 0.1", "shading: phon", 'Value is not accepted. Valid values: "unlit", "phong",'),
         ("lookup: [", "lokup: [", "'forward_lighting' has no such input."),
@@ -382,10 +382,10 @@ def test_scenes_are_completed_and_checked(editor: Editor, desk: Path) -> None:
 @pytest.mark.parametrize(
     ("at", "shown"),
     [
-        ("|taps", "Tests along a side: 4 means 4×4, 1 is the plain hard shadow.\n\nDefault 3, 1 to 16. "),
+        ("|taps", "Tests along a side: 4 means 4×4, 1 is the plain hard shadow.\n\nDefault 3, from 1 to 16. "),
         (
             "|ambient",
-            "Radiance from all sides, a number or RGB; an environment takes its place.\n\nDefault 0.03, at least 0. ",
+            "Radiance from all sides, a number or RGB; an environment takes its place.\n\nDefault 0.03, from 0 up. ",
         ),
         ("|shadow_pcf", "Shadows from a map by percentage-closer filtering.\n\nThe mean of N×N depth tests"),
         ("{|shadow_map: sun", "Depth as the lights see it. (shadow\\_map, texture2d\\_array)"),
@@ -409,7 +409,7 @@ def test_nodes_of_a_plugin_are_known_like_the_others(editor: Editor, desk: Path)
     ((line, message),) = editor.marks(desk, text.replace("density: 0.1", "density: 11"))
     assert (line, message) == (line_of("  display:"), "Value is above the maximum of 10.")
     assert editor.hover(desk, text.replace("density", "|density")).startswith(
-        "Part of the light lost in a metre.\n\nDefault 0.05 1/m, 0 to 10. "
+        "Part of the light lost in a metre.\n\nDefault 0.05 1/m, from 0 to 10. "
     )
     assert editor.offers(desk, text.replace("light.radiance}, params", "light.radiance, de|}, params")).keys() == {
         "depth"
@@ -422,6 +422,6 @@ def test_a_shader_file_is_known_by_its_header_and_by_its_path(editor: Editor, de
     assert editor.marks(desk, text) == []
     ((line, message),) = editor.marks(desk, text.replace("share: 0.1", "share: 2"))
     assert (line, message) == (line_of("  display:"), "Value is above the maximum of 1.")
-    assert editor.hover(desk, text.replace("share", "|share")).startswith("What is left.\n\nDefault 0.5, 0 to 1. ")
+    assert editor.hover(desk, text.replace("share", "|share")).startswith("What is left.\n\nDefault 0.5, from 0 to 1. ")
     assert "- `dimmed`: Some of it." in editor.hover(desk, text.replace("type: dim", "type: |dim"))
     assert editor.marks(desk, text.replace("type: dim", "type: ./dim.frag").replace("plugins.s", "rendergraph.s")) == []
