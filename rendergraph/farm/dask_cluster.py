@@ -37,7 +37,12 @@ def start_local_cluster(count: int, devices: Sequence[int | None], *, timeout: f
     # Its workers are threads of this process, and each has a process of its own by its `WorkerSetup`: Dask's way of
     # starting processes would run the caller's script once more.
     cluster = distributed.LocalCluster(
-        n_workers=count, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+        n_workers=count,
+        threads_per_worker=1,
+        processes=False,
+        dashboard_address=None,
+        silence_logs=50,
+        scheduler_kwargs={"dashboard_address": ":0"},  # it serves status anyway; any port that is free
     )
     return Dask(distributed.Client(cluster, set_as_default=False), devices, timeout=timeout, cluster=cluster)
 

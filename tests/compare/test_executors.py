@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -272,12 +273,27 @@ class Cluster:
         with socket.socket() as found:
             found.bind(("127.0.0.1", 0))
             self.address = f"127.0.0.1:{found.getsockname()[1]}"
+        self.scheduler = self._start_scheduler()
+
+    def _start_scheduler(self) -> subprocess.Popen[bytes]:
         port = self.address.partition(":")[2]
-        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+        return self.start("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+
+    def repair(self) -> None:
+        """Start what a test has killed, and end what it has added: a scheduler and workers `a` and `b`."""
+        lost = self.scheduler.poll() is not None
+        for name, worker in list(self.workers.items()):
+            if lost or name not in ("a", "b") or worker.poll() is not None:
+                worker.kill()
+                worker.wait()
+                del self.workers[name]
+        if lost:
+            self.scheduler = self._start_scheduler()
+        for name in {"a", "b"} - self.workers.keys():
+            self.worker(name)
 
     def start(self, what: str, *words: str) -> subprocess.Popen[bytes]:
-        own = self.folder / f"{what}-{len(self.workers)}"
-        own.mkdir()
+        own = Path(tempfile.mkdtemp(dir=self.folder))
         program = "import sys; from distributed.cli import dask_" + what + " as it; it.main()"
         settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
         return subprocess.Popen(
@@ -303,13 +319,17 @@ class Cluster:
             process.wait()
 
 
+@pytest.fixture(scope="module")
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with contextlib.closing(Cluster(tmp_path_factory.mktemp("cluster"))) as cluster:
+        yield cluster
+
+
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Cluster]:
-    (tmp_path / "cluster").mkdir()
-    with contextlib.closing(Cluster(tmp_path / "cluster")) as made:
-        made.worker("a")
-        made.worker("b")
-        yield made
+def cluster(processes: Cluster) -> Cluster:
+    """The cluster of the module, with all that a test before has killed."""
+    processes.repair()
+    return processes
 
 
 @pytest.mark.slow
@@ -332,7 +352,7 @@ def test_64_variants_are_the_same_by_dask_though_a_worker_is_killed_and_no_disk_
         assert len(rows(tmp_path / "there")) == 64
         assert {event["worker"].partition("://")[0] for event in told} <= {"tcp", "cluster"}
         assert client.status == "running"  # it is its owner's
-        assert not list(tmp_path.glob("cluster/b/**/make.frag"))  # nor is anything left there
+        assert not list(cluster.folder.glob("b/**/make.frag"))  # nor is anything left there
 
 
 @pytest.mark.nightly
