@@ -285,7 +285,8 @@ class Runner(Struct, eq=False):
 
     def _update(self, node: GraphNode, index: int, time: float, camera: ViewMatrices, scene: FrameScene) -> None:
         with _blamed(node, "update"):
-            node.node.update(FrameContext(self.executable, self.graph, node, index, time, camera, scene))
+            frame = FrameContext(self.executable, self.graph, node, index, time, camera, scene)
+            node.node.update(frame)  # pyright: ignore[reportArgumentType]  # a cached_property is a property to mypy
 
     def _count_still(self, scene: Scene, camera: ViewMatrices) -> None:
         """How many frames nothing has moved: neither scene nor camera, nor a parameter that was changed meanwhile."""

@@ -181,6 +181,7 @@ class VariantTask(Task):
         done: set[int] = set()
         while waiting:
             batch = waiting.pop(0)
+            first = batch.numbers[0]
             try:
                 for event in self._batch(worker, batch, runs, reference):
                     if isinstance(event, ReferenceResult):
@@ -195,7 +196,7 @@ class VariantTask(Task):
                 elif reference is None or is_retryable(error):
                     raise
                 else:
-                    yield TaskError(runs[batch.numbers[0]][0].number, _mapped(error, worker))
+                    yield TaskError(runs[first][0].number, _mapped(error, worker))
 
     def _batch(
         self, worker: Worker, batch: Batch, runs: Sequence[tuple[RunSpec, Planned]], reference: Reference | None

@@ -57,7 +57,7 @@ def make_executor(
     if not travels:
         text = "in-memory node classes cannot be sent to other processes; write them to files and pass plugins="
         raise UsageError(Problem("RG641", text))
-    kind = None
+    kind = number = None
     if isinstance(choice, str):
         try:
             check_executor_name(choice)

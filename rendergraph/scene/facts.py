@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rendergraph.declare import LightFacts
 from rendergraph.facts import SELECTIONS, ObjectFacts
-from rendergraph.scene.model import Mesh, Object, Scene, Vec3, changed_objects
+from rendergraph.scene.model import Light, Material, Mesh, Object, Scene, Vec3, changed_objects
 from rendergraph.textures import TextureDesc, full_mip_count
 
 Corners: TypeAlias = npt.NDArray[np.float64]
@@ -87,10 +87,21 @@ class FrameScene:
             self.shown, self.casting = before.shown, before.casting
 
     # `scene` is replaced while no object moves; lights may have changed nevertheless.
-    lights = property(attrgetter("scene.lights"))
-    objects = property(attrgetter("scene.objects"))
-    materials = property(attrgetter("scene.materials"))
-    meshes = property(attrgetter("scene.meshes"))
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        return self.scene.lights
+
+    @property
+    def objects(self) -> tuple[Object, ...]:
+        return self.scene.objects
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        return self.scene.materials
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        return self.scene.meshes
 
     @cached_property
     def corners(self) -> Corners:

@@ -46,26 +46,32 @@ class FrameScene(Protocol):
     @property
     def lights(self) -> Sequence[Any]:
         """The scene's lights, in its order."""
+        ...
 
     @property
     def bounds(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Minimum and maximum corner of all visible objects."""
+        ...
 
     @property
     def corners(self) -> npt.NDArray[np.float64]:
         """World-space corners of the box of each object, (n, 8, 3); read-only."""
+        ...
 
     @property
     def casting(self) -> npt.NDArray[np.bool_]:
         """Which objects are visible and cast a shadow, (n,)."""
+        ...
 
     @property
     def shown(self) -> npt.NDArray[np.bool_]:
         """Which objects are not hidden, (n,)."""
+        ...
 
     @property
     def objects(self) -> Sequence[Any]:
         """Placed objects with `name`, `mesh`, `material`, `transform`, `casts_shadow`, `hidden`."""
+        ...
 
     @property
     def meshes(self) -> Sequence[Any]:
@@ -74,10 +80,12 @@ class FrameScene(Protocol):
         `box` is a mesh's minimum and maximum corner, `edges` the triangles that meet at each edge, `plane` the plane
         that contains them, or None; each is computed once.
         """
+        ...
 
     @property
     def materials(self) -> Sequence[Any]:
         """The materials that an object's `material` indexes."""
+        ...
 
 
 class Frame(Protocol):
@@ -96,15 +104,19 @@ class Frame(Protocol):
     @property
     def scene(self) -> FrameScene:
         """The scene in this frame, a `FrameScene`."""
+        ...
 
     def connected(self, port: Port) -> bool:
         """Whether an input is connected."""
+        ...
 
     def views(self, port: Port) -> Sequence[ViewMatrices]:
         """Return the views that the texture at an input was rendered with, in order; none if it is not connected."""
+        ...
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
         """Set the views of a declared table."""
+        ...
 
     def set_region(
         self,
@@ -121,6 +133,8 @@ class Frame(Protocol):
             depth_bounds: minimum and maximum of the values in the depth texture where fragments pass, 0 to 1. A driver
                 without depth bounds ignores it: it saves work, and must not change the picture.
         """
+        ...
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
         """Upload an array into a declared buffer; it may have fewer bytes than the buffer."""
+        ...

@@ -26,21 +26,27 @@ class Recorder(Protocol):
     @property
     def facts(self) -> Facts:
         """What the node may ask about the graph and the scene."""
+        ...
 
     def desc(self, port: Port) -> TextureDesc | BufferDesc:
         """Return the description that a port's texture or buffer is allocated from."""
+        ...
 
     def used(self, port: Port) -> bool:
         """Whether any node reads an output."""
+        ...
 
     def needs(self, parameter: str) -> tuple[str, ...]:
         """Return what the choice of a parameter needs."""
+        ...
 
     def reads(self, out: Iterable[Part]) -> Mapping[str, Port]:
         """Return the inputs that a step reads if it names none."""
+        ...
 
     def add(self, request: StepRequest) -> None:
         """Keep a request."""
+        ...
 
 
 class StepRequest(Struct, frozen=True, gc=False):

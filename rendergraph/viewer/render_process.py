@@ -42,10 +42,11 @@ class RenderProcess:
         """
         with self._lock:
             child = self._running()
+            patience = child.patience(self._timeout)
             try:
                 with contextlib.suppress(OSError):  # receiving finds out why
                     child.pipe.send(request)
-                response = child.receive(patience := child.patience(self._timeout))
+                response = child.receive(patience)
             except TimeoutError:
                 text = f"the render process did not answer within {patience:.0f} s and was terminated"
                 raise self._lost(f"{text}; undo the last change, or allow more by --timeout") from None
