@@ -131,8 +131,8 @@ def _ports(cls: type[Node]) -> Iterator[Problem]:
     ports = cls.ports()
     for name, port in ports.items():
         wrong = list(mistakes_of(port, f"port '{name}'", name))
-        texts = (*_alone(name, port), *_named(name, port, ports))
-        yield from wrong or (_problem(name, text) for text in texts)
+        # Only if every field is valid on its own may fields be compared.
+        yield from wrong or (_problem(name, text) for text in (*_alone(name, port), *_named(name, port, ports)))
 
 
 def _alone(name: str, port: Port) -> Iterator[str]:
