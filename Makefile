@@ -42,11 +42,11 @@ pictures:
 test:
 	pytest -n $(WORKERS)
 
-# Under a minute, while working.
+# The fast tests, while working.
 quick:
 	pytest -n $(WORKERS) -m "not slow"
 
-# What is slow by nature: every pipeline in every mode, long fuzzing, large references, a second driver. Takes about an hour.
+# What is slow by nature: every pipeline in every mode, long fuzzing, large references, a second driver.
 nightly:
 	sphinx-build -q -W --keep-going -D pictures=0 -b html docs docs/_build/html-nightly
 	pytest -n $(WORKERS) --nightly
