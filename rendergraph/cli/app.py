@@ -206,8 +206,9 @@ def _fail(problems: Sequence[Problem], code: int, as_json: bool) -> int:
 def _usage(error: click.UsageError) -> Problem:
     path = error.ctx.command_path if error.ctx else "rendergraph"
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        known = [name for parameter in error.ctx.command.params for name in parameter.opts if name.startswith("--")]
-        text = f"there is no option '{error.option_name}'{suggestion(error.option_name, known, most=0)}"
+        from rendergraph.cli.suggestions import unknown_option  # only needed here
+
+        text = unknown_option(error, error.ctx)
     else:
         text = " ".join(error.format_message().split()).rstrip(".")
     return Problem("RG500", f"{text[:1].lower()}{text[1:]}; see '{path} --help'")

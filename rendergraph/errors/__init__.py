@@ -268,7 +268,7 @@ def is_framework(module: str) -> bool:
     return module == "rendergraph" or (module.startswith("rendergraph.") and not module.startswith("rendergraph.nodes"))
 
 
-def nearest(word: str, words: Iterable[str]) -> str | None:
+def nearest(word: str, words: Iterable[str], *, floor: float = 0.6) -> str | None:
     """The word a user most likely meant, or None.
 
     `difflib` alone misses beginnings (`--env` for `--environment`, `kernal` for `kernel_size`), so the one word that
@@ -281,7 +281,7 @@ def nearest(word: str, words: Iterable[str]) -> str | None:
     begun = [candidate for low, candidate in lowered.items() if low.startswith(word.lower())]
     if len(begun) == 1 and len(word) > 2:
         return begun[0]
-    close = get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    close = get_close_matches(word.lower(), lowered, n=1, cutoff=floor)
     if close:
         return lowered[close[0]]
     for low, candidate in sorted(lowered.items()):
