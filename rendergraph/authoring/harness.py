@@ -259,11 +259,14 @@ def _draw(self: Any, steps: Steps) -> None:
 def _call(signature: Signature) -> str:
     arguments = signature.declaration.partition("(")[2].rpartition(")")[0]
     kinds = [argument.split()[-2] for argument in arguments.split(",") if argument.strip()]
-    zeros = ", ".join(f"{kind}(0)" for kind in kinds)
+    pattern = {"float": "at.x", "bool": "at.x > 0.5"} | {f"vec{count}": f"vec{count}(at)" for count in (2, 3, 4)}
+    values = ", ".join(pattern.get(kind, f"{kind}(0)") for kind in kinds)  # with zeros, a term may have no effect
     result = signature.declaration.split()[0]
     column = "result[0]" if "mat" in result else "result"
     value = "vec4(result)" if result in ("float", "int", "uint", "bool") else f"vec4({column}.xxxx)"
-    return f"out vec4 made;\nvoid main() {{ {result} result = {signature.name}({zeros}); made = {value}; }}\n"
+    body = "vec4 at = fract(gl_FragCoord.xyxy * vec4(0.037, 0.041, 0.043, 0.047)) + 0.1;"
+    call = f"{result} result = {signature.name}({values}); made = {value};"
+    return f"out vec4 made;\nvoid main() {{ {body} {call} }}\n"
 
 
 def _node(name: str, *, shader: str | None = None, **attributes: Any) -> type[Node]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from itertools import product
 from typing import Any
 
+from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, outputs_of
-from rendergraph.program import Texts, named_reads, unfit_sampler
+from rendergraph.program import Texts, named_reads, unfit_outputs, unfit_sampler
 from rendergraph.steps import Read, Resource, Step, Write
 
 # Text: it takes a millisecond to compile, and most pipelines declare no vertices of their own.
@@ -109,21 +110,22 @@ def check_blocks(step: Step, program: Program, given: Collection[str], texts: Te
         raise InputError(problems)
 
 
-def check_outputs(step: Step, program: Program, outputs: Sequence[str]) -> None:
-    """A target that the shader does not write would hold what was there before.
+def check_outputs(
+    step: Step, program: Program, cls: type[Node], resources: Mapping[str, Resource], texts: Texts
+) -> None:
+    """Check that a program writes every target, and nothing else, in the kind of number that the target holds.
 
     Raises:
-        InputError: there is such a target (RG437).
+        InputError: it does not (RG437, RG447, RG448).
     """
-    if len(outputs) < 2:
-        return  # a single one may have any name, and may be discarded everywhere
-    written = outputs_of(program) - {"gl_FragDepth", "gl_SampleMask"}
+    written = outputs_of(program)
+    problems = [_placed(one, one.subject, texts) for one in unfit_outputs(step, written, cls, resources)]
+    targets = [write.name for write in step.writes if write.use == "color"]
     shader = dict(step.shaders).get("fragment", "the step")
-    problems = [
-        step.problem("RG437", f"{shader} writes no output '{name}'{suggestion(name, written - set(outputs))}", name)
-        for name in outputs
-        if name not in written
-    ]
+    for name in targets if len(targets) > 1 else ():  # a single one may have any name, or be discarded everywhere
+        if name not in written:
+            hint = suggestion(name, written.keys() - set(targets))
+            problems.append(step.problem("RG437", f"{shader} writes no output '{name}'{hint}", name))
     if problems:
         raise InputError(problems)
 

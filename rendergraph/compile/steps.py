@@ -324,7 +324,7 @@ class _Compiler(Struct, eq=False, dict=True):
         check_uniforms(step, program, uniforms, {*sampled, *materials}, texts)
         check_samplers(step, program, self.plan.resources, texts)
         check_blocks(step, program, blocks, texts)
-        check_outputs(step, program, outputs)
+        check_outputs(step, program, self.types[step.node].cls, self.plan.resources, texts)
         check_stored(step, program, reads, self.plan.resources, texts)
         return program, binds, uniforms
 

@@ -192,10 +192,14 @@ def driver_message(error: Exception) -> tuple[str | None, str]:
     return None, re.sub(r"^.*?\n=+\n", "", text, count=1, flags=re.DOTALL).strip()
 
 
-def outputs_of(program: Program) -> set[str]:
-    """Return the names of a program's active outputs: what its last stage writes."""
+def outputs_of(program: Program) -> dict[str, str]:
+    """Return the GLSL types of a program's color outputs by their names."""
     raw, glo = program.device.raw, program.glo
-    return {_name(raw, glo, _OUTPUT, index).removesuffix("[0]") for index in range(_count(raw, glo, _OUTPUT))}
+    found, kind = {}, (ctypes.c_int * 1)()
+    for index in range(_count(raw, glo, _OUTPUT)):
+        raw.glGetProgramResourceiv(glo, _OUTPUT, index, 1, (ctypes.c_uint * 1)(_TYPE), 1, None, kind)
+        found[_name(raw, glo, _OUTPUT, index).removesuffix("[0]")] = _VALUES[kind[0]][0]
+    return {name: glsl for name, glsl in found.items() if not name.startswith("gl_")}
 
 
 def _inspect(program: Program) -> None:

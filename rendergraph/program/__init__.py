@@ -14,7 +14,15 @@ knows; the same for other functions, by their name.
 
 from __future__ import annotations
 
-from rendergraph.program.checks import Texts, check_kept_text, check_texts, named_reads, unfit_sampler, used_blocks
+from rendergraph.program.checks import (
+    Texts,
+    check_kept_text,
+    check_texts,
+    named_reads,
+    unfit_outputs,
+    unfit_sampler,
+    used_blocks,
+)
 from rendergraph.program.macros import positions_macro
 from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts, text_key
 
@@ -29,6 +37,7 @@ __all__ = [
     "prefix",
     "stage_texts",
     "text_key",
+    "unfit_outputs",
     "unfit_sampler",
     "used_blocks",
 ]

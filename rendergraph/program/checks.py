@@ -75,7 +75,7 @@ def _check_step(
     texts = stage_texts(step, types, resources, views)
     check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
     _check_samplers(step, texts, resources)
-    _check_outs(step, texts, types[step.node].cls)
+    _check_outs(step, texts, types[step.node].cls, resources)
 
 
 # --- samplers --------------------------------------------------------------------------------------------------------
@@ -135,21 +135,40 @@ def _check_samplers(step: Step, texts: Mapping[str, StageText], resources: Mappi
         raise InputError(list(dict.fromkeys(problems)))
 
 
-def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node]) -> None:
-    """Check that each `out` is a target of the step or a port of the node; a single one may have any name.
+def unfit_outputs(
+    step: Step, outs: Mapping[str, str], cls: type[Node], resources: Mapping[str, Resource]
+) -> list[Problem]:
+    """Return the problems of a fragment shader's outputs, given as name to GLSL type.
 
-    An `out` inside `#if` belongs to another step or variant.
+    Each is a target of the step or a port of the node; a single one may have any name.
     """
-    text = texts.get("fragment")
-    if text is None:
-        return
-    outs = [found.name for found in globals_of(_always(text.text)).declared if found.storage == "out"]
-    known = {write.name for write in step.writes} | cls.ports().keys()
-    spare = [name for name in outs if name not in known]
-    if len(outs) > 1 and spare:
-        hint = suggestion(spare[0], cls.outputs())
-        what = f"{dict(step.shaders)['fragment']} writes '{spare[0]}', which the node does not declare{hint}"
-        raise InputError(_placed(step.problem("RG448", what), text, spare[:1]))
+    problems = []
+    targets = {write.name: write.resource for write in step.writes if write.use == "color"}
+    for name, kind in outs.items():
+        resource = targets.get(name)
+        if resource is None and len(outs) == len(targets) == 1:
+            resource = next(iter(targets.values()))
+        if resource is not None:
+            desc = resources[resource].desc
+            assert isinstance(desc, TextureDesc)
+            right = {"uint": "u", "int": "i"}.get(FORMATS[desc.format].family, "")
+            if right != (kind[0] if kind[0] in "iu" else ""):
+                text = f"'{name}' is declared as {kind}, but '{resource}' is {desc.format}; declare it as {right}vec4"
+                problems.append(step.problem("RG447", text, name))
+        elif len(outs) > 1 and name not in cls.ports():
+            what = f"{dict(step.shaders)['fragment']} writes '{name}', which the node does not declare"
+            problems.append(step.problem("RG448", what + suggestion(name, cls.outputs()), name))
+    return problems
+
+
+def _check_outs(step: Step, texts: Mapping[str, StageText], cls: type[Node], resources: Mapping[str, Resource]) -> None:
+    """Check the outputs that a text always declares; an `out` inside `#if` belongs to another step or variant."""
+    if "fragment" in texts:
+        text = texts["fragment"]
+        outs = {found.name: found.type for found in globals_of(_always(text.text)).declared if found.storage == "out"}
+        problems = unfit_outputs(step, outs, cls, resources)
+        if problems:
+            raise InputError([_placed(problem, text, [problem.subject]) for problem in problems])
 
 
 def _always(text: str) -> str:

@@ -55,14 +55,18 @@ def describe_program(linked: Linked, node: str, number: int | None) -> dict[str,
     Args:
         linked: the pipeline.
         node: id of the node.
-        number: of the step, as `plan` counts; None for the first that has a program.
+        number: of the step, as `plan` counts; None for the first that has a program
+            and is not for a persistent value, such as a table.
 
     Raises:
         InputError: no such node, or it has no program of its own.
         UsageError: no such step, or it has no program.
     """
     expansion, steps = _steps_with_program(linked, node)
-    step = next((one for one in steps if number in (one.index, None)), None)
+    kept = {id for id, resource in expansion.resources.items() if resource.role == "kept"}
+    each_frame = [one for one in steps if not any(write.resource in kept for write in one.writes)]
+    first = (each_frame or steps)[0]
+    step = first if number is None else next((one for one in steps if one.index == number), None)
     if step is None:
         listed = ", ".join(_step_name(one) for one in steps)
         text = f"--step: '{node}' has no step {number} with a program; available: {listed}"

@@ -19,6 +19,7 @@ from msgspec import Struct, field
 
 from rendergraph.declare import Added
 from rendergraph.declare.extensions import ImageLoader
+from rendergraph.document import YamlLimits
 from rendergraph.scene.edges import Edges, find_edges, is_solid
 from rendergraph.stamps import Stamps
 
@@ -123,6 +124,7 @@ class SceneLimits(Struct, frozen=True):
         image_side: texels along one side of an image.
         image_bytes: decoded bytes of one image.
         image_ratio: decoded bytes for each byte of the file, if an image is above 64 MiB.
+        yaml: limits of the text of a scene file.
     """
 
     file_bytes: int = 2 << 30
@@ -132,6 +134,7 @@ class SceneLimits(Struct, frozen=True):
     image_side: int = 16384
     image_bytes: int = 2 << 30
     image_ratio: int = 1000
+    yaml: YamlLimits = YamlLimits()
 
     def exceeded(self, what: str, limit: str) -> str:
         """Return the text of a mistake for an exceeded limit, with the option that raises it."""

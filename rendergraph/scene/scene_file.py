@@ -42,7 +42,7 @@ _SRGB = ("base_color", "emissive", "specular_color")
 
 def read_scene(path: Path, reading: Reading) -> Scene:
     """Read a scene file; the error has every mistake in it, or the first of a mesh file it names."""
-    document = load(path, keep_going=True)
+    document = load(path, limits=reading.limits.yaml, keep_going=True)
     reader = _Reader(path, reading, Validator(scene_keys.CODES, document.problems))
     scene = reader.read(document.root)
     if reader.validator.problems:

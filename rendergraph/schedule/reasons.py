@@ -64,6 +64,7 @@ def order_reasons(model: Model, order: Sequence[int], chosen: str | None) -> dic
 def culled_reasons(steps: Sequence[Step], kept: Sequence[Step], versions: Versions) -> Mapping[str, str]:
     """Return node id to why none of its steps runs."""
     running = {step.node for step in kept}
+    running |= {step.view.rpartition(".")[0] for step in kept if step.view}  # a node that only sets a view
     culled: dict[str, str] = {}
     for node in dict.fromkeys(step.node for step in steps):
         if node in running:

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from rendergraph import stamps
 from rendergraph.declare import Extensions
+from rendergraph.document import YamlLimits
 from rendergraph.scene.animate import complete
 from rendergraph.scene.environments import named
 from rendergraph.scene.load import load
@@ -51,7 +52,7 @@ def scene_of(resolved: Resolved) -> Scene:
 
 def scene_limits(selection: Selection) -> SceneLimits:
     """Return the limits of the scene and its images."""
-    return SceneLimits(**selection.allowed("scene"))
+    return SceneLimits(**selection.allowed("scene"), yaml=YamlLimits(**selection.allowed("yaml")))
 
 
 def _environment(path: Path, scene: Scene, limits: SceneLimits, extensions: Extensions) -> Environment:

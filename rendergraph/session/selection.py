@@ -87,7 +87,7 @@ def _limit_names() -> dict[str, dict[str, str]]:
     from rendergraph.scene.model import SceneLimits
 
     names = {
-        kind: {f"{kind}-{name.replace('_', '-')}": name for name in limits.__struct_fields__}
+        kind: {f"{kind}-{name.replace('_', '-')}": name for name in limits.__struct_fields__ if name != "yaml"}
         for kind, limits in (("yaml", YamlLimits), ("scene", SceneLimits))
     }
     return {**names, "plan": {"plan-memory": "memory"}}

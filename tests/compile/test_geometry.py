@@ -158,7 +158,9 @@ class Through(Node):
 def test_a_node_that_makes_nothing_but_views_is_updated(draw: Draw) -> None:
     scene = CAMERA + "objects: {box: {shape: box, size: [1, 1, 1], at: [0, 0, 10]}}\n"  # behind the camera
     text = "nodes: {b: {type: back}, t: {type: through, inputs: {view: b.views}}}\noutputs: {depth: t.depth}"
-    assert draw(text, Back, Through, scene=scene)["depth"].max() > 0.0
+    frame = draw(text, Back, Through, scene=scene)
+    assert frame["depth"].max() > 0.0
+    assert frame.info.culled == {}
 
 
 class Turned(Node):

@@ -444,6 +444,16 @@ CASES = {
         {},
         r"test\.yaml:5:3: RG437 node 'a' \(wrong\): wrong\.frag writes no output 'mask'$",
     ),
+    "an output of whole numbers": (
+        'color = Output(Any, format="rgba32ui", doc="Numbers.")',
+        {"wrong.frag": "out vec4 color;\nvoid main() { color = vec4(1.0); }"},
+        r"wrong\.frag:1:10: RG447 node 'a' \(wrong\): 'color' is declared as vec4, but 'a\.color' is rgba32ui; declare it as uvec4$",
+    ),
+    "an output more": (
+        COLOR,
+        {"wrong.frag": "out vec4 color;\nout vec4 mask;\nvoid main() { color = mask = vec4(1.0); }"},
+        r"wrong\.frag:2:10: RG448 node 'a' \(wrong\): wrong\.frag writes 'mask', which the node does not declare; available: color$",
+    ),
     "a material's texture without a guard": (
         COLOR + 'def record(self, steps):\n    steps.geometry("wrong.frag")',
         {

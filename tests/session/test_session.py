@@ -296,6 +296,12 @@ def test_limits_are_raised_by_the_name_that_the_message_gives(tmp_path: Any) -> 
     with pytest.raises(InputError) as caught:
         rg.load(tmp_path / "deep.yaml", limits={"yaml-depth": 100}).resolve().spec.check()
     assert "yaml-depth" not in str(caught.value)
+    (tmp_path / "scene.yaml").write_text(f"scene: 1\n{deep}\n")
+    with pytest.raises(InputError, match="--limit yaml-depth=N"):
+        rg.load("forward", scene=tmp_path / "scene.yaml").check()
+    with pytest.raises(InputError) as caught:
+        rg.load("forward", scene=tmp_path / "scene.yaml", limits={"yaml-depth": 100}).check()
+    assert "yaml-depth" not in str(caught.value)
     with pytest.raises(InputError, match="--limit scene-vertices=N"):
         rg.load("forward", limits={"scene-vertices": 10}, scene=_triangle(tmp_path)).check()
     with pytest.raises(UsageError, match="there is no limit 'scene-vertexes'; did you mean 'scene-vertices'"):

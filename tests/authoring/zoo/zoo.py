@@ -53,6 +53,7 @@ class Zoo(Node):
     past = History(AnyTexel, format="r32f")
 
     gain: float = param(default=1.0, min=0, max=2, doc="A number.")
+    slope: float = param(default=1.0, min=0, max=2, doc="A number that the function takes.")
     tint: tuple[float, float, float] = param(default=(1.0, 1.0, 1.0), min=0, max=2, doc="A colour.")
 
     def record(self, steps: Steps) -> None:
