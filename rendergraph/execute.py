@@ -74,7 +74,6 @@ class FrameContext(Struct, eq=False):
     scene: FrameScene
 
     def connected(self, port: Port) -> bool:
-        """Whether anything is linked to an input."""
         return bool(self.node.inputs.get(declared_port(self.node.node.ports(), port, "connected's argument").name))
 
     def views(self, port: Port) -> Sequence[ViewMatrices]:
@@ -84,7 +83,6 @@ class FrameContext(Struct, eq=False):
         return [view for table in tables for view in self.executable.views.current[table]]
 
     def set_views(self, port: Views, views: Sequence[ViewMatrices]) -> None:
-        """Set the views of a declared table."""
         if not isinstance(declared_port(self.node.node.ports(), port, "set_views"), Views):
             raise Misuse(f"set_views is given '{port.name}', which is no Views port", "RG433")
         for view in views:
@@ -110,7 +108,6 @@ class FrameContext(Struct, eq=False):
             region.set(scissor, depth_bounds)
 
     def write(self, port: Port, values: npt.NDArray[Any]) -> None:
-        """Upload into a declared buffer."""
         buffer_of(declared_port(self.node.node.ports(), port, "write"), "write")
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
@@ -130,8 +127,6 @@ class Runner(Struct, eq=False):
     """Runs an executable frame by frame.
 
     Attributes:
-        executable: what runs.
-        graph: for the nodes that compute something each frame.
         drawn: frames since history began.
         reuse: leave out steps whose values are there and would be the same.
         cull: leave out objects that lie outside of the views that they would be drawn with.
@@ -168,7 +163,6 @@ class Runner(Struct, eq=False):
 
     @property
     def updating(self) -> list[str]:
-        """The nodes that compute something each frame."""
         return [node.id for node in self._updating]
 
     @property
@@ -196,13 +190,7 @@ class Runner(Struct, eq=False):
         Args:
             index: frame number, from 1.
             time: seconds since frame 1.
-            delta: seconds since the frame before.
-            scene: the scene at that time.
-            camera: its camera's view.
             timed: measure each step; otherwise nothing is measured and None returned.
-
-        Raises:
-            InputError: a node's `update` failed (RG432, RG433).
         """
         executable, views = self.executable, self.executable.views
         start = perf_counter()
@@ -320,11 +308,7 @@ class Runner(Struct, eq=False):
         self._complete = True
 
     def check(self) -> None:
-        """Raise what the driver has complained about since the last check.
-
-        Raises:
-            RenderError: there was a GL error.
-        """
+        """Raise what the driver has complained about since the last check."""
         error = self.executable.device.raw.error()
         if error:
             self.executable.renew()

@@ -106,11 +106,7 @@ def entry_points(*groups: str) -> Iterator[EntryPoint]:
 
 
 def require(feature: str, extra: str, *modules: str) -> None:
-    """Check that the `modules` of an extra are installed, which a feature needs.
-
-    Raises:
-        UsageError: one is missing; the message says how to install the extra.
-    """
+    """Check that the `modules` of an extra are installed, which a feature needs."""
     from importlib.util import find_spec  # only features with an extra need it
 
     missing = [name.replace("_", "-") for name in modules if find_spec(name) is None]

@@ -41,7 +41,6 @@ def schema(catalog: Catalog, bases: Mapping[str, Mapping[str, str]] = {}) -> Sch
     A type that cannot be imported is a legal word without further rules: its plugin's mistake is not the file's.
 
     Args:
-        catalog: the known types.
         bases: what files extend, as it is written in them, with the types of its nodes by their ids.
     """
     types: dict[str, type[Node] | None] = dict.fromkeys(catalog.names())

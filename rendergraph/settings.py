@@ -43,7 +43,6 @@ class CacheLimits(Struct, frozen=True):
 
     @property
     def bytes(self) -> int:
-        """The second limit in bytes."""
         return self.mebibytes << 20
 
 
@@ -76,8 +75,6 @@ _MOST_BYTES = 100_000
 
 
 class Settings(Struct, frozen=True):
-    """One `rendergraph.toml`; see `SETTINGS`."""
-
     file: Path
     asset_roots: tuple[Path, ...] = ()
     plugins: tuple[Path, ...] = ()
@@ -127,8 +124,6 @@ class Roots(Struct, frozen=True):
 
         Args:
             file: the file; its own folder is a root, and that of the nearest settings file above it.
-            extra: folders added on the command line.
-            cwd: the current folder by default.
         """
         home = _resolved(file.parent)
         folders = [home]
@@ -154,7 +149,6 @@ class Roots(Struct, frozen=True):
         Args:
             path: joined to the folder of the file it is written in.
             written: how it is written there; the path by default.
-            folder: expect a folder.
         """
         name = shown(written or path, 120)
         record_read(path)

@@ -61,14 +61,10 @@ class MemoryFigures(Struct, frozen=True):
 
     Attributes:
         no_reuse_bytes: with a texture of its own for every resource.
-        allocated_bytes: what the plan allocates.
         lower_bound_bytes: no legal order has a lower peak of live bytes.
-        peak_node: the node whose step is the peak of this order; None without steps.
         proven: an order was found whose peak is that bound.
-        least_peak_bytes: the least peak of live bytes of any order found.
         tier: how textures share: `view` only if some share needs a view, `heap` if some lie in a block.
         next_tier: the next way of sharing that saves bytes, if any.
-        next_tier_bytes: what that would allocate, in this order.
     """
 
     no_reuse_bytes: int
@@ -91,7 +87,6 @@ class ResourcePlan(Struct, frozen=True, dict=True):
     Attributes:
         placement: resource id to the indices of its physicals (two for history, else one).
         released: step position to the resources that are dead after it (for the poison mode).
-        alias, views, heap: as requested of `allocate`.
     """
 
     schedule: Schedule
@@ -130,7 +125,6 @@ def allocate(schedule: Schedule, *, alias: bool = True, views: bool = True, heap
     """Give every resource of a schedule memory.
 
     Args:
-        schedule: steps in order.
         alias: let resources that are never alive together share memory.
         views: let formats of one texel class share through texture views.
         heap: let textures of any description share blocks of memory, if that takes fewer bytes.

@@ -62,7 +62,6 @@ class Entries:
         self.problems.append(Problem(code, text, *place))
 
     def _report_name(self, name: str, text: str) -> None:
-        """Note that an entry of the header does not fit the declarations."""
         self.problems.append(self.header.names[name].problem("RG444", text, key=True))
 
     @property
@@ -82,7 +81,6 @@ class Entries:
         return self.header.names[name].key_place if name in self.header.names else Place(shown_file(self.file))
 
     def collect(self) -> None:
-        """Fill `ports` and `parameters`."""
         count = len(self.declared.keys() | self.header.names.keys())
         if count > MOST_NAMES:
             text = f"the shader has {count:,} ports and parameters, {MOST_NAMES} are the limit; a texture holds tables"

@@ -22,12 +22,7 @@ NAME = "EXTENSION"
 
 
 def extensions(folders: Iterable[tuple[str, Path]], offered: Iterable[EntryPoint]) -> Extensions:
-    """Return what plugins add; nothing is imported before it is asked for.
-
-    Args:
-        folders: folders of plugins, each with the package that stands for it.
-        offered: the entry points of installed plugins.
-    """
+    """Return what plugins add; nothing is imported before it is asked for."""
     named, entries = tuple(folders), sorted(offered, key=lambda entry: entry.value)
     return Extensions(lambda: _sources(named, entries))
 

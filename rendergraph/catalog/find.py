@@ -153,11 +153,7 @@ def _has_header(file: str) -> bool:
 
 
 def shaders(folder: Path, most_files: int = MOST_FILES) -> tuple[list[tuple[str, Listed]], list[Path]]:
-    """Return the shader nodes of a folder that a pipeline file names, and the Python files there, which are not run.
-
-    Raises:
-        ValueError: it has too many files.
-    """
+    """Return the shader nodes of a folder that a pipeline file names, and the Python files there, which are not run."""
     files = list(_files(folder, most_files))
     python = [Path(where, stem + suffix) for where, _, stem, suffix in files if suffix == ".py"]
     found = [

@@ -31,7 +31,6 @@ class Header(Struct, frozen=True, eq=False):
     Attributes:
         inputs, outputs, params: the keys of each entry by its name.
         names: the entries themselves, for their places.
-        threads: the thread counts of a compute shader.
     """
 
     doc: str | None = None
@@ -44,7 +43,6 @@ class Header(Struct, frozen=True, eq=False):
 
 
 def is_in(text: str) -> bool:
-    """Whether a shader's text has a header."""
     return _BEGIN.search(text) is not None
 
 

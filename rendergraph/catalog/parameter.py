@@ -25,11 +25,7 @@ def uniform_names(declared: Iterable[Global]) -> list[str]:
 
 
 class ParameterReader:
-    """Makes one parameter.
-
-    Attributes:
-        lacks_range: it is a number with neither a least nor a greatest value.
-    """
+    """Makes one parameter."""
 
     def __init__(
         self, name: str, entry: Mapping[str, Value], named: Value | None, found: Global | None, report: Report
@@ -46,12 +42,7 @@ class ParameterReader:
         self.lacks_range = False
 
     def parameter(self, uniforms: Sequence[str], words: Callable[[], Set[str]]) -> Parameter | None:
-        """Return the parameter, None if it is wrong.
-
-        Args:
-            uniforms: those that the header does not mention, in case its name is misspelt.
-            words: gives all words of the shader's text.
-        """
+        """Return the parameter, None if it is wrong."""
         found, entry = self.found, self.entry
         role: Any = self._text("role") or ("param" if found is not None else "define")
         if mismatch := self._mismatch(role, uniforms, words):

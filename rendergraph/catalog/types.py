@@ -23,12 +23,8 @@ class NodeType(Struct, frozen=True, dict=True):
 
     Attributes:
         name: the word after `type:`: the stem of its file, or the path of a shader file that is used by path.
-        family: the folder of its file (`shadows`), empty for a single file.
-        file: its Python file, or its shader file.
         shaders: the folder its shaders' names are relative to.
         inherited: the same of the types it extends, the nearest first, for shaders that are not in `shaders`.
-        plugin: the entry point or folder it comes from.
-        warnings: what is missing in a shader file but not required.
         missing: a placeholder for an unknown type, in a graph that is only shown.
         text: of a shader file its header and its lines with those of its includes, without comments.
     """
@@ -90,7 +86,6 @@ class NodeType(Struct, frozen=True, dict=True):
 
 
 def shared_includes() -> Path:
-    """The folder where `#include <…>` looks."""
     return folder("rendergraph.shaders") / "include"
 
 

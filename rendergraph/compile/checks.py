@@ -210,7 +210,6 @@ def layout_for(layout: str, program: Program) -> tuple[str, list[str]]:
 
 
 def attribute_formats(layout: str) -> dict[str, str]:
-    """The attributes of a buffer's layout with their formats."""
     words = layout.split()
     formats = [word for word in words if re.match(_FORMAT, word)]
     return dict(zip(words[len(formats) :], [word for word in formats if "x" not in word], strict=True))

@@ -50,8 +50,6 @@ def seen(packed: PackedScene, view: ViewMatrices, *, clamped: bool = False) -> B
     """Which objects a view may see, bool (n,): false where an object's box lies beyond one side of it.
 
     Args:
-        packed: the objects.
-        view: what they are drawn with.
         clamped: depth is clamped, so that what lies before the near plane or behind the far one is drawn as well.
     """
     x, y, z, w = reversed_projection(view) @ view.view
@@ -67,12 +65,9 @@ class DrawList(Struct, eq=False):
     """Draw commands of some objects, of which those that are seen stand at the front of a buffer.
 
     Attributes:
-        buffer: the commands.
         all: commands of every object of the scene.
         objects: what the list draws when all of it is seen, in the scene's order.
-        order: how they are drawn.
         changed: called with the objects that are drawn, in order, when these are others.
-        drawn: the objects whose commands the buffer holds.
     """
 
     buffer: moderngl.Buffer
@@ -102,9 +97,6 @@ class SceneView(Struct, eq=False):
 
     Attributes:
         table, index: the view; None for all of the table.
-        culls: whether lists draw only what is seen.
-        clamped: see `seen`.
-        lists: what is drawn.
     """
 
     table: str

@@ -42,12 +42,7 @@ class Draw(Struct, eq=False):
     """One draw call or dispatch with what must be set before it.
 
     Attributes:
-        program: what runs.
-        uniforms: name to value, all that the program may look at.
-        state: calls that set the fixed function, None for compute.
-        call: the draw itself.
         binds: texture and buffer binds of its own; textures only where the driver's units ran out.
-        vertex_array: what `call` draws with, for geometry.
         textures: sampled name to its texture in this parity and its sampler, where that is a plain 2D texture.
     """
 
@@ -64,9 +59,7 @@ class SortedDraws(Struct, eq=False):
     """Draws whose order is the eye's: each part is compiled once, and runs of neighbours are found anew as it moves.
 
     Attributes:
-        parts: what can be drawn together, in any order.
         runs: part number, first command and number of commands, far to near.
-        render: draws a run of commands with a part's vertex array.
     """
 
     parts: list[Draw]
@@ -75,7 +68,6 @@ class SortedDraws(Struct, eq=False):
     prepared: list[tuple[Call, ...]] = field(default_factory=list)
 
     def __call__(self) -> None:
-        """Draw all runs."""
         for part, first, count in self.runs:
             for call in self.prepared[part]:
                 call()
@@ -86,9 +78,7 @@ class CompiledStep(Struct, eq=False):
     """A step of one parity.
 
     Attributes:
-        step: what it came from.
         before: framebuffer, clears.
-        draws: in order.
         sorted: draws whose order is the eye's, instead of `draws`.
         after: barriers, poison.
         watched: around the draws: calls that count, or leave them out; first and last.
@@ -127,27 +117,17 @@ class Executable(Struct, eq=False, dict=True):
     """A compiled pipeline of one size.
 
     Attributes:
-        plan: what it was compiled from.
-        memory: its textures.
-        views: its view tables on the GPU.
         binds: the calls that bind textures, samplers and blocks, a list a parity.
-        steps: compiled steps, a list a parity.
         lists: what the next frame runs, a list a parity; filled by `assemble`.
         due: kept steps that the next frame runs.
-        statics: uniform writes that hold for the whole frame.
         scene_views: which objects are drawn, and in what order; asked when a view or an object has moved.
-        scene: what it draws, which counts its changes.
-        reuse: which steps have to run.
         filled: what `update` has written into buffers.
         filled_before: the buffers among them that this drawing has not written yet.
         touched: the sources that have changed since the last frame, as `_looks` names them, but for the scene's.
-        timers: one a step.
-        occlusion_queries: they decide which steps the device skips.
         buffers: draw commands.
         vertex_arrays: frees the vertex arrays over the plan's own buffers.
         fresh: `statics` have to be written and everything bound before the next frame.
         looks_back: a program looks at where things were in the frame before.
-        made_kept: kept steps have run.
         shares_kept: what they make may be taken over from other pipelines, and by those.
     """
 
@@ -190,7 +170,6 @@ class Executable(Struct, eq=False, dict=True):
 
     @property
     def programs(self) -> set[Program]:
-        """All programs that it runs."""
         return {draw.program for steps in self.steps for step in steps for draw in step.all_draws}
 
     def renew(self) -> None:
@@ -308,7 +287,6 @@ class Executable(Struct, eq=False, dict=True):
 
     @cached_property
     def reads_frame(self) -> bool:
-        """Whether any program looks at the frame block."""
         draws = (draw for step in self.steps[0] for draw in step.all_draws)
         return any("frame_block" in draw.program.blocks for draw in draws)
 
@@ -369,7 +347,6 @@ class Executable(Struct, eq=False, dict=True):
         return {c.step.key for c in self.steps[0] if repr(c.values(c.step)) != repr(c.values(values[c.step.key]))}
 
     def set_uniforms(self, values: Mapping[StepKey, Step]) -> None:
-        """Take over changed parameter values."""
         changed = self.changed(values)
         self.touched |= {source_of_step(key) for key in changed}
         self.due = self._with_dependents(self.due | (changed & self.kept.keys()))

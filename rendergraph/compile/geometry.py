@@ -37,12 +37,7 @@ class MultiDraw(Struct, eq=False):
     """Objects drawn by one indirect multi-draw.
 
     Attributes:
-        defines: macros for the program.
         textures: sampler name to GL texture and sampler.
-        cull: `back`, `front` or `none`.
-        clockwise: whether front faces are clockwise.
-        list: what is drawn.
-        mode: the primitive, moderngl's.
     """
 
     defines: Mapping[str, str]
@@ -53,7 +48,6 @@ class MultiDraw(Struct, eq=False):
     mode: int
 
     def call(self, vertex_array: Any) -> Call:
-        """The draw."""
         drawn, mode = self.list, self.mode
 
         def call() -> None:
@@ -72,12 +66,7 @@ class GeometryCompiler(Struct, eq=False):
     buffers: list[moderngl.Buffer] = field(default_factory=list)
 
     def draws(self, step: Step, make: Callable[[MultiDraw], Draw]) -> list[Draw] | SortedDraws:
-        """The draws of a step.
-
-        Args:
-            step: a geometry step.
-            make: compiles a multi-draw's program.
-        """
+        """The draws of a step."""
         objects = select(self.scene.scene, step)
         if not objects:
             return []
@@ -146,7 +135,6 @@ class GeometryCompiler(Struct, eq=False):
         return made
 
     def _view_key(self, step: Step) -> tuple[str, int | None, bool, bool]:
-        """What a `SceneView` is made of."""
         return step.view or CAMERA, step.view_index, step.in_place, step.state.depth_clamp
 
     def _key(self, step: Step, index: int) -> MultiDrawKey:

@@ -72,13 +72,7 @@ _PADDING = {"4f": "16x", "2i": "8x"}
 
 
 class MeshIndices(Struct, frozen=True, eq=False):
-    """The indices of all meshes, for one kind of primitive.
-
-    Attributes:
-        buffer: the indices.
-        commands: what draws each object of the scene with them.
-        mode: the primitive, moderngl's.
-    """
+    """The indices of all meshes, for one kind of primitive."""
 
     buffer: moderngl.Buffer
     commands: Records
@@ -89,8 +83,6 @@ class GpuScene(Struct, eq=False, dict=True):
     """Buffers, material textures and the macros a scene gives to shaders.
 
     Attributes:
-        packed: the arrays the buffers were made from.
-        scene: the scene they were packed from.
         changes: how often each block, the `instances`, and those of the frame before have been uploaded anew.
     """
 
@@ -268,7 +260,6 @@ class GpuScene(Struct, eq=False, dict=True):
         return made
 
     def release(self, programs: ProgramCache) -> None:
-        """Free everything."""
         programs.forget(id(self))
         for buffer, _ in (*self._streams.values(), *self._blocks.values()):
             buffer.release()

@@ -32,7 +32,6 @@ class KeptValues(Struct, eq=False):
     """The last few values that were made, whichever pipeline, scene or parameters they are of.
 
     Attributes:
-        device: where they are.
         limit: bytes of all copies together; the least recently used ones are freed first.
     """
 
@@ -66,7 +65,6 @@ class KeptValues(Struct, eq=False):
             executable.have(there)
 
     def release(self) -> None:
-        """Free all."""
         for held in self._held.values():
             self._delete(held)
         self._held.clear()

@@ -14,12 +14,7 @@ from rendergraph.textures import FORMATS, TextureDesc
 
 
 def check_plan(device: Device, plan: ResourcePlan, views: Mapping[str, ViewTable], fixed_blocks: int) -> None:
-    """Refuse what this device cannot hold, all of it at once.
-
-    Raises:
-        InputError: a node asks for more samples than there are (RG435).
-        RenderError: textures, view tables or steps exceed a limit (RG435).
-    """
+    """Refuse what this device cannot hold, all of it at once."""
     limits = device.limits
     _check_samples(plan, limits)
     texts = [text for name, resource in plan.resources.items() for text in _texture(name, resource.desc, limits)]
@@ -90,16 +85,7 @@ def _step(step: Step, limits: Mapping[str, int], fixed_blocks: int) -> list[Prob
 
 
 def groups_of(step: Step, local: tuple[int, int, int], limits: Mapping[str, int]) -> tuple[int, int, int]:
-    """How many work groups a compute step has.
-
-    Args:
-        step: a compute step.
-        local: the size of one group, as its shader says.
-        limits: the device's.
-
-    Raises:
-        RenderError: more than the device takes (RG435).
-    """
+    """How many work groups a compute step has."""
     groups = step.groups
     if step.invocations is not None:
         x, y, z = (-(-count // size) for count, size in zip(step.invocations, local, strict=True))

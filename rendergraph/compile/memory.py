@@ -67,12 +67,10 @@ class Region(Struct, eq=False):
         self.scissor, self.depth_bounds = scissor, depth_bounds or (0.0, 1.0)
 
     def use(self, framebuffer: moderngl.Framebuffer) -> None:
-        """Bind a framebuffer to draw within the scissor."""
         framebuffer.scissor = self.scissor  # type: ignore[assignment]  # None takes the scissor away
         framebuffer.use()
 
     def bound_depth(self, raw: RawGL) -> None:
-        """Keep to the range of depth."""
         raw.glDepthBoundsEXT(*self.depth_bounds)
 
 
@@ -193,13 +191,11 @@ class Memory(Struct, eq=False, dict=True):
         return self._view(texture, texture.desc.format, read.mip, read.layer)
 
     def buffer(self, resource: str) -> moderngl.Buffer:
-        """A resource's buffer."""
         found = self.physicals[self.plan.placement[resource][0]]
         assert isinstance(found, moderngl.Buffer), f"{resource} is a texture"
         return found
 
     def sampler(self, sampler: Sampler) -> int:
-        """The GL sampler object."""
         if sampler not in self._samplers:
             self._samplers[sampler] = textures.create_sampler(self.device, sampler)
         return self._samplers[sampler]
@@ -303,7 +299,6 @@ class Memory(Struct, eq=False, dict=True):
     # The end ---------------------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Free everything."""
         self.device.unbind()
         for framebuffer in self._framebuffers.values():
             framebuffer.release()
@@ -356,5 +351,4 @@ class ClearTarget:
             self._call, self._args = getattr(raw, name), (glo, 0x1800, index or 0, address)
 
     def __call__(self) -> None:
-        """Clear."""
         self._call(*self._args)

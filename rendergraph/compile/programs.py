@@ -21,9 +21,7 @@ class ProgramCache(Struct, eq=False):
     """Programs by their text, their outputs and the binding points of their blocks, least recently used first.
 
     Attributes:
-        device: what compiles them.
         limit: how many programs are kept; all that kept executables run are kept in any case.
-        compiled: how many programs have been compiled so far.
     """
 
     device: Device
@@ -35,15 +33,10 @@ class ProgramCache(Struct, eq=False):
 
     @property
     def alive(self) -> int:
-        """How many programs there are."""
         return len(self._programs)
 
     def get(self, texts: Mapping[str, StageText], blocks: Mapping[str, int], outputs: Sequence[str]) -> Program:
-        """The program of these texts.
-
-        Raises:
-            InputError: the driver refused a shader, or its macros grow too far.
-        """
+        """The program of these texts."""
         sources = {stage: text.text for stage, text in texts.items()}
         key = (*sources.items(), tuple(outputs), tuple(sorted(blocks.items())))
         if key in self._programs:
@@ -84,11 +77,7 @@ class ProgramCache(Struct, eq=False):
             self._vertex_arrays.pop(key).release()
 
     def trim(self, used: Set[Program]) -> None:
-        """Free the least recently used programs: each costs Mesa's software driver about 3 MB.
-
-        Args:
-            used: programs that kept executables run; none of them is freed.
-        """
+        """Free the least recently used programs that are not `used`: each costs Mesa's software driver about 3 MB."""
         unused = [key for key, program in self._programs.items() if program not in used]
         for key in unused[: max(0, len(self._programs) - self.limit)]:
             program = self._programs.pop(key)
@@ -102,7 +91,6 @@ class ProgramCache(Struct, eq=False):
             _return_free_memory()
 
     def release(self) -> None:
-        """Free everything."""
         for vertex_array in self._vertex_arrays.values():
             vertex_array.release()
         for program in self._programs.values():

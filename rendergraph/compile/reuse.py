@@ -44,7 +44,6 @@ class Reuse(Struct, eq=False, dict=True):
     """What of a plan has to run, frame after frame.
 
     Attributes:
-        plan: the steps, and where their values lie.
         look: tells for each step in order the sources that it looks at itself; asked when a second frame is drawn.
     """
 
@@ -59,10 +58,9 @@ class Reuse(Struct, eq=False, dict=True):
         self._state, self._complete = None, False
 
     def choose(self, changed: frozenset[str]) -> tuple[int, ...] | None:
-        """The positions of the steps that the next frame runs, in order, those of kept values aside; None for all.
+        """The positions of the steps that the next frame runs, in order, except for kept values; None for all steps.
 
-        Args:
-            changed: the sources that have changed since the last frame was chosen.
+        `changed` are the sources that have changed since the last frame was chosen.
         """
         if not self._complete:
             self._state, self._complete = None, True

@@ -68,18 +68,7 @@ def compile_plan(
     """Everything a plan needs on the GPU.
 
     Args:
-        device: where.
-        plan: order and memory.
-        types: node id to type, for shaders.
-        views: view tables by id.
-        scene: the scene on the GPU.
-        programs: the session's programs.
-        pool: the session's textures.
         poison: overwrite released textures with a value that no picture should show.
-
-    Raises:
-        RenderError: no memory.
-        InputError: a shader does not compile.
     """
     check_plan(device, plan, views, len(FIXED_BLOCKS))
     memory = Memory(device, plan, scene.environment, pool)
@@ -336,7 +325,6 @@ class _Compiler(Struct, eq=False, dict=True):
         return {positions_macro(count): f"vec2[]({', '.join(text)})" for count, text in texts.items()}
 
     def _texts(self, step: Step, macros: Mapping[str, str]) -> Texts:
-        """The texts of a step's program."""
         return partial(self._step_texts.of, step, macros)
 
     def _target(self, step: Step, compiled: CompiledStep, parity: int) -> None:

@@ -29,7 +29,6 @@ class ViewBuffers(Struct, eq=False, dict=True):
     """One buffer a view table, and the frame block.
 
     Attributes:
-        current: the views each table holds now.
         changed, moved_before: the tables that were uploaded since these were emptied, and those of the frame before.
     """
 
@@ -51,7 +50,6 @@ class ViewBuffers(Struct, eq=False, dict=True):
         self._frame = self.device.ctx.buffer(reserve=16)
 
     def binding(self, table: str) -> int:
-        """The binding point of a table's block."""
         if table == CAMERA:
             return FIXED_BLOCKS["camera_block"]
         return len(FIXED_BLOCKS) + list(self.tables).index(table)
@@ -119,7 +117,6 @@ class ViewBuffers(Struct, eq=False, dict=True):
             buffer.bind_to_uniform_block(self.previous_binding(name))
 
     def release(self) -> None:
-        """Free the buffers."""
         for buffer in (*self._buffers.values(), *self._before.values(), self._frame):
             buffer.release()
         self._buffers.clear()

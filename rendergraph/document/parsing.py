@@ -197,10 +197,8 @@ def parse(
     """Return the values of a YAML text.
 
     Args:
-        text: the text.
         origin: how messages name it.
         path: the file it comes from, to which its relative paths are relative.
-        limits: budgets.
         keep_going: put mistakes that do not stop the reading into `Document.problems`.
     """
     import yaml  # loaded with the first file

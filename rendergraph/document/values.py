@@ -93,7 +93,6 @@ class Value(Struct, eq=False):
         return self.data if isinstance(self.data, dict) else {}
 
     def updated(self, entries: Mapping[Any, Value]) -> Value:
-        """Return a mapping with some of its entries replaced or added."""
         return self.with_data({**self.mapping, **entries})
 
     def problem(self, code: str, text: str, *, key: bool = False) -> Problem:

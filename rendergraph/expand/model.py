@@ -29,7 +29,6 @@ class VersionedSteps(Struct, frozen=True):
         final: port to its resource and the version it has when its node is done.
         forwarded: port of an idle node to the port that it would continue.
         firsts: resource id to the value in the first frame that a node which continues it declares.
-        idle: nodes that recorded nothing, with the reason.
     """
 
     steps: Sequence[Step]
@@ -47,7 +46,6 @@ class Expansion(Struct, frozen=True):
 
     Attributes:
         wanted: output name or tap to the id of the resource that must exist at the end of the frame.
-        idle: nodes that recorded nothing, with the reason.
         ports: port to the id of the resource that holds its texture or buffer.
     """
 

@@ -26,8 +26,6 @@ class Device(Struct, eq=False, dict=True):
 
     Attributes:
         owned: whether `release` ends the context; a borrowed one stays its owner's.
-        limits: the driver's maxima.
-        textures_made: number of textures allocated so far.
         mips: the program of `fill_mips`, once needed.
     """
 
@@ -143,9 +141,6 @@ def open_device(index: int | None = None) -> Device:
 
     Args:
         index: EGL device number as `doctor` lists them; None for the default, or RENDERGRAPH_DEVICE where set.
-
-    Raises:
-        DeviceError: no driver, no such device, OpenGL older than 4.5, or a process forked from one that has drawn.
     """
     if first_process() != os.getpid():
         text = (

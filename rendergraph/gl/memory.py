@@ -18,7 +18,6 @@ def check_memory(device: Device, needed: int, allowed: int | None = None) -> Non
     """Refuse a plan before the driver is asked: some drivers end the process where others return an error.
 
     Args:
-        device: where the textures would be.
         needed: bytes.
         allowed: MiB; by default RENDERGRAPH_MEMORY_LIMIT, else three quarters of what is free on the device.
     """

@@ -42,11 +42,7 @@ class MemoryBlock(Struct, eq=False):
 
 
 def make_blocks(device: Device, groups: Sequence[Sequence[TextureDesc]]) -> list[MemoryBlock]:
-    """Return a block for each list of descriptions, as large as its largest texture is on this device.
-
-    Raises:
-        RenderError: the driver has no memory objects, there is no Vulkan for the device, or too little memory.
-    """
+    """Return a block for each list of descriptions, as large as its largest texture is on this device."""
     blocks: list[MemoryBlock] = []
     if not groups:
         return blocks

@@ -55,12 +55,10 @@ class Uniform(Struct, frozen=True):
 
     @property
     def glsl(self) -> str:
-        """The type's name in GLSL."""
         return _SAMPLERS.get(self.type, "an opaque type") if self.is_opaque else _VALUES[self.type][0]
 
     @property
     def writer(self) -> str:
-        """The raw function that writes it."""
         return f"glProgramUniform{_VALUES[self.type][1]}"
 
     @property
@@ -75,7 +73,6 @@ class Uniform(Struct, frozen=True):
 
     @property
     def is_opaque(self) -> bool:
-        """Whether it is a sampler or an image."""
         return self.type not in _VALUES
 
 
@@ -84,10 +81,8 @@ class Program(Struct, eq=False):
 
     Attributes:
         object: moderngl's Program or ComputeShader.
-        uniforms: active uniforms outside blocks, by name.
         blocks, storage: active uniform and storage blocks, name to index.
         storage_bytes: the least that a storage block's buffer holds, an array without a size counted as one element.
-        texts: stage to what was compiled.
     """
 
     device: Device
@@ -104,7 +99,6 @@ class Program(Struct, eq=False):
 
     @property
     def local_size(self) -> tuple[int, int, int]:
-        """The work group of a compute shader."""
         values = (ctypes.c_int * 3)()
         self.device.raw.glGetProgramiv(self.glo, 0x8267, ctypes.byref(values))
         return values[0], values[1], values[2]

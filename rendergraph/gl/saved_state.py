@@ -174,11 +174,7 @@ class SavedState:
     """
 
     def __init__(self, raw: RawGL, ctx: moderngl.Context) -> None:
-        """Read everything and pause an active transform feedback.
-
-        Raises:
-            RenderError: conditional rendering is active, which can be neither paused nor resumed.
-        """
+        """Read everything and pause an active transform feedback."""
         self._raw, self._ctx = raw, ctx
         raw.error()  # an error of the owner's must not be taken for ours
         _refuse_conditional(raw)

@@ -35,12 +35,9 @@ def pieces(
     Colour mask, depth mask, viewport and scissor are the framebuffer object's (moderngl sets them with it).
 
     Args:
-        raw: raw functions.
-        state: what a step states.
         depth_test: resolved from `state.depth_test` and the attachments.
         cull: resolved: `back`, `front` or `none`.
         clockwise: front faces are clockwise (mirrored instances).
-        targets: number of colour targets.
     """
 
     def switch(capability: int, on: bool, *more: Call) -> tuple[Call, ...]:

@@ -41,9 +41,7 @@ class Directive(Struct, frozen=True, gc=False):
     """A line that rendergraph handles itself.
 
     Attributes:
-        number, text: the line.
         word: `include`, `version`, `line`, or `needs` for a `#pragma needs`, which the driver ignores.
-        rest: the text after that.
     """
 
     number: int
@@ -69,10 +67,7 @@ class LineRun(Struct, frozen=True, gc=False):
     """Consecutive lines for the driver, and the directive after them.
 
     Attributes:
-        first: number of the first line.
-        bytes: size of the lines.
         nests: how many more `#if` they open than they close.
-        end: None at the end of the file.
     """
 
     first: int

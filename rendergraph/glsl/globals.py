@@ -31,9 +31,6 @@ class Global(Struct, frozen=True):
     Attributes:
         storage: `uniform`, `in`, `out`, or `buffer` for a storage block.
         type: the GLSL type, empty for a block.
-        name: the variable's name, or the block's.
-        at: position of the name in the text.
-        qualifiers: `readonly`, `flat`, …
         layout: `location`, `binding`, … with the text after `=`, empty for plain words (`rgba16f`).
         initialiser: the text after `=`, empty without one.
     """
@@ -62,11 +59,7 @@ class Globals(Struct, frozen=True):
     input_layout: Mapping[str, tuple[str, ...]]
 
     def number(self, words: Sequence[str]) -> int:
-        """Return the integer after a layout's `=`: a literal, or a macro.
-
-        Raises:
-            ValueError: it is neither.
-        """
+        """Return the integer after a layout's `=`: a literal, or a macro; anything else is a ValueError."""
         text = "".join(words)
         if re.fullmatch(r"\d{1,9}", text):
             return int(text)
@@ -125,11 +118,7 @@ _LONGEST = 100
 
 
 def literal(text: str) -> Literal:
-    """Return the value of a literal.
-
-    Raises:
-        ValueError: the text is not a literal.
-    """
+    """Return the value of a literal; any other text is a ValueError."""
     if vector := _VECTOR.match(text):
         convert = int if vector[1] else float
         count, parts = int(vector[2]), [_number(part.strip()) for part in vector[3].split(",")]

@@ -38,7 +38,6 @@ class Head(Struct, frozen=True):
     Attributes:
         qualifiers: all but the storage qualifier: `readonly`, `flat`, …
         layout: `location`, `binding`, … with the tokens after `=`, none for plain words (`rgba16f`).
-        rest: from the type on.
     """
 
     storage: Storage | None

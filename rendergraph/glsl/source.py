@@ -25,7 +25,6 @@ class Origin(Struct, frozen=True):
 
     Attributes:
         file: the author's file, None for generated lines.
-        line: its line there, from 1.
         column: columns by which the line has moved to the right.
         shared: it comes from an include in angle brackets.
         prefix: the prefix of the names that the file declares.
@@ -140,7 +139,6 @@ class Includes:
         """Return the text of a file with all its includes.
 
         Args:
-            source: the file.
             root: the folder that includes in quotes must stay in; the file's own by default.
             prefix: noted in the origins of every line that is not shared.
             plugged: parameters in capitals with the file of their choice: `#include <SHADING>` is the file given here,

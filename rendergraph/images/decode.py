@@ -23,15 +23,12 @@ Warn: TypeAlias = Callable[[Problem], None]
 
 
 def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits: SceneLimits = SceneLimits()) -> Pixels:
-    """Decode a scene's image for upload.
+    """Decode a scene's image for upload: (height, width, 4), top row first, uint8 or float16.
 
     Grey becomes three equal channels and a missing alpha 1; alpha is not multiplied in. Integer images keep their
     encoding (`srgb` ones are uploaded to an sRGB format); images of more than 8 bits that are not sRGB become floats
     0…1. HDR and EXR values are linear light, whatever `srgb` says; NaN becomes 0 and what is beyond the largest half
     float becomes 65504, with a warning that counts the pixels.
-
-    Returns:
-        (height, width, 4), top row first, uint8 or float16.
     """
     if source.loader is not None:
         return _decode_by_plugin(source, source.loader, warn, limits)
@@ -46,11 +43,7 @@ def decode(source: ImageSource, *, srgb: bool, warn: Warn | None = None, limits:
 def decode_light(
     source: ImageSource | MadeImage, *, warn: Warn | None = None, limits: SceneLimits = SceneLimits()
 ) -> Pixels:
-    """Decode an environment map for upload: linear light without negative values.
-
-    Returns:
-        (height, width, 4), top row first, float16.
-    """
+    """Decode an environment map for upload: linear light without negative values, (height, width, 4) in float16."""
     if isinstance(source, MadeImage):
         return source.make()
     pixels = decode(source, srgb=True, warn=warn, limits=limits)
@@ -71,9 +64,8 @@ def decode_light(
 def read(path: Path | str) -> Pixels:
     """Read a picture's values as they are: uint8, uint16, float16 or float32, top row first.
 
-    Returns:
-        (height, width, channels) in the order `R,G,B,A`, or (layers, height, width, channels) where channels are named
-        `000.Y`, `001.Y` and so on.
+    The shape is (height, width, channels) in the order `R,G,B,A`, or (layers, height, width, channels) if channels are
+    named `000.Y`, `001.Y` and so on.
     """
     limits = SceneLimits()
     with _opened(ImageSource(Path(path)), limits) as image:

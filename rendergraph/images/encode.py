@@ -54,7 +54,6 @@ def write(
     and HDR hold linear light: `display` values are decoded first. `data` is written as it is everywhere.
 
     Args:
-        path: the file.
         pixels: (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
         channels: names for EXR; by default `Y`, `R,G`, `R,G,B` or `R,G,B,A`. Layers put `000.` and so on before them.
         encoding: of the values.
@@ -103,7 +102,6 @@ def _eight_bits(path: Path, pixels: Pixels, encoding: Encoding) -> Pixels:
 
 
 def _values(path: Path, pixels: Pixels) -> Pixels:
-    """The texels as floats."""
     if np.issubdtype(pixels.dtype, np.floating):
         return pixels
     if pixels.size and max(int(pixels.max()), -int(pixels.min())) > _EXACT_INTEGER:
@@ -190,7 +188,6 @@ def _png(pixels: npt.NDArray[np.uint8], texts: Mapping[str, str]) -> Iterator[by
 
     Args:
         pixels: (height, width, 1, 3 or 4 channels), top row first, sRGB-encoded; alpha is not multiplied in.
-        texts: metadata by keyword: 1 to 79 letters of ASCII.
     """
     height, width, count = pixels.shape
     yield b"\x89PNG\r\n\x1a\n"

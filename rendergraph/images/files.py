@@ -20,13 +20,10 @@ def failed(path: Path, reason: str) -> RenderError:
 
 @contextlib.contextmanager
 def staged(paths: Sequence[Path]) -> Iterator[list[Path]]:
-    """Temporary files beside each path, which take the paths' places together when the block ends well.
+    """Yield a temporary path beside each path, to be written; they replace the paths together if the block succeeds.
 
     A link is followed, so that it stays a link. Each temporary file is flushed to the disk before the rename and its
     folder after it; whatever ends the block early, an interrupt included, leaves nothing behind.
-
-    Yields:
-        One path for each, in the same folder, to be written by the caller.
     """
     targets = [Path(os.path.realpath(path)) for path in paths]
     temporary = [target.with_name(f".{target.name[:100]}.{os.urandom(4).hex()}.part") for target in targets]

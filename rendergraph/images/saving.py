@@ -97,7 +97,6 @@ def save_outputs(files: Sequence[Saved], metadata: Mapping[str, str]) -> None:
 
 
 def encoded(file: Saved, metadata: Mapping[str, str]) -> bytes:
-    """Return the bytes that `save_outputs` would write."""
     import tempfile  # brings random numbers along, which nothing else needs
 
     with tempfile.TemporaryDirectory(prefix="rendergraph-") as folder:

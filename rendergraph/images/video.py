@@ -19,7 +19,6 @@ ENDING = ".mp4"
 
 
 def is_film(path: Path) -> bool:
-    """Whether a file contains many frames."""
     return path.suffix.lower() == ENDING
 
 

@@ -70,12 +70,9 @@ def heat_map(values: Pixels) -> Bytes:
 
 
 def viewable(array: Pixels, semantic: str = "any", encoding: str | None = None) -> Bytes:
-    """Return a picture of a texture; the module's table lists how each semantic is shown.
+    """Return a picture of a texture, uint8 with one or three channels; the module's table lists how it is shown.
 
     The array is (height, width), (height, width, channels) or (layers, height, width, channels), top row first.
-
-    Returns:
-        uint8, (height, width, 1) grey or (height, width, 3).
     """
     array = array[..., np.newaxis] if array.ndim == 2 else array
     colors = _colors(array[..., :3], semantic, light=semantic in _LIGHT or encoding == "linear")

@@ -19,12 +19,9 @@ class Key(Struct, frozen=True):
     """One key of a table.
 
     Attributes:
-        name: as written in the file.
         type: the type of its values: an annotation, see `keys.values`, or a mapping.
-        doc: one line.
         default: the value where the file has none; None where that means absent.
         unit: the unit's symbol, empty for a pure number.
-        required: the file must have it.
         example: how it is written, for messages.
         code: of the mistake that a value does not fit; empty for the file's usual one.
     """
@@ -44,7 +41,6 @@ class Table(Struct, frozen=True, dict=True):
 
     Attributes:
         what: how messages name it, `light '{}'`, with its own name put in.
-        keys: its keys.
         alternatives: keys of which exactly one is required, and the further keys that each allows: always the same, or
             by the word that is its value.
         refused: keys that one might look for, with the message for each.
@@ -101,12 +97,8 @@ class MapOf(Struct, frozen=True):
     """A mapping with names that authors choose.
 
     Attributes:
-        of: the type of each value.
-        naming: which names are legal.
-        what: a name, in words.
         refused: names that have another meaning, with the message for each.
         null: values may be null; a table without required keys always may.
-        least: minimum count.
     """
 
     of: Type
@@ -170,7 +162,6 @@ def schema(type: Type) -> Schema:
 
 
 def file_schema(table: Table) -> Schema:
-    """Return the JSON Schema of a file."""
     return {"$schema": "http://json-schema.org/draft-07/schema#", **_table(table)}
 
 

@@ -20,9 +20,7 @@ class Codes(Struct, frozen=True):
     """The codes of the mistakes in one kind of file.
 
     Attributes:
-        unknown: an unknown key.
         wrong: a value that does not fit, or is missing.
-        name: an illegal name.
         file: the whole is not a mapping.
     """
 
@@ -36,7 +34,6 @@ class Validator:
     """Checks the values of one file against tables.
 
     Attributes:
-        problems: the mistakes so far, in the order of the file.
         dropped: paths of what was left out, so that it is not reported as missing.
     """
 
@@ -52,11 +49,7 @@ class Validator:
         ] = {}  # by identity, because hashing an annotation takes long
 
     def report(self, value: Value, code: str, text: str, *, key: bool = False) -> None:
-        """Note a mistake at a value, or at its key.
-
-        Raises:
-            InputError: there are too many.
-        """
+        """Note a mistake at a value, or at its key."""
         self.problems.append(value.problem(code, text, key=key))
         if len(self.problems) >= MOST_PROBLEMS:
             raise InputError(self.problems)

@@ -16,7 +16,6 @@ NUMBER: Any = Annotated[float, Range()]
 
 
 def version(number: int) -> Any:
-    """The version of a file format."""
     return Annotated[Literal[number], f"{number}, the version of the format that this program reads"]
 
 
@@ -33,7 +32,6 @@ def shipped(names: Callable[[], Mapping[str, Path]]) -> Any:
 
 
 def choice(*words: str) -> Any:
-    """One of some words."""
     return Literal[words]
 
 
@@ -48,7 +46,6 @@ def whole(low: int, high: float = MOST) -> Any:
 
 
 def vector(count: int = 3, low: float = -MOST, high: float = MOST, *, above: bool = False) -> Any:
-    """A list of `count` numbers, each within limits."""
     return tuple[(number(low, high, above=above),) * count]  # type: ignore[misc]  # made at run time
 
 
@@ -69,7 +66,6 @@ def scale() -> Any:
 
 
 def row(*types: Any) -> Any:
-    """A list with a type for each entry."""
     return tuple[types]  # type: ignore[valid-type]  # made at run time
 
 

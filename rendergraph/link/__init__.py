@@ -43,7 +43,6 @@ def link(
     Args:
         lights: the scene's lights in its order; sizes and layers may depend on them.
         objects: the scene's objects; None without a scene, where any may exist.
-        environment: the description of the scene's environment map.
     """
     given = None if objects is None else tuple(objects)
     return _Linker(spec, spec.catalog or catalog, tuple(lights), given, environment).graph()

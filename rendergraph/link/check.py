@@ -237,7 +237,6 @@ class Checker(Struct, eq=False):
 
 
 def port_kind(port: Port, info: TextureInfo) -> str:
-    """Return the actual kind of an output."""
     if isinstance(port, Function):
         return "function"
     if isinstance(port, Views):

@@ -34,7 +34,6 @@ class Endpoint(NamedTuple):
 
     @property
     def now(self) -> Endpoint:
-        """The same port in this frame."""
         return self._replace(previous=False) if self.previous else self
 
 
@@ -65,7 +64,6 @@ class Graph(Struct, frozen=True, dict=True):
         textures: the properties of every port, internals and functions included; an `InOut` shares its source's.
         aliases: outputs of sub-pipelines and of disabled nodes, `glow.radiance`, and the ports they stand for.
         disabled: nodes that `enabled: false` removes; they are not members.
-        objects: the scene's objects; None without a scene.
         environment: read by inputs of an environment that have no link.
         unlit: nodes that need an environment where the scene has none; they are not members either.
     """
@@ -103,7 +101,6 @@ class Graph(Struct, frozen=True, dict=True):
 
     @cached_property
     def empty(self) -> frozenset[Endpoint]:
-        """Ports whose texture has no layers."""
         descs = ((end, info.desc) for end, info in self.textures.items())
         return frozenset(end for end, desc in descs if desc is not None and desc.layers == 0)
 

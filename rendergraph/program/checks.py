@@ -43,12 +43,7 @@ def check_texts(
     resources: Mapping[str, Resource],
     views: Mapping[str, ViewTable],
 ) -> None:
-    """Build the program texts of steps and check them.
-
-    Raises:
-        InputError: files are missing or cannot be combined (RG400 to RG408), a sampler misfits its texture (RG447),
-            an `out` has no target (RG448), or a persistent value depends on what changes (RG439).
-    """
+    """Build the program texts of steps and check them."""
     problems: list[Problem] = []
     seen: set[object] = set()
     for step in steps:
@@ -182,7 +177,6 @@ def _always(text: str) -> str:
 
 
 def _samplers(text: str) -> dict[str, list[str]]:
-    """Return the types that a text declares for each of its samplers."""
     found: dict[str, list[str]] = {}
     for kind, names in re.findall(_SAMPLER, text):
         for name in re.findall(_NAME, names):

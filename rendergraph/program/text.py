@@ -78,15 +78,8 @@ def stage_texts(
     Args:
         step: its `defines` already hold `HAS_*`, the node's define parameters and its own (from `expand`); likewise
             those of its functions.
-        types: node id to type, at least for the step's node and the providers of its functions.
-        resources: everything the step and its functions read, for layers, views and light tables.
-        views: view tables by id, for their length.
         defines: macros the framework adds: lights, materials, batch, `PASS_VIEW_COUNT`.
         include_folder: where `#include <…>` looks; the shipped one by default.
-        links: links resolved so far, for callers with many steps.
-
-    Raises:
-        InputError: a file is missing or cannot be combined (RG400 to RG409).
     """
     includes = Includes(include_folder or folder("rendergraph.shaders") / "include", links)
     shaders = dict(step.shaders)

@@ -36,7 +36,6 @@ def resolve(
     Mistakes that do not stop the resolving are in its `problems`, for `link` to raise with its own.
 
     Args:
-        source: a shipped name, a path, or a document.
         patches: merge patches, files or plain data, applied in order.
         sets: `PATH=VALUE` texts or a mapping of paths to values; together one patch, types first.
         asset_roots: further folders that files may be read from.

@@ -96,7 +96,6 @@ class Files:
     # Merging --------------------------------------------------------------------------------------------------------
 
     def chain(self, document: Document) -> Value:
-        """Return a file merged onto everything it extends."""
         documents = self._with_bases(document)
         base = documents.pop().root
         tree = base.with_data({key: value for key, value in entries(base).items() if key != "extends"})

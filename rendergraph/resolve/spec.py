@@ -93,8 +93,6 @@ class NodeSpec(Struct, frozen=True, eq=False):
     """One node, sub-pipelines unfolded.
 
     Attributes:
-        id: key in the file; inside a sub-pipeline `glow/blur`.
-        type: empty where the file gives none.
         scope: id of the enclosing sub-pipeline with a slash behind, or empty.
         inputs: links by input or group name; null disconnects.
         params: values by name, `$name` replaced, nulls left out.
@@ -141,11 +139,9 @@ class PipelineSpec(Struct, frozen=True, eq=False):
         roots: where the scene may read from; `roots.check(path, place)`.
         scopes: sub-pipelines by scope (`glow/`).
         tree: the resolved file, sub-pipelines in place of their names.
-        notes: warnings.
         problems: mistakes found so far; `link` raises them with its own, so that a user sees all at once.
         dropped: paths of what was left out because of them.
         removed: the `null` of each node that a file removes from what it extends.
-        missing: packages that it needs and that are not installed.
         unrun: types whose Python is in a folder that only a pipeline file names, and the argument `--plugin` needs.
     """
 

@@ -54,7 +54,6 @@ def complete(scene: Scene, camera_name: str | None = None, aspect: float = WIDE)
 
 
 def moves(scene: Scene) -> bool:
-    """Whether the scene differs from moment to moment."""
     return bool(scene.keyframes) or scene.orbit is not None
 
 
@@ -122,7 +121,6 @@ def _changed(scene: Scene, section: str, name: str, values: Mapping[str, Any]) -
 
 
 def _placed_again(scene: Scene, name: str, values: Mapping[str, Any]) -> Scene:
-    """The scene with the parts of one object moved."""
     if name not in scene.placements:
         return scene
     world, placement = scene_values.placed(values), scene.placements[name]

@@ -52,7 +52,6 @@ def framing_camera(scene: Scene, aspect: float = WIDE, most_points: int = 1 << 2
     one number, the farthest extent of any point towards the side's plane.
 
     Args:
-        scene: its objects, without hidden ones, are framed.
         aspect: width over height of the picture.
         most_points: number of placed vertices above which the boxes of their meshes are framed.
     """

@@ -36,10 +36,6 @@ def is_solid(positions: Floats, triangles: npt.NDArray[np.integer]) -> bool:
     It is closed where each edge is run as often one way as the other. With a number for each place, the sum of
     u v (u - v) over the edges from u to v is 0 then, and as good as never else: of random numbers of 64 bits, a single
     missing triangle gives 0 once in 2⁴¹. Over the edges of one triangle it is (a - b) (b - c) (a - c).
-
-    Args:
-        positions: float32 (n, 3); vertices with equal ones count as one.
-        triangles: (m, 3), each below n.
     """
     first, second, third = triangles.T
     x, y, z = (positions + np.float32(0)).view(np.uint32).astype(np.uint64).T  # -0 is 0
@@ -62,12 +58,7 @@ def _mixed(values: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
 
 
 def find_edges(positions: Floats, triangles: npt.NDArray[np.integer]) -> Edges:
-    """The edges of a mesh: each is run by one triangle one way, and by one the other way, or the mesh is not closed.
-
-    Args:
-        positions: float32 (n, 3).
-        triangles: (m, 3), each below n.
-    """
+    """The edges of a mesh: each is run by one triangle one way, and by one the other way, or the mesh is not closed."""
     place, count = _places(positions)
     corners = triangles.astype(np.int64)
     at = place[corners]

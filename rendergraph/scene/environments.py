@@ -58,10 +58,8 @@ def shipped(name: str, lights: Sequence[Light] = (), values: Mapping[str, Any] =
     """Return a shipped environment, which is generated when it is used.
 
     Args:
-        name: one of `SHIPPED`.
         lights: of the scene. By default the sun of the sky is in the direction of the first directional light; in a
             scene with lights it is only visible and emits no light.
-        values: `sun` and `turbidity` of the scene file.
     """
     if name == "studio":
         return Environment(MadeImage("studio", SIZE, studio), SIZE)

@@ -28,7 +28,6 @@ def selected(scene: Scene, name: str) -> list[int]:
 
 
 def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
-    """Facts of the objects, in the scene's order."""
     facts = []
     for placed in scene.objects:
         mesh, material = scene.meshes[placed.mesh], scene.materials[placed.material]
@@ -54,12 +53,10 @@ def object_facts(scene: Scene) -> tuple[ObjectFacts, ...]:
 
 
 def light_facts(scene: Scene) -> tuple[LightFacts, ...]:
-    """Facts of the lights, in the scene's order."""
     return tuple(LightFacts(light.name, light.type, light.casts_shadow) for light in scene.lights)
 
 
 def environment_facts(scene: Scene) -> TextureDesc | None:
-    """The texture of a scene's environment, if it has one."""
     if scene.environment is None:
         return None
     size = scene.environment.size
@@ -126,7 +123,6 @@ class FrameScene:
 
 
 def corners_of(meshes: tuple[Mesh, ...], objects: tuple[Object, ...] | list[Object]) -> Corners:
-    """World-space corners of objects' boxes, (n, 8, 3)."""
     used = {number: place for place, number in enumerate(dict.fromkeys(entry.mesh for entry in objects))}
     boxes = np.array([meshes[number].box for number in used], np.float64).reshape(-1, 2, 3)
     transforms = np.array([entry.transform for entry in objects]).reshape(-1, 4, 4)

@@ -69,20 +69,17 @@ def strip_triangles(indices: Indices) -> Indices:
 
 
 def fan_triangles(indices: Indices) -> Indices:
-    """Triangles of a fan."""
     first = np.broadcast_to(indices[:1], indices[1:-1].shape)
     return proper(np.stack([first, indices[1:-1], indices[2:]], axis=1))
 
 
 def proper(triangles: Indices) -> Indices:
-    """Triangles with three distinct corners."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     keep = (a != b) & (b != c) & (c != a)
     return np.ascontiguousarray(triangles if keep.all() else triangles[keep], np.uint32)
 
 
 def translation(at: npt.ArrayLike) -> Matrix:
-    """Affine matrix that moves by `at`."""
     matrix = np.eye(4)
     matrix[:3, 3] = at
     return matrix
@@ -132,7 +129,6 @@ def rigid(matrix: Matrix) -> Matrix:
 
 
 def vec3(values: npt.ArrayLike) -> Vec3:
-    """Three plain floats."""
     x, y, z = (float(value) for value in np.asarray(values))
     return x, y, z
 

@@ -75,7 +75,6 @@ class ImageFile(Struct):
         return pixels
 
     def check(self, limits: SceneLimits) -> None:
-        """Check what the header says."""
         if self.handle.format_name() != _FORMATS[self.kind]:
             raise ImageError("RG351", f"is not what it claims to be; {READ}")
         if self.spec.deep:
@@ -119,7 +118,6 @@ def read_header(source: ImageSource, limits: SceneLimits) -> tuple[tuple[int, in
 
 
 def _jpeg_frame(source: ImageSource) -> tuple[int, int, int]:
-    """Width, height and channels in the frame header of a JPEG."""
     head, _ = _first_bytes(source, 1 << 20)
     at = 2
     while (segment := _JPEG_SEGMENT.match(head, at)) is not None:

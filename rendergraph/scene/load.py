@@ -25,19 +25,9 @@ def load(
 ) -> Scene:
     """Load the scene in a file and check all of it; the extension chooses the reader.
 
-    Args:
-        path: a scene file (.yaml), or a mesh (.obj, .gltf, .glb, or a plugin's format).
-        check_path: the root rule for every path in the file: returns it resolved or raises InputError. By default paths
-            stay under the file's own folder, links followed.
-        limits: how much the file may ask for.
-        extensions: formats of plugins.
-
-    Returns:
-        The scene as the file has it: `animate.complete` adds a camera and a light if there are none. What a reader
-        left out, replaced or clamped is in `warnings`.
-
-    Raises:
-        InputError: the file or one it names is missing, malformed, out of range, outside the roots, or beyond a limit.
+    The scene is as the file has it: `animate.complete` adds a camera and a light if there are none. What a reader left
+    out, replaced or clamped is in `warnings`. `check_path` is the root rule for every path in the file; by default
+    paths stay under the file's own folder, links followed.
     """
     reading = Reading(path, check_path or inside(path.parent), limits, extensions)
     suffix = path.suffix.lower()

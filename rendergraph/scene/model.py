@@ -109,7 +109,6 @@ class Mesh(Struct, frozen=True, eq=False, dict=True, weakref=True):
 
     @cached_property
     def edges(self) -> Edges:
-        """How its triangles meet."""
         return find_edges(self.positions, self.indices)
 
 
@@ -147,8 +146,6 @@ class ImageSource(Struct, frozen=True):
     Attributes:
         path: the file it comes from, also if `data` has its bytes.
         data: the encoded bytes of an embedded image.
-        label: its name in messages.
-        loader: the plugin's function that decodes it.
         size: width and height of the decoded image; None if only decoding tells.
         channels: in the file; 0 if unknown.
     """
@@ -190,13 +187,11 @@ class Texture(Struct, frozen=True):
 
 
 class Material(Struct, frozen=True):
-    """A surface, glTF's names in snake case.
+    """A surface; names and meanings are glTF's, in snake case.
 
     Attributes:
         base_color: linear RGBA factor.
         emissive: linear RGB factor, `emissive_strength` already multiplied in.
-        occlusion_strength, normal_scale: as in glTF.
-        alpha_mode, alpha_cutoff, double_sided, unlit: as in glTF.
         ior: index of refraction; dielectric f0 is ((ior-1)/(ior+1))².
         specular, specular_color: as in KHR_materials_specular, linear RGB.
         anisotropy_strength, anisotropy_rotation: as in KHR_materials_anisotropy, radians.

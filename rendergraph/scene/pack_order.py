@@ -30,11 +30,7 @@ def ordered(positions: Floats, triangles: Indices) -> Indices:
 
 
 def first_use(triangles: Indices, count: int) -> tuple[npt.NDArray[np.int64], Indices]:
-    """Vertices renumbered in the order triangles first use them; unused ones drop out.
-
-    Returns:
-        The old number of each new vertex, and the triangles in new numbers.
-    """
+    """Renumber vertices in the order of first use, without unused ones: their old numbers, and the new triangles."""
     corners = triangles.reshape(-1)
     first = np.full(count, -1, np.int64)
     first[corners[::-1]] = np.arange(len(corners) - 1, -1, -1)  # of equal targets the last assignment stays

@@ -28,13 +28,11 @@ def f0_of(material: Material) -> Vec3:
 
 
 def exponent(roughness: float) -> float:
-    """Phong's n from a roughness."""
     alpha = max(roughness * roughness, _LEAST_ALPHA)
     return (1 / (alpha * alpha) - 1) / 2
 
 
 def roughness_of(shininess: float) -> float:
-    """The roughness whose `exponent` is n."""
     return math.sqrt(math.sqrt(1 / (2 * max(0.0, shininess) + 1)))
 
 

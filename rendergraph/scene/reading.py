@@ -92,7 +92,6 @@ class Reading(Struct):
         self._warnings.setdefault((code, kind, place.file), Problem(code, text, place, severity="warning"))
 
     def add_warnings(self, problems: Iterable[Problem]) -> None:
-        """Add the warnings of another file's reader."""
         for problem in problems:
             self._warnings.setdefault((problem.code, problem.text, str(problem.place)), problem)
 
@@ -108,7 +107,6 @@ class Reading(Struct):
         return InputError(Problem(code, text, self._place(line, file)))
 
     def over(self, what: str, limit: str) -> InputError:
-        """Return the error for an exceeded limit."""
         return self.error("RG307", self.limits.exceeded(what, limit))
 
     def _place(self, line: int, file: Path | None) -> Place:
@@ -152,14 +150,12 @@ class Reading(Struct):
             raise self.error("RG301", f"{what} '{self._name(path)}' cannot be read: {_reason(problem)}") from None
 
     def check_file(self, path: Path, what: str) -> None:
-        """Check that a path is a regular file."""
         kind = file_kind(path)
         if kind != "file":
             text = f"{what} '{self._name(path)}' {_NOT_A_FILE[kind]}"
             raise InputError(Problem("RG301", text)) if path == self.path else self.error("RG301", text)
 
     def check_bytes(self, path: Path, what: str) -> None:
-        """Check a file's length against `file_bytes`."""
         size = path.stat().st_size
         if size > self.limits.file_bytes:
             raise self.over(f"{what} '{self._name(path)}' has {size:,} bytes", "file_bytes")

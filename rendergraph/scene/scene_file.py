@@ -110,7 +110,6 @@ class _Reader:
         )
 
     def _check_name(self, entry: Value, key: str, known: Iterable[str], section: str) -> None:
-        """Check that the name under a key exists."""
         value = entry.get(key)
         if value is not None and value.data is not None and str(value.data) not in known:
             hint = suggestion(str(value.data), known) or f"; there are no {section}"
@@ -333,7 +332,6 @@ class _Reader:
 
 
 def _entries(value: Value, section: str) -> dict[str, Value]:
-    """The entries of a section, if it exists."""
     entries = value.get(section)
     return dict(entries.items()) if entries is not None else {}
 

@@ -144,7 +144,6 @@ def plane(size: Sequence[float], segments: int) -> Mesh:
 
 
 def box(size: Sequence[float]) -> Mesh:
-    """A box with flat faces, each with the whole texture."""
     half = np.asarray(size, np.float64) / 2
     parts = []
     for right, up, out in (
@@ -170,7 +169,6 @@ def sphere(radius: float, segments: int, rings: int) -> Mesh:
 
 
 def cylinder(radius: float, height: float, segments: int) -> Mesh:
-    """An upright cylinder with flat caps."""
     half = height / 2
     side = _lathe("side", [(radius, half, 1, 0), (radius, -half, 1, 0)], segments)
     return _joined("cylinder", [side, _cap(radius, half, True, segments), _cap(radius, -half, False, segments)])

@@ -44,7 +44,6 @@ class Schedule(Struct, frozen=True, dict=True):
         wanted: as in `Expansion`: output name to resource id.
         culled: node id to the reason why none of its steps runs.
         peak_bytes: the most bytes of live resources at any step, in this order.
-        peak_node: the node of that step.
         least_peak_bytes: the least peak of any order found; this order's may be higher, as it allocates less.
         lower_bound_bytes: no legal order has a lower peak.
         whole_frame: ids of the resources that keep their memory for the whole frame: history, kept values, and buffers
@@ -100,14 +99,9 @@ def schedule(
     The result depends on links, ports and sizes alone: not on the order of nodes or keys in a file, nor on the machine.
 
     Args:
-        expansion: what the nodes recorded.
-        budget_s: how long to search at most, in seconds of an ordinary machine; counted in resources looked at, not by
-            a clock.
+        budget_s: longest search in seconds of an ordinary machine; it counts resources looked at, not time.
         shuffle: seed of a random legal order instead, for tests.
         keep_order: use the program's order instead, for debugging; takes precedence over `shuffle`.
-
-    Raises:
-        InputError: the steps have no legal order, or read what no step has written (RG601 to RG607).
     """
     if len(expansion.steps) > MOST_STEPS:
         text = f"the pipeline has {len(expansion.steps)} steps, more than {MOST_STEPS}; use fewer nodes or lower counts"
@@ -173,7 +167,6 @@ class _SchedulingProblem(Struct, frozen=True):
         return Model.of(waits, self.kept, self.resources, self.whole_frame, self.shown, self.sinks)
 
     def with_copies(self, model: Model, copies: Mapping[str, int]) -> Model:
-        """Return a model with this number of textures for each history."""
         whole = [self.resources[id] for id in self.whole_frame]
         sizes = [one.desc.bytes * copies[one.id] if one.role == "history" else one.bytes for one in whole]
         return replace(model, constant=sum(sizes))

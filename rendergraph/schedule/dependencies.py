@@ -96,10 +96,6 @@ def contributing(
     """Return the steps that some output depends on, in the order given.
 
     History that such a step reads from the last frame is needed as well: its writers stay.
-
-    Raises:
-        InputError: a needed step reads, or continues, a texture that no step has written (RG601, RG603), an output is
-            never written (RG604), or the node that would write it is idle (RG607).
     """
     kept: set[StepKey] = set()
     problems: list[Problem] = []

@@ -39,15 +39,12 @@ class Model(Struct, frozen=True):
     mapping, so neither does anything computed from it.
 
     Attributes:
-        steps: by number.
         before, after: numbers of the steps that a step waits for, and that wait for it.
         touched: resources that a step touches, as numbers; only those that are not alive during the whole frame.
         born: bytes that become alive with a step.
-        sizes: bytes of each resource.
         classes: number of the storage class of each resource; equal ones can share a texture.
         toucher_count: number of steps that touch each resource, plus one for the frame's end if it is shown.
         shown: numbers of the resources that are alive at the frame's end.
-        names: id of each resource.
         constant: bytes alive during the whole frame: history, kept values, buffers that `update` fills.
     """
 
@@ -82,11 +79,6 @@ class Model(Struct, frozen=True):
         """Number the steps of a dependency graph; bytes of the whole frame are not counted yet.
 
         Args:
-            waits: step to the steps it waits for.
-            kept: the steps.
-            resources: what the steps touch.
-            whole_frame: ids of the resources that are alive during the whole frame.
-            shown: ids of the resources that are alive at its end.
             sinks: the steps the frame is rendered for, in a fixed order.
         """
         by_key = {step.key: step for step in kept}

@@ -26,11 +26,9 @@ def search(model: Model, *, below: int, bound: int, budget: int) -> tuple[list[i
     - Branches that an automorphism of the graph exchanges run in the order of their numbers (`twin_chains`).
 
     Args:
-        model: the steps.
         below: peak of the best order known; states that reach it are dropped.
         bound: a peak that no order is below; up to there everything is free.
-        budget: resources to look at before giving up. A count and not a time, so that the result does not depend on
-            the machine.
+        budget: resources to look at before giving up; a count, so that the result does not depend on the machine.
     """
     beams = _Beams(model, budget)
     order = None

@@ -123,7 +123,6 @@ def list_schedule(model: Model, *, backwards: bool = False) -> list[int]:
 
 
 def random_order(model: Model, seed: int) -> list[int]:
-    """Return a legal order drawn by the seed."""
     import random  # rarely needed
 
     rank = list(range(len(model)))

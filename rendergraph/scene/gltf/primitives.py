@@ -126,7 +126,6 @@ class Primitives:
         return corners
 
     def _check_bounds(self, number: int) -> None:
-        """Warn if positions are outside their declared bounds."""
         accessor, positions = self._buffers.accessors[number], self._buffers.floats(number)
         if not accessor.min or not accessor.max or accessor.component_type != 5126:
             return

@@ -43,7 +43,6 @@ _IDENTITY: Matrix = np.eye(4)
 
 
 def read_gltf(path: Path, reading: Reading) -> Scene:
-    """Read the default scene of a .gltf or .glb file."""
     data = reading.read(path, "scene file")
     binary: bytes | None = None
     if data[:4] == b"glTF" or path.suffix.lower() == ".glb":
@@ -203,7 +202,6 @@ class _Reader:
     # The scene --------------------------------------------------------------------------------------------------------
 
     def scene(self) -> Scene:
-        """Build the default scene with world transforms."""
         roots = self._roots()
         count = sum(
             len(self._meshes[node.json.mesh]) * (1 if node.instances is None else len(node.instances))

@@ -56,7 +56,6 @@ class Statements(Struct, eq=False):
         states: for each face, columns object, group, smoothing group and material as numbers into `names`.
         names: the words behind the numbers; smoothing groups are kept as they are, 0 for off.
         libraries: `mtllib` arguments with their lines.
-        has_smoothing: whether there is an `s` statement at all.
     """
 
     positions: Doubles
@@ -84,7 +83,6 @@ class _Parsed(Struct):
 
 
 def parse(data: bytes, reading: Reading, block_bytes: int = _BLOCK_BYTES) -> Statements:
-    """Parse a whole file."""
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     if b"\0" in data[:4096]:

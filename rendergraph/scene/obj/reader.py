@@ -109,7 +109,6 @@ def _normals(parsed: Statements, reading: Reading) -> tuple[Doubles, Ints]:
 
 
 def _polygon_normals(parsed: Statements) -> Doubles:
-    """Unit normals of whole polygons, however they are cut."""
     result = np.zeros((len(parsed.sizes), 3))
     starts = np.cumsum(parsed.sizes) - parsed.sizes
     for size in np.unique(parsed.sizes):
@@ -140,12 +139,8 @@ def _assemble(
     """Objects and meshes: one for each object, group and material, in the order of first use.
 
     Args:
-        path: the file.
-        parsed: its statements.
-        library: its materials.
         places: (m, 3), rows of `parsed.corners` that are the corners of triangles.
         faces: (m,), face of each triangle.
-        reading: of the file.
     """
     normals, normal_of = _normals(parsed, reading)
     states = parsed.states[faces][:, [0, 1, 3]]
