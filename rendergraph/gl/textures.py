@@ -43,7 +43,7 @@ def target_of(desc: TextureDesc) -> int:
 
 
 def create(device: Device, desc: TextureDesc, label: str = "", *, memory: int | None = None) -> GpuTexture:
-    """Allocate a texture, in memory of its own or at the beginning of a memory object; `label` is its name in errors."""
+    """Allocate a texture, in its own memory or at the beginning of a memory object; `label` is its name in errors."""
     raw = device.raw
     raw.error()
     target, gl_format = target_of(desc), FORMATS[desc.format].gl
