@@ -37,18 +37,14 @@ __all__ = [
     "view",
 ]
 
-
-def __dir__() -> list[str]:
-    return [*__all__, "__version__"]  # what `rg.<TAB>` offers
-
-
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "compare": ("sweep",),
         "errors": ("RendergraphError",),
         "session": ("Frame", "Pipeline", "RenderOptions", "Selection", "Session", "load"),
         "settings": ("CacheLimits",),
+        "version": ("__version__",),
         "viewer": ("view",),
     },
 )

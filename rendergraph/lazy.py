@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 
-def lazy_exports(package: str, names: Mapping[str, Iterable[str]]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package, which is called `package`; `names` are those that each module defines."""
+def lazy_exports(
+    package: str, names: Mapping[str, Iterable[str]]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return `__getattr__` and `__dir__` of a package; `names` has what each of its modules exports."""
     module_of = {name: module for module, members in names.items() for name in members}
 
     def load(name: str) -> Any:
@@ -17,4 +19,4 @@ def lazy_exports(package: str, names: Mapping[str, Iterable[str]]) -> Callable[[
 
         return getattr(importlib.import_module(f".{module_of[name]}", package), name)
 
-    return load
+    return load, lambda: list(module_of)

@@ -33,7 +33,7 @@ def command(selection: Selection, as_json: bool) -> None:
     from rendergraph.compare.sweepfile import is_sweep
     from rendergraph.schema import outdated
     from rendergraph.session import stages
-    from rendergraph.session.made import is_picture
+    from rendergraph.session.picture_metadata import is_picture
     from rendergraph.settings import Roots
 
     if is_sweep(Path(selection.source)):

@@ -194,7 +194,7 @@ def _variants(
 def _are_pictures(names: Sequence[str], reference: str | None, select: options.Select) -> bool:
     """Whether all are pictures, and no option changes them or how they are rendered."""
     from rendergraph.session import Selection
-    from rendergraph.session.made import is_picture
+    from rendergraph.session.picture_metadata import is_picture
 
     source, context = click.core.ParameterSource, click.get_current_context()
     drawn = {"frames", "frame", "device", "executor"} & {
@@ -241,7 +241,7 @@ def _of_with(problem: Problem, settings: Sequence[str]) -> Problem:
 
 def load_reference(reference: str | None, select: options.Select) -> Path | Pipeline | None:
     """Return the reference: a picture's path, or a pipeline with the same scene, without the variants' settings."""
-    from rendergraph.session.made import is_picture
+    from rendergraph.session.picture_metadata import is_picture
 
     if reference is None:
         return None

@@ -29,7 +29,7 @@ def command(selection: Selection, as_json: bool) -> None:
       rendergraph config forward.png
     """
     from rendergraph.session import Selection, stages
-    from rendergraph.session.made import is_picture
+    from rendergraph.session.picture_metadata import is_picture
 
     if is_picture(selection.source) and selection == Selection(selection.source):
         _of_picture(Path(selection.source), as_json)
@@ -44,7 +44,7 @@ def command(selection: Selection, as_json: bool) -> None:
 
 
 def _of_picture(path: Path, as_json: bool) -> None:
-    from rendergraph.session.made import metadata
+    from rendergraph.session.picture_metadata import metadata
 
     found = metadata(path)
     if as_json:

@@ -144,7 +144,7 @@ def _read(
     """Do everything that needs no GL device: return the expanded pipeline, and the output files by their names."""
     from rendergraph import images
     from rendergraph.session import stages
-    from rendergraph.session.wanted import every_port, figures
+    from rendergraph.session.outputs import every_port, figures
 
     with track_reads() as files:
         linked = stages.link(stages.resolve(selection))
@@ -172,7 +172,7 @@ def _read(
 
 def _default(source: str, ending: str) -> Path:
     """The file without -o; a picture that is rendered again is not overwritten."""
-    from rendergraph.session.made import is_picture
+    from rendergraph.session.picture_metadata import is_picture
 
     if is_picture(source):
         kind = ".exr" if source.lower().endswith(".exr") else ".png"
@@ -271,7 +271,7 @@ def _check(targets: Sequence[Target], expanded: Expanded, files: Iterable[Path])
     from rendergraph.installed import require
 
     linked, numbers = expanded.linked, expanded.options.frames
-    for name, port in expanded.wanted.items():
+    for name, port in expanded.requests.items():
         if linked.graph.textures[port.end].desc is None:
             text = f"'{name}' is a buffer, which no picture file holds; from Python it is frame['{name}']"
             raise InputError(Problem("RG508", text))

@@ -30,12 +30,7 @@ __all__ = [
     "sweep",
 ]
 
-
-def __dir__() -> list[str]:
-    return __all__
-
-
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "engine": ("Sweep", "compare", "compare_pictures", "sweep"),

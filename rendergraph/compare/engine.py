@@ -25,8 +25,8 @@ from rendergraph.diff import diff
 from rendergraph.errors import InputError, Problem, UsageError
 from rendergraph.farm.bundle import make_bundle
 from rendergraph.metrics import check_sizes
-from rendergraph.session.pipeline import Pipeline, load, loaded
-from rendergraph.session.progress import shown
+from rendergraph.session.pipeline import Pipeline, as_pipeline, load
+from rendergraph.session.progress import report_progress
 from rendergraph.stamps import track_reads
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def compare(
         pipelines = [pipelines]
     if not pipelines:
         raise UsageError(Problem("RG500", "there is no pipeline to compare"))
-    given, reference = [loaded(each) for each in pipelines], named_reference(reference)
+    given, reference = [as_pipeline(each) for each in pipelines], named_reference(reference)
     catalogs = [each.catalog for each in (*given, reference) if isinstance(each, Pipeline)]
     with track_reads() as files:
         if isinstance(reference, Pipeline):
@@ -123,7 +123,10 @@ def compare(
         prepared = prepare_variants([measured_at(each, options.metric) for each in given], reference, options, names)
     runner = Runner(prepared, options)
     travels = all(catalog is None for catalog in catalogs)
-    with options.open_executor(len(given), travels=travels) as farm, shown(options.progress, "steps") as report:
+    with (
+        options.open_executor(len(given), travels=travels) as farm,
+        report_progress(options.progress, "steps") as report,
+    ):
         farm.upload_inputs(lambda: make_bundle(files, given[0].selection.plugins, prepared.modules))
         runner.execute(farm, report)
     runs = [*prepared.runs, *([prepared.other] if prepared.other else [])]
@@ -161,7 +164,7 @@ def sweep(
         DeviceError: there is no usable GL device.
     """
     options = options.replace(**settings)
-    base, out, reference = loaded(base), Path(out), named_reference(reference)
+    base, out, reference = as_pipeline(base), Path(out), named_reference(reference)
     with track_reads() as files:
         prepared = prepare(base, axes, out, reference, options)
     runs = prepared.runs
@@ -174,7 +177,7 @@ def sweep(
         if missing or prepared.other:
             with (
                 options.open_executor(-(-len(missing) // MOST_RUNS), travels=base.catalog is None) as farm,
-                shown(options.progress, "runs") as report,
+                report_progress(options.progress, "runs") as report,
             ):
                 farm.upload_inputs(lambda: make_bundle(files, base.selection.plugins, prepared.modules))
                 folder.begin(prepared.study)

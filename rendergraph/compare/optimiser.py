@@ -20,8 +20,8 @@ from rendergraph.compare.results import OBJECTIVES, Result, Search, objective_va
 from rendergraph.compare.space import Axes, Axis, Space, typed
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.installed import require
-from rendergraph.session.progress import shown
-from rendergraph.session.wanted import figures
+from rendergraph.session.outputs import figures
+from rendergraph.session.progress import report_progress
 
 if TYPE_CHECKING:
     from rendergraph.session import Pipeline
@@ -147,7 +147,10 @@ def search(
     optimiser = _Optimiser(space, objectives, options.seed)
     parts: list[Sweep] = []
     # A batch is one task: this process renders it, unless an executor was named. It stays open between batches.
-    with options.open_executor(1, travels=base.catalog is None) as farm, shown(options.progress, "runs") as report:
+    with (
+        options.open_executor(1, travels=base.catalog is None) as farm,
+        report_progress(options.progress, "runs") as report,
+    ):
 
         def render(runs: Sequence[Mapping[str, str]], *, resume: bool) -> Sweep:
             before = len(optimiser.asked)

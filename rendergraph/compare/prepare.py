@@ -19,7 +19,7 @@ from rendergraph.compare.results import Pixels, Reference
 from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_names
 from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.metrics import Encoding, check_sizes
-from rendergraph.session.made import at_time, described, is_picture
+from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
 from rendergraph.session.pipeline import Pipeline, load
 from rendergraph.textures import FORMATS
 
@@ -132,7 +132,7 @@ class Run:
     @property
     def metadata(self) -> dict[str, str]:
         """The metadata of its picture."""
-        return {**described(self.planned.linked), **at_time(self.frame, 30.0)}
+        return {**pipeline_metadata(self.planned.linked), **frame_metadata(self.frame, 30.0)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ __all__ = [
     "table_of",
 ]
 
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "assets": ("describe_pipeline", "describe_scene", "kind_of"),

@@ -1,7 +1,4 @@
-"""The Python API: load, set, render; and `stages`, the way that every verb goes.
-
-Everything is looked up on first use: `check` and `plan` work without GL, and `--help` needs none of it.
-"""
+"""The Python API: load, set, render; and `stages`, which every verb goes through. All is imported on first use."""
 
 from __future__ import annotations
 
@@ -17,12 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Frame", "OutputInfo", "Pipeline", "RenderOptions", "Selection", "Session", "load"]
 
-
-def __dir__() -> list[str]:
-    return __all__
-
-
-__getattr__ = lazy_exports(
+__getattr__, __dir__ = lazy_exports(
     __name__,
     {
         "frame": ("Frame", "OutputInfo"),

@@ -1,4 +1,4 @@
-"""A compiled pipeline with its scene and camera: draws frames, and reads them back."""
+"""A compiled pipeline with its scene and camera: renders frames, and reads them back."""
 
 from __future__ import annotations
 
@@ -18,24 +18,20 @@ from rendergraph.scene.cameras import view_matrices
 from rendergraph.scene.model import Camera
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.made import at_time, described
-from rendergraph.session.values import Expanded, Wanted
+from rendergraph.session.picture_metadata import frame_metadata, pipeline_metadata
+from rendergraph.session.values import Expanded, OutputRequest
 from rendergraph.textures import FORMATS, Semantic, TextureDesc
 from rendergraph.version import __version__
 
 
 class Drawing(Struct, eq=False, dict=True):
-    """What `stages.compile` makes; to be used inside `with gpu.current()`, until something else is drawn there.
+    """The result of `stages.compile`, to be used inside `with gpu.current()` until something else is rendered there.
 
     Attributes:
-        expanded: what is drawn.
-        executable: compiled.
-        scene: its scene on the GPU.
-        gpu: where.
-        runner: the bare frame, without scene and camera at its time and without what is read back.
-        times: what the frames since `begin` took.
-        number: of the frame that was drawn last.
-        camera: what that was seen with, None before there is one.
+        runner: renders the bare frame, without scene and camera at its time and without reading back.
+        times: of the frames since `begin`.
+        number: of the last rendered frame.
+        camera: of the last rendered frame.
     """
 
     expanded: Expanded
@@ -52,33 +48,28 @@ class Drawing(Struct, eq=False, dict=True):
         history = any(r.role == "history" for r in self.executable.plan.resources.values())
         self._remembers = history or self.executable.looks_back
 
-    def begin(self) -> None:
-        """Warm up where that is asked for, and start history afresh."""
+    def begin(self, lead: int | None = None) -> None:
+        """Warm up if the options say so, and clear the history."""
         options = self.expanded.options
         if options.warms_up:
             self._draw(options.frames[0])
             self.gpu.device.ctx.finish()
-            self.executable.reuse.forget()  # what is measured is done
+            self.executable.reuse.forget()  # every measured step must run
         self.runner.reset()
-        self.times, self.number = [], 0
-
-    def begin_at(self, number: int) -> None:
-        """Leave out the frames before this one, as though nothing had been remembered of them."""
-        self.number = max(0, number - 1)
+        self.times, self.number = [], 0 if lead is None else max(0, options.frames[0] - lead - 1)
 
     def draw(self, number: int, camera: Camera | None = None) -> None:
-        """Draw a frame, with the scene as it is at its time.
+        """Render a frame, with the scene as it is at its time.
 
-        Where something is remembered from frame to frame, those before that have not been drawn are drawn first: a
-        frame is the same whichever others are looked at. With a camera of the caller's, which those before may not have
-        had, it goes on from what was drawn last.
+        If frames depend on earlier ones, missing earlier frames are rendered first, so that a frame does not depend on
+        which others are requested. With a camera of the caller's, rendering continues from the last frame instead.
 
         Args:
             number: of the frame.
-            camera: what it is seen with; by default what was selected, as it is at that time.
+            camera: by default the selected one, as it is at that time.
 
         Raises:
-            RenderError: the driver reported an error, a node's `update` failed, or something else was drawn meanwhile.
+            RenderError: the driver reported an error, an `update` failed, or something else was rendered meanwhile.
         """
         if self.gpu.cache.drawing is not self:
             text = "the session has begun to draw something else; take all frames of one drawing before the next"
@@ -102,7 +93,7 @@ class Drawing(Struct, eq=False, dict=True):
             scene = animate.at(scene, time)
             self.scene.update(scene)
         if not self.runner.drawn:
-            self.scene.advance()  # nothing has moved before the first frame
+            self.scene.advance()  # the first frame has no motion
         self.camera = camera or scene.cameras[linked.selection.camera or next(iter(scene.cameras))]
         view = view_matrices(self.camera, linked.graph.size)
         begun = perf_counter()
@@ -113,12 +104,12 @@ class Drawing(Struct, eq=False, dict=True):
         return FrameTimes((perf_counter() - begun) * 1e3, (), self.runner.ran)
 
     def read(self) -> Frame:
-        """What was wanted of the frame that was drawn last."""
+        """Read back the requested outputs of the last frame."""
         linked, plan = self.expanded.linked, self.executable.plan
         graph = linked.graph
         resources = plan.schedule.wanted
         infos = {}
-        for name, port in self.expanded.wanted.items():
+        for name, port in self.expanded.requests.items():
             infos[name] = _output_info(
                 name, port, graph.textures[port.end].semantic, plan.resources[resources[name]].desc
             )
@@ -128,29 +119,29 @@ class Drawing(Struct, eq=False, dict=True):
             size=graph.size,
             arrays={
                 name: self.runner.read(resources[name], mip=port.mip or 0, layer=port.layer, stencil=port.stencil)
-                for name, port in self.expanded.wanted.items()
+                for name, port in self.expanded.requests.items()
             },
             infos=infos,
             device=self.gpu.device.as_json(),
             types={node: graph[node].type.name for node in self._drawn},
             memory=plan.memory.as_json(),
             culled=dict(plan.schedule.culled),
-            metadata={**self._metadata, **at_time(self.number, self.expanded.options.fps)},
+            metadata={**self._metadata, **frame_metadata(self.number, self.expanded.options.fps)},
             times=tuple(self.times),
             warnings=(*dict.fromkeys(self.gpu.cache.image_warnings), *self._alone()),
         )
 
     def _alone(self) -> Iterator[Problem]:
-        """What is to be said of one frame where a node puts many together."""
+        """Yield a warning if a single frame is rendered of a pipeline that accumulates frames."""
         node = self.runner.jittering
         if node is not None and self.expanded.options.frames == range(1, 2):
-            text = f"'{node}' puts pictures of many frames together, and this is the first of them"
+            text = f"'{node}' accumulates over frames, but only frame 1 was rendered"
             text += "; --frames 16-16 shows more"
             yield Problem("RG620", text, Place(self.expanded.linked.graph.name), severity="warning")
 
     @cached_property
     def _drawn(self) -> tuple[str, ...]:
-        """The nodes that draw, or compute something for those that do, in order."""
+        """The nodes that render, or compute something for those that do, in order."""
         drawing = dict.fromkeys(step.node for step in self.executable.plan.schedule.steps)
         return (*(node for node in self.runner.updating if node not in drawing), *drawing)
 
@@ -159,13 +150,13 @@ class Drawing(Struct, eq=False, dict=True):
         found = {"rendergraph": __version__} | versions(("moderngl", "numpy", "OpenImageIO"))
         device = self.gpu.device
         return {
-            **described(self.expanded.linked),
+            **pipeline_metadata(self.expanded.linked),
             "rendergraph:versions": ", ".join(f"{name} {version}" for name, version in found.items()),
             "rendergraph:device": f"{device.renderer}, OpenGL {device.as_json()['version']}",
         }
 
 
-def _output_info(name: str, port: Wanted, semantic: Semantic, desc: object) -> OutputInfo:
+def _output_info(name: str, port: OutputRequest, semantic: Semantic, desc: object) -> OutputInfo:
     if not isinstance(desc, TextureDesc):
         return OutputInfo(name, str(port.end), semantic.name, "bytes", "buffer", None, ())
     meaning, format, encoding = semantic.name, desc.format, semantic.encoding

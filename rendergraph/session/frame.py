@@ -1,4 +1,4 @@
-"""A rendered frame: arrays by output name, times, memory, and what a picture's metadata says."""
+"""A rendered frame: arrays by output name, times, memory, and the metadata of its pictures."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 
 class OutputInfo(Struct, frozen=True):
-    """What an array's texels are.
+    """The meaning of an array's texels.
 
     Attributes:
         name: the output's name, or the tap: `node.port`, with its part.
         port: `node.port`.
-        semantic: the semantic's name, `stencil` where that was tapped.
+        semantic: the semantic's name; `stencil` if that was tapped.
         format: the texture format.
         kind: `texture2d`, `texture2d_array`, `texture_cube` or `buffer`.
         encoding: `linear`, `display` or None.
-        channels: channel names as an EXR has them.
+        channels: channel names, as in an EXR file.
     """
 
     name: str
@@ -40,11 +40,11 @@ class OutputInfo(Struct, frozen=True):
 
 
 def not_finite(pixels: npt.NDArray[Any], semantic: str) -> int:
-    """How many pixels hold NaN or infinity; a depth may be infinite, where nothing is.
+    """Return the number of pixels that hold NaN or infinity; a depth may be infinite, where there is no surface.
 
     Args:
-        pixels: (…, channels), as it was read back; whole numbers are finite.
-        semantic: what the texels mean.
+        pixels: (…, channels), as read back; whole numbers are finite.
+        semantic: of the texels.
     """
     import numpy as np  # a session is imported without it
 
@@ -54,26 +54,8 @@ def not_finite(pixels: npt.NDArray[Any], semantic: str) -> int:
     return 0 if sound.all() else int((~sound).any(axis=-1).sum())
 
 
-def not_finite_warning(drawn: str, name: str, port: str, pixels: npt.NDArray[Any], semantic: str) -> Problem | None:
-    """What is to be said of a picture that holds NaN or infinity, None of others.
-
-    Args:
-        drawn: the pipeline's name, or the variant's.
-        name: the output's.
-        port: the node and port it shows.
-        pixels, semantic: as `not_finite` takes them.
-    """
-    count = not_finite(pixels, semantic)
-    if not count:
-        return None
-    shown = f"'{name}'" + (f" ({port})" if port != name else "")
-    of = pixels.size // pixels.shape[-1]
-    text = f"{count} of {of} pixels of {shown} are NaN or infinite; run … --tap-all FOLDER shows where they begin"
-    return Problem("RG619", text, Place(drawn), severity="warning")
-
-
 def figures_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, float | list[float]]:
-    """Of a run's outputs those that are one texel, each as a number, or as one a channel."""
+    """Return the outputs of one texel, each as a number, or as a list of its channels."""
     found: dict[str, float | list[float]] = {}
     for name, array in arrays.items():
         if array.shape[:-1] == (1, 1):
@@ -84,22 +66,22 @@ def figures_of(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, float | list
 
 @dataclass(frozen=True, eq=False)
 class Frame(Mapping[str, npt.NDArray[Any]]):
-    """What was drawn; `frame["image"]` is an array with the top row first.
+    """A rendered frame; `frame["image"]` is an array with the top row first.
 
-    Arrays are (height, width, channels), with layers before where a texture has them: uint8 for 8-bit formats,
+    Arrays are (height, width, channels), preceded by layers if the texture has several: uint8 for 8-bit formats,
     float32 for all other colours and depth, 32-bit integers for integer formats.
 
     Attributes:
         number: frame number, from 1.
         pipeline: the pipeline's name.
         size: width and height.
-        device: what drew it.
-        types: the nodes that draw and their types, in order.
+        device: the GL device.
+        types: the rendering nodes and their types, in order.
         memory: the plan's figures.
         culled: node to the reason why it did not run.
-        metadata: what goes into a picture file.
-        times: what each frame so far took, step by step where that was measured.
-        warnings: what was replaced in the scene's images.
+        metadata: of its picture files.
+        times: of each frame so far, step by step if steps were timed.
+        warnings: about images of the scene.
     """
 
     number: int
@@ -131,17 +113,17 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         return len(self.arrays)
 
     def info(self, name: str) -> OutputInfo:
-        """What an output's texels are."""
+        """Return the meaning of an output's texels."""
         return self.infos[name]
 
     @property
     def figures(self) -> Mapping[str, float | list[float]]:
-        """The outputs that are one texel, each as a number, or as one a channel."""
+        """The outputs of one texel, each as a number, or as a list of its channels."""
         return figures_of(self.arrays)
 
     @cached_property
     def passes(self) -> tuple[Mapping[str, object], ...]:
-        """Per executed pass `node`, `type`, `gpu_ms`, `cpu_ms`, in order; without times where none were measured."""
+        """Each executed pass, in order: `node`, `type`, `gpu_ms`, `cpu_ms`; the times may be None."""
         from rendergraph.execute import median_times
 
         medians = {time.node: time for time in median_times(self.times)}
@@ -157,26 +139,25 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
 
     @cached_property
     def frame_ms(self) -> Mapping[str, float]:
-        """Median, least and most over the frames so far."""
+        """Median, minimum and maximum over the frames so far."""
         from rendergraph.execute import summary
 
         return summary([time.frame_ms for time in self.times])
 
     @cached_property
     def unsound(self) -> Mapping[str, Problem]:
-        """Of each output that holds NaN or infinity, what is to be said."""
-        return {
-            name: problem
-            for name, array in self.arrays.items()
-            if (
-                problem := not_finite_warning(
-                    self.pipeline, name, self.infos[name].port, array, self.infos[name].semantic
-                )
-            )
-        }
+        """A warning for each output that holds NaN or infinity."""
+        warnings = {}
+        for name, array in self.arrays.items():
+            if count := not_finite(array, self.infos[name].semantic):
+                port = "" if (port := self.infos[name].port) == name else f" ({port})"
+                text = f"{count} of {array.size // array.shape[-1]} pixels of '{name}'{port} are NaN or infinite"
+                text += "; run … --tap-all FOLDER shows where they begin"
+                warnings[name] = Problem("RG619", text, Place(self.pipeline), severity="warning")
+        return warnings
 
     def as_json(self) -> dict[str, object]:
-        """The fields of `run --json`, without the paths."""
+        """Return the fields of `run --json`, without the paths."""
         return {
             "pipeline": self.pipeline,
             "device": dict(self.device),
@@ -193,7 +174,7 @@ class Frame(Mapping[str, npt.NDArray[Any]]):
         """Write an output; the extension chooses the format and, without a name, the output.
 
         Raises:
-            UsageError: pictures are not written with that extension.
+            UsageError: pictures cannot have that extension.
             InputError: there is no such output, or the folder cannot be written to.
             RenderError: the file cannot be written, or its format cannot hold the texture.
         """

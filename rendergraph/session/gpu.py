@@ -1,4 +1,4 @@
-"""A GL context for one thread, and what stays on it."""
+"""A GL context for one thread, and its caches."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from rendergraph.errors import Problem, RenderError
@@ -20,12 +19,7 @@ if TYPE_CHECKING:
 
 
 class Gpu:
-    """Where pipelines are drawn; `Session` is one that takes them by name.
-
-    Attributes:
-        device: the GL device.
-        cache: programs, the scene and compiled pipelines, kept from one drawing to the next.
-    """
+    """Where pipelines are rendered; its `cache` has programs, the scene and compiled pipelines."""
 
     def __init__(
         self,
@@ -37,12 +31,12 @@ class Gpu:
         """Open a context.
 
         Args:
-            device: EGL device number as `doctor` lists them.
-            ctx: the caller's own current context, borrowed: drawn in whatever its state, given back as it was found.
-            cache: how much is kept; by default what `rendergraph.toml` says in the current project.
+            device: EGL device number, as `doctor` lists it.
+            ctx: the caller's own current context, to borrow; its state is restored after use.
+            cache: limits of the caches; by default those of `rendergraph.toml` in the current project.
 
         Raises:
-            DeviceError: no GL device is usable.
+            DeviceError: there is no usable GL device.
             InputError: the settings file is malformed.
         """
         if cache is None:
@@ -56,17 +50,11 @@ class Gpu:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """Free everything; the context too, unless it was borrowed.
-
-        Raises:
-            RenderError: it is another thread's.
-        """
+        """Free everything, the context too unless it was borrowed; only the thread that created it may do so."""
         if self._closed:
             return
         if os.getpid() != self._process or self.device.gone:  # all of it is the other process's, or gone
@@ -84,25 +72,21 @@ class Gpu:
 
     @contextmanager
     def current(self) -> Iterator[None]:
-        """Where everything is compiled and drawn.
-
-        A context of our own is the thread's current one meanwhile; what was current before is again afterwards. A
-        borrowed one, which its owner makes current, is given back as it was found.
+        """Make the context current, in which everything is compiled and rendered, and restore the previous one.
 
         Raises:
-            RenderError: it is closed, another thread's or process's, or its borrowed context has been released.
+            RenderError: it is closed, belongs to another thread or process, or its borrowed context has been released.
         """
+        text = ""
         if self._closed:
-            raise RenderError(
-                Problem("RG615", "the session is closed; draw before its `with` block ends, or make another")
-            )
-        if os.getpid() != self._process:
+            text = "the session is closed; draw before its `with` block ends, or make another"
+        elif os.getpid() != self._process:
             text = "a session stays in its process; fork before OpenGL is used, or start processes anew ('spawn')"
-            raise RenderError(Problem("RG615", text))
-        if threading.get_ident() != self._thread:
-            raise RenderError(Problem("RG615", "a session must be used by the thread that made it; make one a thread"))
-        if self.device.gone:
+        elif threading.get_ident() != self._thread:
+            text = "a session must be used by the thread that made it; make one a thread"
+        elif self.device.gone:
             text = "the session's context has been released; keep it until the session is closed, or make another"
+        if text:
             raise RenderError(Problem("RG615", text))
         with self.device.current():
             yield
@@ -110,7 +94,7 @@ class Gpu:
 
 @contextmanager
 def opened(gpu: Gpu | None, device: int | None) -> Iterator[Gpu]:
-    """The one that is given, or one of our own that ends with the block."""
+    """Yield the given `Gpu`, or one that is closed with the block."""
     if gpu is not None:
         yield gpu
         return

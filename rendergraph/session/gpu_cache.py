@@ -1,4 +1,4 @@
-"""What stays on the GPU from one drawing to the next: programs, a scene, compiled pipelines, values of kept steps."""
+"""The caches of a session on the GPU: programs, a scene, compiled pipelines, values of kept steps."""
 
 from __future__ import annotations
 
@@ -41,16 +41,14 @@ class _Entry(Struct, eq=False):
 
 
 class GpuCache:
-    """What a session keeps within its limits, the least recently used things going first; and one scene.
+    """Everything that a session keeps within its limits, freeing the least recently used things first; and one scene.
 
     Attributes:
-        limits: how much is kept.
-        programs: compiled programs.
-        kept: what kept steps have made.
-        scenes_made: how many scenes have been put on the GPU so far.
-        image_warnings: what was replaced in the images of the scene that is there.
-        active: what was compiled or taken last.
-        drawing: who draws it; whoever drew before comes too late.
+        kept: values that kept steps have computed.
+        scenes_made: number of scenes that have been uploaded so far.
+        image_warnings: about the images of the current scene.
+        active: the last compiled or found executable.
+        drawing: the drawing that may render; all earlier ones are invalid.
     """
 
     def __init__(self, device: Device, limits: CacheLimits) -> None:
@@ -68,15 +66,11 @@ class GpuCache:
 
     @property
     def executables(self) -> list[Executable]:
-        """The compiled pipelines that are kept, the one that was drawn longest ago first."""
+        """The cached executables, the least recently used first."""
         return [entry.executable for entry in self._entries.values()]
 
     def upload(self, linked: Linked) -> GpuScene:
-        """A pipeline's scene on the GPU, in place of another that was there.
-
-        Raises:
-            InputError: the environment that was named cannot be decoded.
-        """
+        """Return a pipeline's scene on the GPU, in place of the previous scene."""
         if self._scene is not None and self._scene[0] is linked.scene:
             return self._scene[1]
         self.clear_scene()
@@ -97,8 +91,8 @@ class GpuCache:
         self._scene = linked.scene, scene
         return scene
 
-    def take(self, expanded: Expanded) -> tuple[Hashable, Executable | None]:
-        """What was compiled of the same before, with the values of these steps, and the key it is kept by."""
+    def find(self, expanded: Expanded) -> tuple[Hashable, Executable | None]:
+        """Return a cached executable with the values of these steps, or None, and the key under which it is cached."""
         key = key_of(expanded)
         entry = self._entries.pop(key, None)
         if entry is None:
@@ -116,13 +110,8 @@ class GpuCache:
         self.kept.restore(executable)
         return key, executable
 
-    def make(self, key: Hashable, planned: Planned, scene: GpuScene) -> Executable:
-        """Compile a plan, and keep it in place of those that were drawn longest ago.
-
-        Raises:
-            InputError: a mistake in a shader.
-            RenderError: the device cannot hold it.
-        """
+    def compile(self, key: Hashable, planned: Planned, scene: GpuScene) -> Executable:
+        """Compile a plan, and cache it in place of those that were used longest ago."""
         self._save()
         linked, needed = planned.linked, planned.plan.memory.allocated_bytes
         types = {node.id: node.type for node in linked.graph.nodes}
@@ -149,7 +138,7 @@ class GpuCache:
         self.programs.release()
 
     def clear_scene(self) -> None:
-        """Free the scene and all that was compiled for it."""
+        """Free the scene and everything that was compiled for it."""
         self._save()
         for executable in self.executables:
             executable.release()
@@ -160,7 +149,7 @@ class GpuCache:
             scene[1].release(self.programs)
 
     def _make_room(self, needed: int) -> None:
-        """Free the executables that were drawn longest ago, until one more of `needed` bytes may be kept."""
+        """Free executables, until one more of `needed` bytes can be cached."""
         while self._entries and (
             len(self._entries) >= _MOST_EXECUTABLES
             or needed + sum(entry.bytes for entry in self._entries.values()) > self.limits.bytes
@@ -168,13 +157,13 @@ class GpuCache:
             self._entries.pop(next(iter(self._entries))).executable.release()
 
     def _save(self) -> None:
-        """Copy the kept values of what was drawn last, before they are lost or something else is drawn."""
+        """Copy the kept values of the active executable, before they are lost or something else is rendered."""
         if self.active is not None:
             self.kept.save(self.active)
 
 
 def key_of(expanded: Expanded) -> Hashable:
-    """What decides that a compiled pipeline can be drawn in place of another: all but the values of uniforms."""
+    """Return what decides that an executable can be used for these steps: everything but the values of uniforms."""
     linked, options = expanded.linked, expanded.options
     sources = tuple(
         (node.id, node.type.shaders, node.type.inherited, _declaration(node.type.cls)) for node in linked.graph.nodes
@@ -184,13 +173,13 @@ def key_of(expanded: Expanded) -> Hashable:
 
 
 def _declaration(cls: type[Node]) -> tuple[Any, ...]:
-    """What program text takes from a class beside the steps it recorded: a module that is imported anew may differ."""
+    """Return what program text takes from a class besides the recorded steps; a reloaded module may differ in it."""
     words = ("kind", "semantic", "signature")
     return tuple((name, type(p), *(getattr(p, word, None) for word in words)) for name, p in cls.ports().items())
 
 
 def _structure(expansion: Expansion) -> tuple[Any, ...]:
-    """An expansion without the values that can change in a compiled pipeline."""
+    """Return an expansion without the values that can change in an executable."""
     steps = tuple(
         replace(
             step,

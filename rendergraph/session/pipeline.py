@@ -1,4 +1,4 @@
-"""A pipeline as Python has it: load, set, render."""
+"""A pipeline in Python: load, set, render."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 from msgspec import structs
 
 from rendergraph.session import stages
-from rendergraph.session.progress import shown
+from rendergraph.session.progress import report_progress
 from rendergraph.session.selection import RenderKeywords, RenderOptions, Selection, each_of
 
 if TYPE_CHECKING:
@@ -39,12 +39,12 @@ def load(
     limits: Mapping[str, int] | None = None,
     plugins: Sequence[str | Path] = (),
 ) -> Pipeline:
-    """A pipeline by shipped name or file; nothing is read until it is asked for.
+    """Return a pipeline by shipped name or file; it is read when it is first needed.
 
-    The arguments are the fields of a `Selection`.
+    The arguments are the fields of `Selection`.
 
     Raises:
-        UsageError: a limit of an unknown name, or a size that is no pair of whole numbers.
+        UsageError: an unknown limit, or a size that is not a pair of whole numbers.
     """
     return Pipeline(
         Selection(
@@ -62,13 +62,13 @@ def load(
     )
 
 
-def loaded(pipeline: Pipeline | str | Path) -> Pipeline:
-    """A pipeline, or the one of a name or a file."""
+def as_pipeline(pipeline: Pipeline | str | Path) -> Pipeline:
+    """Return the pipeline, or the one with that name or file."""
     return pipeline if isinstance(pipeline, Pipeline) else load(pipeline)
 
 
 def _once(stage: Callable[[Pipeline], T]) -> Callable[[Pipeline], T]:
-    """A stage that is gone through once for each pipeline, and kept with it."""
+    """Cache the result of a stage with the pipeline."""
 
     @wraps(stage)
     def kept(self: Pipeline) -> T:
@@ -82,11 +82,13 @@ def _once(stage: Callable[[Pipeline], T]) -> Callable[[Pipeline], T]:
 
 @dataclass(frozen=True, eq=False)
 class Pipeline:
-    """A selection, and what has been found out about it; `set` and the like return changed copies.
+    """A selection with the results of its stages; `set` and the like return changed copies.
+
+    Each stage runs once. It raises an `InputError` with all mistakes that it finds.
 
     Attributes:
-        selection: what is asked for.
-        catalog: the node types that can be used; by default those that are installed and those of plugins.
+        selection: the file, and the changes to it.
+        catalog: the available node types; by default the installed ones and those of plugins.
     """
 
     selection: Selection
@@ -101,70 +103,50 @@ class Pipeline:
     # Changing --------------------------------------------------------------------------------------------------------
 
     def set(self, path: str, value: object) -> Pipeline:
-        """The same with one value changed, `ao.radius` or a pipeline parameter's name, as `-s` does."""
+        """Return a copy with one value changed, `ao.radius` or a pipeline parameter's name, as with `-s`."""
         text = value if isinstance(value, str) else json.dumps(value, default=lambda found: found.tolist())  # NumPy's
         return self.select(sets=(*self.selection.sets, f"{path}={text}"))
 
     def patch(self, patch: str | Path | Mapping[str, Any]) -> Pipeline:
-        """The same with a merge patch applied (RFC 7386)."""
+        """Return a copy with a merge patch applied (RFC 7386)."""
         return self.select(patches=(*self.selection.patches, Path(patch) if isinstance(patch, str) else patch))
 
     def with_scene(self, scene: str | Path) -> Pipeline:
-        """The same of another scene."""
+        """Return a copy with another scene."""
         return self.select(scene=str(scene))
 
     def with_size(self, size: tuple[int, int]) -> Pipeline:
-        """The same at another size."""
+        """Return a copy with another size."""
         return self if self.selection.size == size else self.select(size=size)
 
     def select(self, **fields: Any) -> Pipeline:
-        """The same with other values of these fields of its selection."""
+        """Return a copy with other values of these fields of its selection."""
         return replace(self, selection=structs.replace(self.selection, **fields))
 
     # Stages ----------------------------------------------------------------------------------------------------------
 
     @_once
     def resolve(self) -> Resolved:
-        """The file with everything applied; done once.
-
-        Raises:
-            InputError: a file is missing or is no YAML.
-        """
+        """Return the file with everything applied."""
         return stages.resolve(self.selection, self.catalog)
 
     @_once
     def link(self) -> Linked:
-        """The checked graph with its scene; done once.
-
-        Raises:
-            InputError: with all mistakes of the file.
-        """
+        """Return the checked graph with its scene."""
         return stages.link(self.resolve())
 
     @_once
     def check(self) -> Planned:
-        """Everything that can be wrong and be found without GL, for all of the file's outputs; done once.
-
-        Raises:
-            InputError: with all mistakes found.
-        """
+        """Find every mistake that can be found without GL, and return the plan of all outputs."""
         return stages.check(self.link())
 
     def expand(self, **options: Unpack[RenderKeywords]) -> Expanded:
-        """All steps with what they read and write; the keywords are the fields of `RenderOptions`.
-
-        Raises:
-            InputError: a mistake in the file, or an output or port that it does not have.
-        """
+        """Return all steps with what they read and write; the keywords are the fields of `RenderOptions`."""
         linked = self.link()
         return stages.expand(linked, RenderOptions.of({"frames": linked.frames, "fps": linked.fps, **options}))
 
     def plan(self, **options: Unpack[RenderKeywords]) -> ResourcePlan:
-        """Order and memory, without GL; the keywords are the fields of `RenderOptions`.
-
-        Raises:
-            InputError: a mistake in the file, or the steps have no legal order.
-        """
+        """Return order and memory, without GL; the keywords are the fields of `RenderOptions`."""
         return stages.plan(self.expand(**options)).plan
 
     # Drawing ---------------------------------------------------------------------------------------------------------
@@ -178,24 +160,24 @@ class Pipeline:
         progress: Progress | bool | None = None,
         **options: Unpack[RenderKeywords],
     ) -> Frame:
-        """Draw it and return the last frame.
+        """Render the pipeline and return the last frame.
 
         Args:
-            size: width and height in pixels, the file's by default.
-            session: where to draw; a private one for this call by default.
-            device: GL device number, where no session is given.
-            progress: told how many frames are drawn, and of how many; True shows a bar on stderr.
+            size: width and height in pixels; the file's by default.
+            session: where to render; a private session by default.
+            device: GL device number where no session is given.
+            progress: a function that receives how many frames are done, and of how many; True shows a bar on stderr.
             options: the fields of `RenderOptions`.
 
         Raises:
             InputError: a mistake in a file or a shader.
-            RenderError: it failed while drawing.
+            RenderError: rendering failed.
             DeviceError: there is no usable GL device.
         """
         from rendergraph.session.gpu import opened
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)
-        with opened(session, device) as gpu, shown(progress, "frames") as tell:
+        with opened(session, device) as gpu, report_progress(progress, "frames") as tell:
             return stages.draw_last(expanded, gpu, tell)
 
     def frames(
@@ -206,7 +188,7 @@ class Pipeline:
         device: int | None = None,
         **options: Unpack[RenderKeywords],
     ) -> Iterator[Frame]:
-        """Draw it frame by frame; as `render`, and each frame is there before the next one is drawn."""
+        """Render frame by frame, as `render`; each frame is yielded before the next one is rendered."""
         from rendergraph.session.gpu import opened
 
         expanded = (self if size is None else self.with_size(size)).expand(**options)

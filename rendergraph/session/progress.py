@@ -1,4 +1,4 @@
-"""How far long work is: told to a function, or shown as a bar on stderr where that was asked for."""
+"""Progress of long work: calls of a function, or a bar on stderr."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _WIDTH = 30
 
 
 @contextmanager
-def shown(progress: Progress | bool | None, word: str) -> Iterator[Progress]:
-    """What to tell: the function that was given, a bar where that is `True`, else nobody.
+def report_progress(progress: Progress | bool | None, word: str) -> Iterator[Progress]:
+    """Yield the function to call: the one that was given, one that shows a bar for `True`, else one that does nothing.
 
     Args:
-        progress: what a caller asked for.
-        word: what is counted, behind the numbers: `frames`.
+        progress: as the caller passed it.
+        word: the unit of the numbers: `frames`.
     """
     if not isinstance(progress, bool):
-        yield progress or _nobody
+        yield progress or _ignore
         return
     if not progress or sys.stderr is None:
-        yield _nobody
+        yield _ignore
         return
     longest, begun, before = 0, time.monotonic(), 0
 
@@ -50,13 +50,13 @@ def shown(progress: Progress | bool | None, word: str) -> Iterator[Progress]:
 
 
 def _pace(done: int, left: int, seconds: float) -> str:
-    """How fast it goes, and the time that is left, once that can be told."""
+    """Return the speed and the remaining time, once they can be estimated."""
     if done < 1 or seconds < 1 or not left:
         return ""
     wait = left * seconds / done
-    told = f"{wait:.0f} s" if wait < 120 else f"{wait / 60:.0f} min" if wait < 7200 else f"{wait / 3600:.1f} h"
-    return f", {done / seconds:.3g} a second, {told} left"
+    time_left = f"{wait:.0f} s" if wait < 120 else f"{wait / 60:.0f} min" if wait < 7200 else f"{wait / 3600:.1f} h"
+    return f", {done / seconds:.3g} a second, {time_left} left"
 
 
-def _nobody(done: int, total: int) -> None:
+def _ignore(done: int, total: int) -> None:
     pass

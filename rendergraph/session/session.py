@@ -1,4 +1,4 @@
-"""A session draws pipelines, names and files on one GL context."""
+"""A session renders pipelines, by value, name or file, on one GL context."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
 from rendergraph.session.frame import Frame
 from rendergraph.session.gpu import Gpu
-from rendergraph.session.pipeline import Pipeline, loaded
+from rendergraph.session.pipeline import Pipeline, as_pipeline
 from rendergraph.session.progress import Progress
 from rendergraph.session.selection import RenderKeywords
 
 
 class Session(Gpu):
-    """Draws pipelines on one GL context, and keeps on it what the next one can use.
+    """Renders pipelines on one GL context, and caches on it what the next one can use.
 
-    Programs live as long as the session, keyed by source and macros; a scene stays on the GPU until another pipeline
-    asks for a different one; compiled pipelines and their textures are kept for the last few that were drawn, so that
-    variants can be drawn in turns. A changed shader or include is noticed, and only the programs whose text it changes
-    are compiled anew. A session is bound to the thread that made it.
+    Programs are cached by source and macros; a scene stays on the GPU until another pipeline needs a different one; the
+    last few compiled pipelines are kept with their textures, so that variants can take turns. When a shader or include
+    changes, only the programs whose text it changes are compiled again. A session is bound to the thread that created
+    it.
     """
 
     def render(
@@ -32,8 +32,8 @@ class Session(Gpu):
         progress: Progress | bool | None = None,
         **options: Unpack[RenderKeywords],
     ) -> Frame:
-        """Draw a pipeline, or the one of a name or a file, and return the last frame; see `Pipeline.render`."""
-        return loaded(pipeline).render(size, session=self, progress=progress, **options)
+        """Render a pipeline and return the last frame; see `Pipeline.render`."""
+        return as_pipeline(pipeline).render(size, session=self, progress=progress, **options)
 
     def frames(
         self,
@@ -41,13 +41,13 @@ class Session(Gpu):
         size: tuple[int, int] | None = None,
         **options: Unpack[RenderKeywords],
     ) -> Iterator[Frame]:
-        """Draw a pipeline, or the one of a name or a file, frame by frame; see `Pipeline.frames`."""
-        return loaded(pipeline).frames(size, session=self, **options)
+        """Render a pipeline frame by frame; see `Pipeline.frames`."""
+        return as_pipeline(pipeline).frames(size, session=self, **options)
 
     def compile(self, pipeline: Pipeline | str | Path, **options: Unpack[RenderKeywords]) -> Drawing:
-        """Compile a pipeline without drawing it; one that is kept is taken again where only uniforms differ.
+        """Compile a pipeline without rendering it; a cached executable is used again if only uniforms differ.
 
-        To be called, and what it returns used, inside `with session.current()`. Its `runner` draws the bare frame: what
-        `render` does before and after (warming up, reading back) is the caller's.
+        Call it, and use the result, inside `with session.current()`. Its `runner` renders the bare frame, without the
+        warm-up and the read-back of `render`.
         """
-        return stages.compile(loaded(pipeline).expand(**options), self)
+        return stages.compile(as_pipeline(pipeline).expand(**options), self)

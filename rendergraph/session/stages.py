@@ -1,9 +1,11 @@
-"""The way from what is asked for to pictures: each stage once, in this order.
+"""The stages from a selection to pictures, each called once, in this order.
 
     Selection ──resolve──▶ Resolved ──link──▶ Linked ──expand──▶ Expanded ──plan──▶ Planned ──draw──▶ Frames
 
-Every verb, Python's `render` and all comparisons go this way, and stop where they have enough. Nothing here is kept but
-scenes in use (`scenes`) and, from `draw` on, what a `Gpu` keeps. GL is imported when something is drawn.
+Every verb, Python's `render` and all comparisons use them, and stop at the stage that they need. Each raises an
+`InputError` with all mistakes that it finds, and from `compile` on a `RenderError` if the device or the driver fails.
+Nothing is cached here but scenes in use (`scenes`) and, from `compile` on, what a `Gpu` caches. GL is imported when
+something is rendered.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 import rendergraph.allocate
 import rendergraph.expand
@@ -25,11 +27,11 @@ from rendergraph.errors import InputError, Option, Place, Problem
 from rendergraph.scene.animate import complete
 from rendergraph.scene.facts import environment_facts, light_facts, object_facts
 from rendergraph.scene.model import Scene
-from rendergraph.session.made import Made, is_picture, made
+from rendergraph.session.outputs import requested_outputs
+from rendergraph.session.picture_metadata import PictureMetadata, is_picture, read_picture_metadata
 from rendergraph.session.scenes import scene_of
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned, Resolved
-from rendergraph.session.wanted import wanted_ports
 from rendergraph.settings import Roots
 
 if TYPE_CHECKING:
@@ -40,14 +42,13 @@ if TYPE_CHECKING:
 
 
 def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
-    """Read the file and all it refers to, and apply what was said about it; of a picture, the file it was made with.
+    """Read the file and everything it refers to, and apply the selection; of a picture, the pipeline in its metadata.
+
+    Only a file that is missing, not YAML, or extends itself is an error here; `link` reports all other mistakes.
 
     Args:
-        selection: what was asked for.
-        catalog: the node types that can be used; by default those that are installed and those of plugins.
-
-    Raises:
-        InputError: a file is missing, is no YAML, or leads back to itself. What else is wrong `link` raises.
+        selection: the pipeline, and the changes to it.
+        catalog: the available node types; by default the installed ones and those of plugins.
     """
     for folder in selection.asset_roots:
         if not folder.is_dir():
@@ -60,7 +61,7 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     source: str | Document = selection.source
     frames, fps = range(1, 2), 30.0
     if is_picture(selection.source):
-        picture = made(Path(selection.source), limits)
+        picture = read_picture_metadata(Path(selection.source), limits)
         source, frames, fps = picture.document, range(picture.frame, picture.frame + 1), picture.fps
         selection = replace(
             selection,
@@ -84,8 +85,8 @@ def resolve(selection: Selection, catalog: Catalog | None = None) -> Resolved:
     return Resolved(selection=selection, catalog=catalog, spec=spec, frames=frames, fps=fps)
 
 
-def _environment(selection: Selection, picture: Made) -> Path | None:
-    """The environment that a picture names: whoever draws it again has not typed that."""
+def _environment(selection: Selection, picture: PictureMetadata) -> Path | None:
+    """Return the environment that a picture names, which must lie below an asset root: the user has not typed it."""
     path = picture.environment
     if path is not None:
         Roots.of_file(Path("x"), selection.asset_roots).check(path, Place(str(selection.source)))
@@ -93,27 +94,18 @@ def _environment(selection: Selection, picture: Made) -> Path | None:
 
 
 def link(resolved: Resolved) -> Linked:
-    """Read the scene and make the checked graph.
-
-    Raises:
-        InputError: with all mistakes of the file.
-    """
+    """Read the scene and return the checked graph."""
     spec, catalog = resolved.spec, resolved.catalog
     try:
         scene = scene_of(resolved)
     except InputError as error:  # the file's own mistakes may be why, such as a plugin that is not installed
         raise InputError([*spec.problems, *error.problems]) from None
-    around = environment_facts(scene)
-    graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene), around)
-    return resolved.linked(scene, graph)
+    graph = rendergraph.link.link(spec, catalog, light_facts(scene), object_facts(scene), environment_facts(scene))
+    return Linked(**asdict(resolved), scene=scene, graph=graph)
 
 
 def sketch(resolved: Resolved) -> Linked:
-    """The graph to look at, where node types may be missing: they are in it as far as known, and in `missing`.
-
-    Raises:
-        InputError: something else is wrong; with all mistakes of the file.
-    """
+    """Return a graph for display, in which node types may be missing; `missing` has what is known of them."""
     spec, catalog = resolved.spec, resolved.catalog
     try:
         return link(resolved)
@@ -126,38 +118,26 @@ def sketch(resolved: Resolved) -> Linked:
                 raise error from None
             scene, unread = complete(Scene("missing")), lacking.problems
         graph, missing = rendergraph.link.sketch(spec, catalog, light_facts(scene), environment_facts(scene))
-        return resolved.linked(scene, graph, (*missing, *unread))
+        return Linked(**asdict(resolved), scene=scene, graph=graph, missing=(*missing, *unread))
 
 
 def expand(linked: Linked, options: RenderOptions = RenderOptions()) -> Expanded:
-    """Record the steps of everything that is wanted.
-
-    Raises:
-        InputError: an output or port that there is not, or a node recorded what its declaration does not allow.
-    """
-    wanted = wanted_ports(linked.graph, options)
-    ends = {name: port.end for name, port in wanted.items()}
-    return Expanded(linked, options, wanted, rendergraph.expand.expand(linked.graph, ends))
+    """Record the steps of all requested outputs."""
+    requests = requested_outputs(linked.graph, options)
+    ends = {name: port.end for name, port in requests.items()}
+    return Expanded(linked, options, requests, rendergraph.expand.expand(linked.graph, ends))
 
 
 def plan(expanded: Expanded) -> Planned:
-    """Order the steps and give their textures memory.
-
-    Raises:
-        InputError: the steps have no legal order.
-    """
-    linked, options, wanted, expansion = expanded.linked, expanded.options, expanded.wanted, expanded.expansion
+    """Order the steps and assign memory to their textures."""
+    linked, options, requests, expansion = expanded.linked, expanded.options, expanded.requests, expanded.expansion
     schedule = rendergraph.schedule.schedule(expansion, shuffle=options.shuffle)
     allocated = rendergraph.allocate.allocate(schedule, alias=options.alias, heap=options.heap)
-    return Planned(linked, options, wanted, expansion, allocated)
+    return Planned(linked, options, requests, expansion, allocated)
 
 
 def check(linked: Linked) -> Planned:
-    """Find everything that can be wrong before GL is used, for all of the file's outputs.
-
-    Raises:
-        InputError: with all mistakes found.
-    """
+    """Find every mistake that can be found without GL, for all outputs of the file."""
     from rendergraph.program import check_texts
 
     planned = plan(expand(linked))
@@ -167,21 +147,17 @@ def check(linked: Linked) -> Planned:
 
 
 def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
-    """Make everything a frame needs; what the `gpu` has kept is taken again where only uniforms differ.
+    """Compile everything that a frame needs; a cached executable is used again if only uniforms differ.
 
-    To be called inside `with gpu.current()`, where the drawing is used too, before anything else is drawn.
-
-    Raises:
-        InputError: a mistake in a shader, or the steps have no legal order.
-        RenderError: the device cannot hold it.
+    Call it, and use the drawing, inside `with gpu.current()`, before anything else is rendered there.
     """
     from rendergraph.session.drawing import Drawing
 
     scene = gpu.cache.upload(expanded.linked)
-    key, executable = gpu.cache.take(expanded)
+    key, executable = gpu.cache.find(expanded)
     if executable is None:
         planned = expanded if isinstance(expanded, Planned) else plan(expanded)
-        executable = gpu.cache.make(key, planned, scene)
+        executable = gpu.cache.compile(key, planned, scene)
     if executable is not gpu.cache.active:
         executable.take_over()
     drawing = Drawing(expanded, executable, scene, gpu)
@@ -190,25 +166,19 @@ def compile(expanded: Expanded, gpu: Gpu) -> Drawing:
 
 
 def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Frame]:
-    """Draw frame after frame; each is there to look at before the next one is drawn.
+    """Render frame after frame, and yield each before the next one is rendered.
 
-    Between two frames the device is as it was before, so that a borrowed one may be used; nothing else can be drawn
-    with this `gpu` meanwhile.
+    Between two frames the device is in its previous state, so a borrowed one can be used; this `gpu` itself can render
+    nothing else meanwhile.
 
     Args:
-        expanded: what.
-        gpu: where.
-        lead: how many frames are drawn before the first, where something is remembered from frame to frame; all by
-            default.
-
-    Raises:
-        InputError: a mistake in a shader.
-        RenderError: it failed while drawing.
+        expanded: what to render.
+        gpu: where to render.
+        lead: number of frames rendered before the first, if frames depend on earlier ones; all by default.
     """
     with gpu.current():
-        drawing = _begun(expanded, gpu)
-        if lead is not None:
-            drawing.begin_at(expanded.options.frames[0] - lead)
+        drawing = compile(expanded, gpu)
+        drawing.begin(lead)
     for number in expanded.options.frames:
         with gpu.current():
             drawing.draw(number)
@@ -217,22 +187,12 @@ def draw(expanded: Expanded, gpu: Gpu, lead: int | None = None) -> Iterator[Fram
 
 
 def draw_last(expanded: Expanded, gpu: Gpu, progress: Progress | None = None) -> Frame:
-    """Draw all frames, and look at the last one only; `progress` is told of each.
-
-    Raises:
-        InputError: a mistake in a shader.
-        RenderError: it failed while drawing.
-    """
+    """Render all frames and return the last one; `progress` is called after each."""
     with gpu.current():
-        drawing = _begun(expanded, gpu)
+        drawing = compile(expanded, gpu)
+        drawing.begin()
         for done, number in enumerate(expanded.options.frames, start=1):
             drawing.draw(number)
             if progress is not None:
                 progress(done, len(expanded.options.frames))
         return drawing.read()
-
-
-def _begun(expanded: Expanded, gpu: Gpu) -> Drawing:
-    drawing = compile(expanded, gpu)
-    drawing.begin()
-    return drawing

@@ -1,4 +1,4 @@
-"""What the stages before the first use of GL hand on, each with what it was made from."""
+"""The values of the stages before the first use of GL, each with the value it was made from."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from rendergraph.session.selection import RenderOptions, Selection
 
 
-class Wanted(Struct, frozen=True):
-    """A port whose texture must exist at the end of a frame, and what of it is read.
+class OutputRequest(Struct, frozen=True):
+    """A port whose texture must exist at the end of a frame, and the part of it that is read.
 
     Attributes:
         end: the port.
-        layer, mip: the part, None for all layers and for mip 0.
+        layer, mip: the part; None for all layers and for mip 0.
         stencil: read the stencil instead of the depth.
     """
 
@@ -36,7 +36,7 @@ class Wanted(Struct, frozen=True):
     stencil: bool = False
 
     def lacks(self, desc: TextureDesc | None) -> str | None:
-        """What its port has not of the part that is asked for, as the end of a sentence that names the port."""
+        """Return why a texture lacks the requested part, as the end of a sentence that starts with the port."""
         if (self.layer, self.mip, self.stencil) == (None, None, False):
             return None
         if desc is None:
@@ -49,14 +49,7 @@ class Wanted(Struct, frozen=True):
 
 
 class Resolved(Struct, frozen=True, eq=False, kw_only=True):
-    """The file with everything applied.
-
-    Attributes:
-        selection: what was asked for.
-        catalog: the node types that can be used.
-        spec: the resolved file.
-        frames, fps: what is drawn where nobody says: the first frame, or the one that a picture shows.
-    """
+    """The file with everything applied; by default `frames` is the first frame, or the one that a picture shows."""
 
     selection: Selection
     catalog: Catalog
@@ -67,28 +60,9 @@ class Resolved(Struct, frozen=True, eq=False, kw_only=True):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.selection.source}>"
 
-    def linked(self, scene: Scene, graph: Graph, missing: tuple[Problem, ...] = ()) -> Linked:
-        """The same with its scene and its graph."""
-        return Linked(
-            selection=self.selection,
-            catalog=self.catalog,
-            spec=self.spec,
-            frames=self.frames,
-            fps=self.fps,
-            scene=scene,
-            graph=graph,
-            missing=missing,
-        )
-
 
 class Linked(Resolved, frozen=True, eq=False, kw_only=True):
-    """The checked graph with its scene.
-
-    Attributes:
-        scene: completed by a camera and a light where it has none.
-        graph: typed nodes and links.
-        missing: what a sketch lacks, such as node types that nobody has; nothing in what can be drawn.
-    """
+    """The checked graph with its scene, which has at least a camera and a light; `missing` is what a sketch lacks."""
 
     scene: Scene
     graph: Graph
@@ -96,30 +70,23 @@ class Linked(Resolved, frozen=True, eq=False, kw_only=True):
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """What was noticed in the pipeline and the scene and is no error."""
+        """All warnings about the pipeline and the scene."""
         return (*self.spec.notes, *self.graph.warnings, *self.scene.warnings, *self.missing)
 
 
 class Expanded(Struct, frozen=True, eq=False):
-    """The steps of what is wanted.
-
-    Attributes:
-        linked: where they come from.
-        options: what was wanted of it.
-        wanted: the ports that must exist at the end of a frame with the part that is read, by output name or tap.
-        expansion: all steps with what they read and write.
-    """
+    """The steps of all requested outputs and taps, which `requests` has by name."""
 
     linked: Linked
     options: RenderOptions
-    wanted: Mapping[str, Wanted]
+    requests: Mapping[str, OutputRequest]
     expansion: Expansion
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.linked.selection.source}>"
 
     def for_frames(self, frames: range, *, warm_up: bool = True, timed: bool = False) -> Self:
-        """The same to be drawn for other frames, which changes neither steps nor plan."""
+        """Return the same for other frames, which changes neither steps nor plan."""
         return replace(self, options=replace(self.options, frames=frames, warm_up=warm_up, timed=timed))
 
 

@@ -1,8 +1,8 @@
-"""Drawing again whenever a file that went into the picture changes.
+"""Render again whenever an input file of the picture changes.
 
-Files are polled (`stamps`): a few dozen `stat` calls ten times a second cost nothing that can be measured, work on
-every file system, network and container included, and follow a file that an editor replaces by another of its name.
-What is watched is what the last attempt looked at, also in vain, so a missing include is waited for like any other.
+Files are polled (`stamps`): a few dozen `stat` calls ten times a second cost nothing measurable, work on every file
+system, network and container included, and follow a file that an editor replaces by another of its name. Files that the
+last attempt looked for in vain are watched, too, such as a missing include.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ PATIENCE = 1.0
 
 @dataclass(frozen=True)
 class Turn(Generic[T]):
-    """One attempt to draw.
+    """One attempt to render.
 
     Attributes:
-        value: what the drawing returned; None where it failed.
+        value: the returned value; None if it failed.
         error: why it failed.
-        changed: the files that led to it, none the first time.
-        ms: milliseconds from the change being noticed until everything was drawn and written.
-        made: how many `programs`, `textures` and `scenes` were made for it.
-        files: what it looked at, and so what is watched now.
+        changed: the files that caused it; none the first time.
+        ms: milliseconds from noticing the change until everything was rendered and written.
+        made: number of `programs`, `textures` and `scenes` that were created.
+        files: the files that it looked for, which are watched now.
     """
 
     value: T | None
@@ -49,14 +49,10 @@ class Turn(Generic[T]):
 
 
 def turns(draw: Callable[[Gpu], T], gpu: Gpu) -> Iterator[Turn[T]]:
-    """Draw, and again after every change of a file that the drawing looked at; endless.
+    """Render, and again after every change of an input file; yield every attempt, without end.
 
-    Args:
-        draw: does everything afresh, from reading the pipeline on; what has not changed is taken from there.
-        gpu: where to draw.
-
-    Yields:
-        Every attempt. A mistake is one, too, and is waited upon to be mended.
+    `draw` starts from reading the pipeline; what has not changed comes from the caches of `gpu`. A mistake is an
+    attempt, too, and the next change may fix it.
     """
     seen: tuple[Path, ...] = ()
     while True:
@@ -73,9 +69,9 @@ def turns(draw: Callable[[Gpu], T], gpu: Gpu) -> Iterator[Turn[T]]:
 
 
 def wait(files: Stamps) -> list[Path]:
-    """Block until some file is no longer as it was and has come to rest; which ones.
+    """Block until a file has changed and is stable again, and return which.
 
-    A file that has vanished is given a moment to come back: many editors write by renaming.
+    A file that has vanished is given a moment to return: many editors write by renaming.
     """
     while True:
         found = modified(files)

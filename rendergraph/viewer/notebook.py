@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from rendergraph.installed import require
-from rendergraph.session.pipeline import Pipeline, loaded
+from rendergraph.session.pipeline import Pipeline, as_pipeline
 from rendergraph.viewer.render_process import RenderProcess
 from rendergraph.viewer.view_state import ViewState
 
@@ -73,10 +73,10 @@ def view(
     require(*EXTRA)
     from rendergraph.viewer.server import Server  # needs the extra
 
-    found = loaded(pipeline)
+    found = as_pipeline(pipeline)
     other = None
     if against is not None:
-        compared = loaded(against)
+        compared = as_pipeline(against)
         other = Path(compared.selection.source).stem, compared.selection
     server = Server(ViewState(found.selection, Path.cwd(), against=other), RenderProcess(device), port=port)
     return Viewer(server.url, server.start(), height)

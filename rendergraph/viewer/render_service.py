@@ -25,9 +25,9 @@ from rendergraph.session import stages
 from rendergraph.session.drawing import Drawing
 from rendergraph.session.frame import Frame, OutputInfo
 from rendergraph.session.gpu import Gpu
+from rendergraph.session.outputs import every_port
 from rendergraph.session.selection import RenderOptions, Selection
 from rendergraph.session.values import Expanded, Linked, Planned
-from rendergraph.session.wanted import every_port
 from rendergraph.stamps import Stamps
 from rendergraph.viewer import messages
 from rendergraph.viewer.describe import describe
@@ -173,7 +173,7 @@ class RenderService:
                 drawing = stages.compile(expanded, self._gpu)
                 drawing.begin()
             drawing.draw(request.frame, request.camera)
-            return _Rendered(request, drawing.read(), list(expanded.wanted)[-1], drawing)
+            return _Rendered(request, drawing.read(), list(expanded.requests)[-1], drawing)
 
     def _link(self, selection: Selection) -> Linked:
         if selection not in self._linked:

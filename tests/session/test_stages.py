@@ -24,7 +24,7 @@ from rendergraph.errors import InputError, RenderError, UsageError
 from rendergraph.session import RenderOptions, Selection, gpu_cache, stages
 from rendergraph.session.selection import RenderKeywords
 
-IN_ORDER = ["resolve", "scene_of", "link", "wanted_ports", "expand", "schedule", "allocate", "compile_plan"]
+IN_ORDER = ["resolve", "scene_of", "link", "requested_outputs", "expand", "schedule", "allocate", "compile_plan"]
 SIZE = (16, 12)
 DRAWN = Selection("forward", size=SIZE, sets=("sun.resolution=64",))
 
@@ -78,7 +78,7 @@ def test_what_differs_in_uniforms_alone_is_neither_planned_nor_compiled(
     assert gone_through == IN_ORDER[:5]
     gone_through.clear()
     gl.render(pipeline, frames=range(1, 4))
-    assert gone_through == ["wanted_ports", "expand"]
+    assert gone_through == ["requested_outputs", "expand"]
 
 
 def test_comparing_plans_each_picture_and_each_look_inside_once(gone_through: list[str]) -> None:

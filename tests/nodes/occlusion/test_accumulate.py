@@ -14,7 +14,7 @@ SIZE = (64, 48)
 PORTS = {"mean": "steady.accumulated", "raw": "ao.occlusion", "depth": "gbuffer.depth"}
 
 
-def loaded(samples: int, **options: Any) -> rg.Pipeline:
+def as_pipeline(samples: int, **options: Any) -> rg.Pipeline:
     text: dict[str, Any] = {"outputs": PORTS, "nodes": {"ao": {"params": {"samples": samples}}}}
     return rg.load("ssao-accumulated", size=SIZE, patches=[text], **options)
 
@@ -25,7 +25,7 @@ def drawn(session: rg.Session, pipeline: rg.Pipeline, first: int, last: int) -> 
 
 
 def test_of_still_frames_it_is_the_plain_mean(session: rg.Session) -> None:
-    frames = drawn(session, loaded(8), 1, 6)
+    frames = drawn(session, as_pipeline(8), 1, 6)
     raw = np.array([frame["raw"] for frame in frames])
     assert raw.std(axis=0).max() > 0.02  # each frame is noisy in another way
     np.testing.assert_array_equal(frames[0]["mean"], raw[0])
@@ -34,8 +34,8 @@ def test_of_still_frames_it_is_the_plain_mean(session: rg.Session) -> None:
 
 @pytest.mark.slow
 def test_few_samples_in_many_frames_are_many(session: rg.Session) -> None:
-    exact = drawn(session, loaded(128).set("ao.animated", False), 1, 1)[0]["raw"]
-    one, many = (drawn(session, loaded(32), frame, frame)[0]["mean"] for frame in (1, 32))
+    exact = drawn(session, as_pipeline(128).set("ao.animated", False), 1, 1)[0]["raw"]
+    one, many = (drawn(session, as_pipeline(32), frame, frame)[0]["mean"] for frame in (1, 32))
     errors = [float(np.sqrt(((found - exact) ** 2).mean())) for found in (one, many)]
     assert errors[1] < 0.3 * errors[0]
     assert errors[1] < 0.004
@@ -55,7 +55,7 @@ MOVES
 
 def with_scene(folder: Path, ball: str, moves: str) -> rg.Pipeline:
     (folder / "scene.yaml").write_text(SCENE.replace("BALL", ball).replace("MOVES", moves))
-    return loaded(16, scene=folder / "scene.yaml")
+    return as_pipeline(16, scene=folder / "scene.yaml")
 
 
 def test_what_comes_into_view_begins_anew(session: rg.Session, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
-"""How a picture was made: what is written into it, and read back, so that a picture's name stands for its pipeline.
+"""How a picture was made: metadata that is written into it and read back, so that a picture can stand for its pipeline.
 
-A picture is untrusted as a pipeline file is: its paths are read as if that file stood in the current folder.
+A picture is as untrusted as a pipeline file: its paths are resolved as if that file were in the current folder.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ _MOST_FRAMES = 10**9
 
 
 def is_picture(name: str | Path) -> bool:
-    """Whether a name is a picture's."""
+    """Return whether the extension is that of a picture."""
     return Path(name).suffix.lower() in PICTURES
 
 
-def described(linked: Linked) -> dict[str, str]:
-    """What the metadata of all its pictures says of what is drawn."""
+def pipeline_metadata(linked: Linked) -> dict[str, str]:
+    """Return the metadata of all pictures of a pipeline."""
     selection, path = linked.selection, linked.spec.path
     found = {
         "pipeline": linked.spec.to_yaml(origins=False),
@@ -43,13 +43,13 @@ def described(linked: Linked) -> dict[str, str]:
     return {f"rendergraph:{name}": text for name, text in found.items() if text is not None}
 
 
-def at_time(frame: int, fps: float) -> dict[str, str]:
-    """What the metadata of one picture says of when it is; the first frame says nothing."""
+def frame_metadata(frame: int, fps: float) -> dict[str, str]:
+    """Return the metadata of one frame; the first frame has none."""
     return {} if frame == 1 else {"rendergraph:frame": str(frame), "rendergraph:fps": f"{fps:g}"}
 
 
 def _inside(folder: Path) -> str | None:
-    """A folder as it lies in the current one; None elsewhere, and of the current one itself."""
+    """Return a folder relative to the current one; None if it lies elsewhere or is the current one."""
     try:
         text = folder.resolve().relative_to(Path.cwd().resolve()).as_posix()
     except (ValueError, OSError):
@@ -57,14 +57,8 @@ def _inside(folder: Path) -> str | None:
     return None if text == "." else text
 
 
-class Made(Struct, frozen=True):
-    """What a picture says of how it was made.
-
-    Attributes:
-        document: its pipeline, resolved.
-        camera, environment: what was said beside the file; None where nothing was.
-        frame, fps: which frame it shows.
-    """
+class PictureMetadata(Struct, frozen=True):
+    """How a picture was made: its pipeline; camera and environment, if they were chosen beside it; its frame."""
 
     document: Document
     camera: str | None
@@ -74,51 +68,53 @@ class Made(Struct, frozen=True):
 
 
 def metadata(path: Path) -> dict[str, str]:
-    """What a picture says of how it was made, by name: `pipeline` at least.
+    """Return the metadata of a picture by name, at least `pipeline`.
 
     Raises:
-        InputError: it cannot be read, or does not say.
+        InputError: it cannot be read, or has no such metadata.
     """
     from rendergraph.images import read_metadata  # most pipelines are files
 
     record_read(path)
-    said = read_metadata(path)
-    if "pipeline" not in said:
+    found = read_metadata(path)
+    if "pipeline" not in found:
         text = "the picture does not say how it was made; EXR and PNG files that rendergraph wrote do"
         raise InputError(Problem("RG510", text, Place(str(path))))
-    return said
+    return found
 
 
-def made(path: Path, limits: YamlLimits) -> Made:
-    """How a picture was made.
+def read_picture_metadata(path: Path, limits: YamlLimits) -> PictureMetadata:
+    """Return how a picture was made.
 
     Raises:
-        InputError: it cannot be read, or does not say.
+        InputError: as from `metadata`.
     """
     from rendergraph.read import read  # see above
 
-    said = metadata(path)
-    home = PurePosixPath(said.get("folder", ""))
+    found = metadata(path)
+    home = PurePosixPath(found.get("folder", ""))
     inside = not home.is_absolute() and ".." not in home.parts
-    document = read(Path(home if inside else "") / path.name, said["pipeline"], limits, name=str(path), keep_going=True)
-    return Made(
+    document = read(
+        Path(home if inside else "") / path.name, found["pipeline"], limits, name=str(path), keep_going=True
+    )
+    return PictureMetadata(
         document,
-        said.get("camera"),
-        Path(said["environment"]) if "environment" in said else None,
-        _frame(said),
-        _fps(said),
+        found.get("camera"),
+        Path(found["environment"]) if "environment" in found else None,
+        _frame(found),
+        _fps(found),
     )
 
 
-def _frame(said: Mapping[str, str]) -> int:
-    text = said.get("frame", "")
+def _frame(found: Mapping[str, str]) -> int:
+    text = found.get("frame", "")
     number = int(text) if re.fullmatch(r"[0-9]{1,10}", text) else 1
     return number if 1 <= number < _MOST_FRAMES else 1
 
 
-def _fps(said: Mapping[str, str]) -> float:
+def _fps(found: Mapping[str, str]) -> float:
     try:
-        number = float(said.get("fps", ""))
+        number = float(found.get("fps", ""))
     except ValueError:
         return 30.0
     return number if math.isfinite(number) and number > 0 else 30.0

@@ -1,4 +1,4 @@
-"""The textures that a render asks for."""
+"""The textures that a render requests."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.expand.model import ENVIRONMENT
 from rendergraph.link import Graph, endpoint
 from rendergraph.session.selection import TEXTURE_PART, RenderOptions
-from rendergraph.session.values import Planned, Wanted
+from rendergraph.session.values import OutputRequest, Planned
 
 
-def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
-    """What must exist at the end of a frame, by output name or tap.
+def requested_outputs(graph: Graph, options: RenderOptions) -> dict[str, OutputRequest]:
+    """Return what must exist at the end of a frame, by the name of the output or tap.
 
     Raises:
-        InputError: an output, a port or a part of one that the pipeline does not have.
+        InputError: the pipeline has no such output, port, or part of one.
     """
-    wanted: dict[str, Wanted] = {}
+    requests: dict[str, OutputRequest] = {}
     problems = []
     for name in graph.outputs if options.outputs is None else options.outputs:
         if name in graph.outputs:
-            wanted[name] = Wanted(graph.outputs[name])
+            requests[name] = OutputRequest(graph.outputs[name])
         else:
             hint = suggestion(name, graph.outputs)
             problems.append(Problem("RG205", f"pipeline '{graph.name}' has no output '{name}'{hint}"))
     for tap in options.taps:
         try:
-            wanted[tap] = _tapped(graph, tap)
+            requests[tap] = _parse_tap(graph, tap)
         except InputError as error:
             problems += [p.relocate(None, code="RG206", context=f"--tap {tap}") for p in error.problems]
             continue
-        end = wanted[tap].end
+        end = requests[tap].end
         node = graph[end.node]
         problems += [
             Problem("RG116", f"--tap {tap}: it needs input '{name}' of '{end.node}', which is not connected")
@@ -40,11 +40,11 @@ def wanted_ports(graph: Graph, options: RenderOptions) -> dict[str, Wanted]:
         ]
     if problems:
         raise InputError(problems)
-    return wanted
+    return requests
 
 
 def figures(graph: Graph) -> tuple[str, ...]:
-    """The outputs of the file that are one texel: what they hold is a figure of the run."""
+    """Return the outputs of the file that have a single texel: they are figures of a run."""
     infos = {name: graph.textures.get(end.now) for name, end in graph.outputs.items()}
     return tuple(
         name
@@ -54,7 +54,7 @@ def figures(graph: Graph) -> tuple[str, ...]:
 
 
 def every_port(planned: Planned) -> tuple[str, ...]:
-    """All ports whose textures the steps of a plan write, internals included, as taps, in the order they are done."""
+    """Return all ports whose textures the steps of a plan write, internals included, as taps, in order of execution."""
     graph, expansion = planned.linked.graph, planned.expansion
     held: dict[tuple[str, str], list[str]] = {}
     for end, resource in expansion.ports.items():
@@ -69,16 +69,16 @@ def every_port(planned: Planned) -> tuple[str, ...]:
     return tuple(reversed(dict.fromkeys(reversed(written))))
 
 
-def _tapped(graph: Graph, tap: str) -> Wanted:
-    """What a tap names: `node.port`, `node.port[2]`, `node.port[2,mip=3]` or `node.port:stencil`."""
+def _parse_tap(graph: Graph, tap: str) -> OutputRequest:
+    """Parse a tap: `node.port`, `node.port[2]`, `node.port[2,mip=3]` or `node.port:stencil`."""
     found = re.fullmatch(r"([^\[:]*)" + TEXTURE_PART, tap)
     if found is None:
         text = "the part of a texture is [LAYER], [mip=N], [LAYER,mip=N] or :stencil after NODE.PORT"
         raise InputError(Problem("RG206", text))
     end = endpoint(graph, found[1])
     layer, mip = (None if found[name] is None else int(found[name]) for name in ("layer", "mip"))
-    wanted = Wanted(end, layer, mip, stencil=found["stencil"] is not None)
+    request = OutputRequest(end, layer, mip, stencil=found["stencil"] is not None)
     desc = graph.textures[end].desc
-    if missing := wanted.lacks(desc):
+    if missing := request.lacks(desc):
         raise InputError(Problem("RG206", f"'{found[1]}' {missing}"))
-    return wanted
+    return request
