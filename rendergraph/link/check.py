@@ -119,8 +119,11 @@ class Checker(Struct, eq=False):
         self, draft: UnlinkedNode, port: Port, link: Link, code: str, takes: str, carries: str, hint: Accepts | None
     ) -> None:
         text = f"'{draft.spec.id}.{port.name}' {takes}, but '{link.source}'{self._at(link)} {carries}"
-        way = "" if code == "RG214" else self._neighbour(port, link)  # all of a node has as many samples
+        # The outputs of a node mostly have the same samples and size.
+        way = "" if code in ("RG214", "RG216") else self._neighbour(port, link)
         way = way or self._converters(hint)
+        if not way and code == "RG216":
+            way = '; a node that can read other sizes declares the input with size="any"'
         if not way and code == "RG201":
             way = self._elsewhere(draft, port)
         self.problems.append(link.value.problem(code, text + way))

@@ -233,6 +233,26 @@ def test_rules_may_ask_what_is_connected_without_asking_for_more(toy_catalog: Ca
     assert info(graph, "b.radiance").desc.size == (2, 2)
 
 
+class TwoHalves(Node):
+    """Two textures of half the size."""
+
+    one = Output(Radiance, size=0.5, doc="Half.")
+    other = Output(Radiance, size=0.5, doc="Half, too.")
+
+
+class Whole(Node):
+    """Reads texel by texel."""
+
+    radiance = Input(Radiance, doc="Whole.")
+    color = Output(Radiance, doc="Colour.")
+
+
+def test_a_refused_size_is_answered_with_what_other_sizes_take_and_not_with_a_port_of_the_same_size() -> None:
+    text = "nodes: {a: {type: two_halves}, b: {type: whole, inputs: {radiance: a.one}}}\noutputs: {o: b.color}"
+    (found,) = problems(text, Catalog.of(TwoHalves, Whole))
+    assert found.endswith('is 640×360; a node that can read other sizes declares the input with size="any"')
+
+
 def test_a_failing_count_of_views_is_the_authors_mistake() -> None:
     def count(node: Node, facts: Facts) -> int:
         raise RuntimeError("no views today")
