@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from msgspec.structs import replace
 
-from rendergraph.document import Document, Value, YamlLimits, parse, read_text
+from rendergraph.document import Document, Value, YamlLimits, is_standard_input, parse, read_text
 from rendergraph.errors import InputError
 from rendergraph.keys import Codes, Key, MapOf, Naming, Recursive, Table, Validator
 from rendergraph.keys.values import NUMBER, TEXT, listed, row, shipped, version, whole
@@ -116,6 +116,8 @@ def read(
         if path is None:
             raise ValueError("read() needs a path or a text")
         text = read_text(path, limits, name)
+        if is_standard_input(path):  # what it refers to is relative to the current folder
+            path, name = None, "stdin"
     return _read(path, text, limits, name, keep_going, patch)
 
 

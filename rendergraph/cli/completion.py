@@ -41,7 +41,14 @@ def _topics(ctx: Context, incomplete: str) -> list[str]:
     from rendergraph.catalog import Catalog
 
     names = Catalog.discover(()).names()
-    return sorted({*names, *shipped_pipelines(), *shipped_scenes(), *reference.FILE_KINDS})
+    shipped = {*shipped_pipelines(), *shipped_scenes(), *_environments(ctx, incomplete)}
+    return sorted({*names, *shipped, *reference.FILE_KINDS})
+
+
+def _environments(ctx: Context, incomplete: str) -> Iterable[str]:
+    from rendergraph.scene.environments import SHIPPED
+
+    return SHIPPED
 
 
 def _families(ctx: Context, incomplete: str) -> Iterable[str]:
@@ -84,6 +91,7 @@ def _taps(ctx: Context, incomplete: str) -> list[str]:
 
 pipelines = _words(lambda ctx, incomplete: shipped_pipelines(), or_files=True)
 scenes = _words(lambda ctx, incomplete: shipped_scenes(), or_files=True)
+environments = _words(_environments, or_files=True)
 topics = _words(_topics, or_files=True)
 families, cameras, settings, ports, taps = map(_words, (_families, _cameras, _settings, _ports, _taps))
 

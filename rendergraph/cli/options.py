@@ -6,7 +6,7 @@ import importlib
 import math
 import re
 from collections.abc import Callable
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -223,7 +223,11 @@ SELECTION_OPTIONS = {
         "--camera", metavar="NAME", shell_complete=offered("cameras"), help="Camera of the scene to render from."
     ),
     "environment": click.option(
-        "--environment", type=_PATH, metavar="FILE", help="Environment map: a shipped name, .hdr or .exr."
+        "--environment",
+        type=_PATH,
+        metavar="FILE",
+        shell_complete=offered("environments"),
+        help="Environment map: a shipped name, .hdr or .exr.",
     ),
     "size": click.option("--size", type=SIZE, metavar="WxH", help="Size of the picture in pixels."),
     "sets": click.option(
@@ -271,7 +275,7 @@ def selection_options(function: F) -> F:
         from rendergraph.session import Selection
 
         fields = {name: given.pop(name) for name in SELECTION_OPTIONS}
-        function(select=partial(Selection, **fields), **given)
+        function(select=lambda name: Selection("/dev/stdin" if name == "-" else name, **fields), **given)
 
     return _all(*SELECTION_OPTIONS.values())(selecting)  # type: ignore[return-value]
 

@@ -18,10 +18,14 @@ if TYPE_CHECKING:
 @options.alias_option
 @options.heap_option
 @click.option("--shuffle", type=int, metavar="SEED", help="Use another legal order.")
-def command(selection: Selection, as_json: bool, no_alias: bool, heap: bool, shuffle: int | None) -> None:
+@click.option("--every-step", is_flag=True, help="Give each step that makes a kept value a row of its own.")
+def command(
+    selection: Selection, as_json: bool, no_alias: bool, heap: bool, shuffle: int | None, every_step: bool
+) -> None:
     """Show order, lifetimes and memory, with reasons.
 
-    Lists the order of the steps, how long each texture lives, which textures share memory, and the bytes.
+    Lists the order of the steps, how long each texture lives, which textures share memory, and the bytes. Steps that
+    make values kept from frame to frame, such as tables and environment maps, share a row.
 
     \b
     Examples:
@@ -33,4 +37,6 @@ def command(selection: Selection, as_json: bool, no_alias: bool, heap: bool, shu
 
     render_options = RenderOptions(alias=not no_alias, heap=heap, shuffle=shuffle)
     plan = stages.plan(stages.expand(options.link(selection), render_options)).plan
-    emit_json(diagrams.plan_json(plan)) if as_json else emit(diagrams.plan_text(plan).rstrip("\n"))
+    emit_json(diagrams.plan_json(plan)) if as_json else emit(
+        diagrams.plan_text(plan, every_step=every_step).rstrip("\n")
+    )

@@ -56,13 +56,17 @@ def memory_name(plan: ResourcePlan, id: str) -> str:
     return f"{kind} {'+'.join(map(str, plan.placement[id]))}"
 
 
-def plan_text(plan: ResourcePlan) -> str:
-    """Return order with reads, writes and reasons; lifetimes; sharing; culled nodes; bytes."""
+def plan_text(plan: ResourcePlan, *, every_step: bool = False) -> str:
+    """Return order with reads, writes and reasons; lifetimes; sharing; culled nodes; bytes.
+
+    Steps in sequence that make kept values of one node share a row, unless `every_step` is asked for.
+    """
     resources = ids_by_memory(plan)
+    groups = _groups(plan, every_step)
     culled = [(f"  {node}", reason) for node, reason in sorted(plan.schedule.culled.items())]
     parts = [
-        "order\n" + table(_order_rows(plan), right=(4,)),
-        _lifetimes_text(plan, resources) if resources else "",
+        "order\n" + table(_order_rows(plan, groups), right=(4,)),
+        _lifetimes_text(plan, resources, groups) if resources else "",
         "sharing\n" + table([(f"  {id}", plan.reasons[id]) for id in resources]) if resources else "",
         "not run\n" + table(culled) if culled else "",
         "memory\n" + table(_memory_rows(plan)),
@@ -116,17 +120,47 @@ def _resource_json(plan: ResourcePlan, id: str) -> dict[str, Any]:
     return found | {"physical": list(plan.placement[id]), "reason": plan.reasons[id]}
 
 
-def _order_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:
-    names = step_names(plan.schedule.steps)
+def _is_kept(plan: ResourcePlan, step: Step) -> bool:
+    return bool(step.writes) and all(plan.resources[write.resource].role == "kept" for write in step.writes)
+
+
+def _groups(plan: ResourcePlan, every_step: bool) -> list[list[int]]:
+    """The positions of the steps of each row."""
+    steps = plan.schedule.steps
+    groups: list[list[int]] = []
+    for position, step in enumerate(steps):
+        before = steps[groups[-1][0]] if groups and not every_step and _is_kept(plan, step) else None
+        if before is not None and before.node == step.node and _is_kept(plan, before):
+            groups[-1].append(position)
+        else:
+            groups.append([position])
+    return groups
+
+
+def _order_rows(plan: ResourcePlan, groups: Sequence[Sequence[int]]) -> list[tuple[str, ...]]:
+    names, live = step_names(plan.schedule.steps), live_bytes(plan)
     rows: list[tuple[str, ...]] = [("  #", "step", "reads", "writes", "live", "why here")]
-    for position, (step, live) in enumerate(zip(plan.schedule.steps, live_bytes(plan), strict=True), start=1):
-        continued = {read.resource for read in step.reads if read.use == "attach"}  # kept, but not sampled
+    for group in groups:
+        steps = [plan.schedule.steps[position] for position in group]
+        inside = {write.resource for step in steps for write in step.writes} if len(group) > 1 else set()
+        continued = {read.resource for step in steps for read in step.reads if read.use == "attach"}  # but not sampled
         reads = [
-            read.resource + ("@previous" if read.previous else "") for read in step.all_reads if read.use != "attach"
+            read.resource + ("@previous" if read.previous else "")
+            for step in steps
+            for read in step.all_reads
+            if read.use != "attach" and read.resource not in inside
         ]
-        writes = [w.resource + (" (continued)" if w.resource in continued else "") for w in step.writes]
-        reason = plan.schedule.reasons.get(step.key, "")
-        rows.append((f"{position:3}", names[step.key], _first(reads), _first(writes), format_bytes(live), reason))
+        writes = [
+            write.resource + (" (continued)" if write.resource in continued - inside else "")
+            for step in steps
+            for write in step.writes
+        ]
+        number, name, reason = f"{group[0] + 1:3}", names[steps[0].key], plan.schedule.reasons.get(steps[0].key, "")
+        if len(group) > 1:
+            number, name = f"{number}–{group[-1] + 1}", f"{steps[0].node} ({len(group)} steps)"
+            reason = "kept: they run when their values are new or out of date"
+        most = max(live[position] for position in group)
+        rows.append((number, name, _first(reads), _first(writes), format_bytes(most), reason))
     return rows
 
 
@@ -137,26 +171,31 @@ def _first(ids: Sequence[str]) -> str:
     return ", ".join(unique[:MOST_NAMES] + more) or "-"
 
 
-def _lifetimes_text(plan: ResourcePlan, resources: Sequence[str]) -> str:
-    steps = plan.schedule.steps
-    is_matrix = len(steps) <= MOST_COLUMNS
+def _lifetimes_text(plan: ResourcePlan, resources: Sequence[str], groups: Sequence[Sequence[int]]) -> str:
+    is_matrix = len(groups) <= MOST_COLUMNS
     rows: list[tuple[str, ...]] = []
     if is_matrix:
-        numbers = [str(position + 1) for position in range(len(steps))]
+        numbers = [str(group[0] + 1) for group in groups]
         digits = max(map(len, numbers), default=0)
         rows += [("", "".join(number.rjust(digits)[digit] for number in numbers)) for digit in range(digits)]
     for id in resources:
         life = plan.lifetimes[id]
         span = f"{life.first + 1}–{life.last + 1}"
         if is_matrix:
-            uses = (use_of(step, id) or ("─" if life.first <= p <= life.last else "·") for p, step in enumerate(steps))
-            span = "".join(uses)
+            span = "".join(_use_in(plan, group, id) for group in groups)
         memory = memory_name(plan, id)
         if plan.physicals[plan.placement[id][0]].block:
             memory = f"block {memory.partition(' ')[2]}"
         rows.append((f"  {id}", span, memory, format_bytes(plan.bytes(id)), format_resource(plan.resources[id])))
     legend = "W writes, R reads, B both, P reads last frame's, ─ kept" if is_matrix else "first and last step"
     return f"lifetimes ({legend})\n" + table(rows, right=(3,))
+
+
+def _use_in(plan: ResourcePlan, group: Sequence[int], id: str) -> str:
+    uses = {use_of(plan.schedule.steps[position], id) for position in group} - {""}
+    if not uses:
+        return "─" if plan.lifetimes[id].first <= group[-1] and group[0] <= plan.lifetimes[id].last else "·"
+    return uses.pop() if len(uses) == 1 else "B"
 
 
 def _memory_rows(plan: ResourcePlan) -> list[tuple[str, ...]]:

@@ -7,7 +7,10 @@ is built but text, numbers, switches, null, lists and mappings, every one under 
 
 from __future__ import annotations
 
+import sys
+from functools import lru_cache
 from pathlib import Path
+from typing import TextIO
 
 from rendergraph.document.parsing import YamlLimits, over_limit, parse, scalar
 from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
@@ -34,15 +37,21 @@ def read_text(path: Path, limits: YamlLimits, name: str) -> str:
 
 
 def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
-    """Return the bytes of a regular file of at most `most` bytes."""
+    """Return the bytes of a regular file, or of standard input, of at most `most` bytes."""
     name = shown(name or str(path))
     record_read(path)
     try:
-        if not path.is_file() and path.exists():
+        if is_standard_input(path):
+            raw = _standard_input(sys.stdin, most)
+            if not raw:
+                text = "standard input is empty; workers of an executor have none: write the text to a file"
+                raise InputError(Problem("RG011", text))
+        elif not path.is_file() and path.exists():
             what = "is a folder; a file is expected" if path.is_dir() else "is not a regular file"
             raise InputError(Problem("RG011", f"'{name}' {what}"))
-        with path.open("rb") as file:
-            raw = file.read(most + 1)
+        else:
+            with path.open("rb") as file:
+                raw = file.read(most + 1)
     except FileNotFoundError:
         raise InputError(Problem("RG011", f"there is no file '{name}'")) from None
     except (OSError, ValueError) as error:
@@ -53,6 +62,17 @@ def read_bytes(path: Path, most: int, name: str | None = None) -> bytes:
     return raw
 
 
+def is_standard_input(name: str | Path | None) -> bool:
+    """Whether a file that the user named is the process's standard input."""
+    return str(name) in ("-", "/dev/stdin")
+
+
+@lru_cache(maxsize=1)
+def _standard_input(stream: TextIO | None, most: int) -> bytes:
+    """The bytes of the stream, which can be read once only."""
+    return stream.buffer.read(most + 1) if stream is not None else b""
+
+
 __all__ = [
     "BROKEN",
     "Document",
@@ -60,6 +80,7 @@ __all__ = [
     "Value",
     "YamlLimits",
     "from_plain",
+    "is_standard_input",
     "kind_of",
     "load",
     "parse",

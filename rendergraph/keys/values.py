@@ -50,13 +50,17 @@ def vector(count: int = 3, low: float = -MOST, high: float = MOST, *, above: boo
 
 
 def color(high: float = MOST, *, alpha: bool = False) -> Any:
-    """Red, green and blue from 0 up; with `alpha` a fourth number, 1 by default."""
+    """Red, green and blue from 0 up, or one number for a grey; with `alpha` a fourth number, 1 by default."""
     three, four = vector(3, 0, high), vector(4, 0, high)
-    if not alpha:
-        return Annotated[three, Brief("[r, g, b]")]
-    words = words_for(four, file=True).replace("4", "3 or 4", 1)
-    opaque = Converted(lambda value: (*value, 1.0) if isinstance(value, tuple) and len(value) == 3 else value)
-    return Annotated[four | three, words, Brief("[r, g, b]"), opaque]
+    words = words_for(three, file=True).replace("list of 3", "number or a list of 3" + (" or 4" if alpha else ""), 1)
+
+    def whole(value: Any) -> Any:
+        rgb = (value,) * 3 if isinstance(value, float) else value
+        return (*rgb, 1.0) if alpha and isinstance(rgb, tuple) and len(rgb) == 3 else rgb
+
+    return Annotated[
+        number(0, high) | three | (four if alpha else three), words, Brief("grey | [r, g, b]"), Converted(whole)
+    ]
 
 
 def scale() -> Any:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rendergraph.catalog import Catalog
-from rendergraph.document import Document, Source, Value, YamlLimits, from_plain
+from rendergraph.document import Document, Source, Value, YamlLimits, from_plain, is_standard_input
 from rendergraph.errors import InputError, Option, Place, Problem, shown_file, suggestion
 from rendergraph.keys import Validator, plain
 from rendergraph.read import CODES, SIZE, checked, entries, flag, read, word
@@ -91,7 +91,7 @@ def resolve(
 def _entry(source: str | Path | Document, limits: YamlLimits) -> Document:
     if isinstance(source, Document):
         return checked(source, keep_going=True)
-    if isinstance(source, str) and is_name(source):
+    if isinstance(source, str) and is_name(source) and not is_standard_input(source):
         shipped = shipped_pipelines()
         if source not in shipped:
             hint = suggestion(source, shipped)

@@ -289,6 +289,8 @@ def _no_parameter(
     text = f"the pipeline has no parameter '{setting.name}'"
     if setting.name in ("size", "scene"):
         text += f"; --{setting.name} sets the {setting.name}"
+    elif setting.name in nodes and setting.value.data in (None, False, "off", "none"):
+        text += f"; to leave out node '{setting.name}', write {setting.name}.enabled=false"
     elif setting.name in nodes:
         text += f"; to set one of node '{setting.name}', write {setting.name}.PARAM=VALUE"
     elif nearest(setting.name, parameters) is None and (meant := _of_nodes(setting.name, nodes, names_of)):

@@ -57,7 +57,7 @@ MATERIAL = Table(
         Key(
             "base_color",
             color(1, alpha=True),
-            "Linear base colour, three numbers or four with alpha.",
+            "Linear base colour: a grey, three numbers, or four with alpha.",
             (1.0, 1.0, 1.0, 1.0),
         ),
         _unit("metallic", "0 dielectric, 1 metal.", 0.0),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +64,38 @@ def test_a_name_of_two_things_is_explained_as_both(cli: Any) -> None:
     assert "\nbloom  (pipeline)\n" in shown
 
 
+@pytest.mark.parametrize("name", ["sky", "studio"])
+def test_environments_are_explained(cli: Any, name: str) -> None:
+    result = cli("explain", name)
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith(f"{name}  (environment)\n")
+    assert f"--environment {name}\n" in result.out
+    assert cli("explain", name, "--json").json["environment"] == name
+    assert "'studio'?" in cli("explain", "studi").err
+    assert "has no program" in cli("explain", name, "--glsl").err
+
+
+def test_standard_input_is_a_pipeline_or_a_patch(cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def typed(text: str, *words: str) -> Any:
+        monkeypatch.setattr(sys, "stdin", TextIOWrapper(BytesIO(text.encode())))
+        return cli(*words)
+
+    (tmp_path / "base.yaml").write_text("extends: forward\nscene: spheres\n")
+    for name in ("-", "/dev/stdin"):  # relative to the current folder
+        assert typed("extends: ./base.yaml\n", "config", name, "--json").json["resolved"]["scene"] == "spheres"
+    assert typed("size: [64, 36]\n", "config", "forward", "-p", "-", "--json").json["resolved"]["size"] == [64, 36]
+    assert typed("nodes: {a: b}\n", "check", "-").err.startswith("stdin:1:12: RG106")
+    assert "RG011 standard input is empty" in typed("", "check", "-").err
+
+
+def test_a_plan_shows_steps_of_kept_values_in_one_row(cli: Any) -> None:
+    shown = cli("plan", "forward").out
+    assert re.search(r"^ +\d+–\d+ +environment \(\d+ steps\) .* kept: ", shown, re.M)
+    assert "environment[" not in shown
+    assert re.search(r"^  environment\.cells +──B───  texture", shown, re.M)
+    assert cli("plan", "forward", "--every-step").out.count("environment[") > 9
+
+
 def test_the_help_has_the_exit_codes(cli: Any) -> None:
     shown = cli("--help").out
     for code, meaning in EXIT_CODES.items():
@@ -73,6 +107,9 @@ def test_the_help_has_the_exit_codes(cli: Any) -> None:
     [
         (["-s", "taps=3"], "RG119 the pipeline has no parameter 'taps'; did you mean 'shadows.taps'?"),
         (["-s", "exposre=1"], "did you mean 'display.exposure'?"),
+        (["-s", "shadows=null"], "; to leave out node 'shadows', write shadows.enabled=false"),
+        (["-s", "shadows=false"], "; to leave out node 'shadows', write shadows.enabled=false"),
+        (["-s", "shadows=3"], "; to set one of node 'shadows', write shadows.PARAM=VALUE"),
     ],
 )
 def test_a_parameter_without_its_node_is_found(cli: Any, words: list[str], meant: str) -> None:
@@ -205,6 +242,7 @@ def test_bash_completes_what_is_typed(tmp_path: Path) -> None:
         "rendergraph run forward --tap sun.": "sun.shadow_map=",
         "rendergraph run forward --scene sta": "stairs",
         "rendergraph run forward --camera ": "main",
+        "rendergraph run forward --environment st": "studio",
         "rendergraph explain corn": "cornell_box",
         "rendergraph nodes dis": "display",
         "rendergraph run nothing -s ": "",

@@ -102,7 +102,7 @@ WRONG = {
     "lamps: {a: {kind: log}}": "1:19 WRONG 'kind': expected one of round, square, long, as in kind: round, got 'log'; did you mean 'long'?",
     "lamps: {a: {kind: long, pwr: 1}}": "1:25 UNKNOWN lamp 'a' has no key 'pwr'; did you mean 'power'?",
     "lamps: {a: {kind: long, power: 0}}": "1:32 WRONG 'power': expected a number above 0, got 0",
-    "lamps: {a: {kind: long, color: [1, 2, 0]}}": "1:32 WRONG 'color': expected a list of 3 or 4 numbers from 0 to 1, got [1, 2, 0]",
+    "lamps: {a: {kind: long, color: [1, 2, 0]}}": "1:32 WRONG 'color': expected a number or a list of 3 or 4 numbers from 0 to 1, got [1, 2, 0]",
     "lamps: {a: {kind: long, size: [1, 2]}}": "1:31 WRONG 'size': expected a number or a list of 3 numbers, got [1, 2]",
     "boxes: {a: {}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",
     "boxes: {a: {shape: cube, file: x}}": "1:9 WRONG box 'a' needs either 'shape' or 'file'",

@@ -93,6 +93,13 @@ materials: {m: {base_color: [1, 0, 0]}}
     assert (last.name, last.roughness, last.metallic, last.base_color) == ("g/1_1", 1, 1, (1, 0, 0, 1))
 
 
+def test_one_number_is_a_grey(tmp_path: Path) -> None:
+    text = "scene: 1\nobjects: {b: {shape: box, material: m}}\nmaterials: {m: {base_color: 0.5, emissive: 2}}\n"
+    (material,) = read(tmp_path, f"{text}lights: {{sun: {{type: directional, color: 0.25}}}}\n").materials
+    assert material.base_color == (0.5, 0.5, 0.5, 1)
+    assert material.emissive == (2, 2, 2)
+
+
 def test_a_file_brings_its_lights_and_cameras_placed(tmp_path: Path, shared: Path) -> None:
     shutil.copyfile(shared / "reference/b2_shadows/spot_basic/scene.glb", tmp_path / "s.glb")
     text = "scene: 1\nobjects:\n  room: {file: s.glb, at: [0, 10, 0], material: m}\nmaterials: {m: {}}\n"
@@ -147,7 +154,7 @@ WRONG = {
     "objects: {a: {shape: box, at: [0, 1e300, 0]}}": "RG321 'at': expected a list of 3 numbers, got [0, 1e+300, 0]",
     "objects: {a: {shape: sphere, segments: 1.5}}": "expected a whole number from 3 to 2048, got 1.5",
     "objects: {a: {shape: box, material: red}}": "no material 'red'; there are no materials",
-    "materials: {m: {base_color: [1, 2, 0]}}": "expected a list of 3 or 4 numbers from 0 to 1, got [1, 2, 0]",
+    "materials: {m: {base_color: [1, 2, 0]}}": "expected a number or a list of 3 or 4 numbers from 0 to 1, got [1, 2, 0]",
     "materials: {m: {alpha_mode: Mask}}": "2:29: RG321 'alpha_mode': expected one of opaque, mask, blend, got 'Mask'; did you mean 'mask'?",
     "materials: {m: {normal_texture: a.png}}": "2:33: RG350 image 'a.png' does not exist",
     "lights: {l: {intensity: 1}}": "2:10: RG321 light 'l' needs 'type'",
