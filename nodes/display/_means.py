@@ -13,5 +13,5 @@ def halve_down(steps: Steps, chain: Internal) -> int:
     """
     last = steps.desc(chain).mips - 1
     for level in range(last):
-        steps.fullscreen("<halve.frag>", source=chain.mip(level), out=chain.mip(level + 1))
+        steps.fullscreen("<downsample.frag>", source=chain.mip(level), out=chain.mip(level + 1))
     return last

@@ -57,7 +57,7 @@ class Bloom(Node):
                 halve = {"HALVE": True}
                 steps.fullscreen("bright_pass.frag", radiance=self.radiance, gain=self.gain, out=here, defines=halve)
             else:
-                steps.fullscreen("<halve.frag>", source=self.glow.mip(level - 1), out=here)
+                steps.fullscreen("<downsample.frag>", source=self.glow.mip(level - 1), out=here)
             steps.fullscreen("gaussian_blur.frag", source=here, out=scratch, axis=(1, 0))
             steps.fullscreen("gaussian_blur.frag", source=scratch, out=here, axis=(0, 1))
         added = State(blend=ADD, color_mask=(True, True, True, False))

@@ -110,9 +110,9 @@ class DeferredMultisampled(DeferredLighting):
         self.light_marked(steps, reads, first=0 if lit else 1)
         self.blend_over(steps)
         if steps.used(self.edge_share):
-            steps.fullscreen("<halve.frag>", source=self.edges, out=self.means.mip(0))
+            steps.fullscreen("<downsample.frag>", source=self.edges, out=self.means.mip(0))
             last = halve_down(steps, self.means)
-            steps.fullscreen("<halve.frag>", source=self.means.mip(last), out=self.edge_share)
+            steps.fullscreen("<downsample.frag>", source=self.means.mip(last), out=self.edge_share)
 
     def light_marked(self, steps: Steps, reads: dict[str, Any], first: int) -> None:
         """Light samples of marked pixels, in tiles: some rasterisers ask the stencil after the shader has run.

@@ -12,7 +12,6 @@ from rendergraph.cli.lazy_click import click
 from rendergraph.cli.output import amount, emit_json, say, warn
 
 if TYPE_CHECKING:
-    from rendergraph.errors import Problem
     from rendergraph.session import Selection
 
 
@@ -47,12 +46,11 @@ def command(selection: Selection, as_json: bool) -> None:
             emit_json({"sweep": file, "runs": runs, "warnings": [problem.as_json() for problem in warnings]})
         return
     linked = options.link(selection)
-    stages.check(linked)
+    later = list(stages.check(linked).warnings)
     graph, path = linked.graph, linked.spec.path
-    later: list[Problem] = []
     if path and not is_picture(path):
         stale = outdated(path, Roots.of_file(path, selection.asset_roots), linked.catalog, selection.plugins)
-        later = [stale] if stale else []
+        later += [stale] if stale else []
     warn(later)
     width, height = graph.size
     links = sum(len(ends) for node in graph.nodes for ends in node.inputs.values())

@@ -34,7 +34,7 @@ RESERVED_NAMES: frozenset[str] = (
     namespace using texture sampler2D sampler3D samplerCube image2D abs acos all any asin atan ceil clamp cos cross
     degrees determinant distance dot equal exp exp2 floor fma fract inverse inversesqrt length log log2 main max min mix
     mod modf normalize not pow radians reflect refract round sign sin smoothstep sqrt step tan transpose trunc camera
-    world_position linear_depth is_nothing nearer to_viewer packed row_major atomic_uint dvec2 dvec3 dvec4 dmat2 dmat3
+    world_position linear_depth is_nothing nearer view_dir packed row_major atomic_uint dvec2 dvec3 dvec4 dmat2 dmat3
     dmat4 mat2x2 mat2x3 mat2x4 mat3x2 mat3x3 mat3x4 mat4x2 mat4x3 mat4x4 dmat2x2 dmat2x3 dmat2x4 dmat3x2 dmat3x3 dmat3x4
     dmat4x2 dmat4x3 dmat4x4
     """.split()  # noqa: SIM905 - a list of so many words reads best as text

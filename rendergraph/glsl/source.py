@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
-from itertools import accumulate, chain, repeat
+from functools import cache, cached_property
+from itertools import accumulate, chain, product, repeat
 from pathlib import Path
 
-from msgspec import Struct
+from msgspec import Struct, json
 from msgspec.structs import replace
 
 from rendergraph.errors import InputError, Place, Problem, shown_file, suggestion
-from rendergraph.glsl.files import MAX_BYTES, LineRun, Links, runs
+from rendergraph.glsl.files import MAX_BYTES, LineRun, Links, read_text, runs, strip_comments
+from rendergraph.glsl.names import mentions
 from rendergraph.stamps import record_read
 
 MAX_DEPTH = 32
@@ -225,7 +226,7 @@ class Includes:
         if match is None:
             text = f"'#include {written[:60]}' is not '#include <name.glsl>' or '#include \"name.glsl\"'"
             raise _error("RG405", text, origin, raw)
-        name = match[1] or match[2]
+        name = _old_names(self.include_folder).get(written, match[1] or match[2])
         beside = match[1] is not None
         shared = not beside or in_shared
         places = [(file.parent, root)] if beside else [(self.include_folder, self.include_folder)]
@@ -260,6 +261,32 @@ def expand(
     inherited: tuple[Path, ...] = (),
 ) -> SourceText:
     return Includes(include_folder).expand(source, root=root, versions=versions, inherited=inherited)
+
+
+@cache
+def _old_names(include_folder: Path) -> dict[str, str]:
+    """Return old names of `<files>`, `functions()`, `.members` and other words of the shared includes, with the new."""
+    file = include_folder / "old_names.json"
+    return json.decode(file.read_bytes()) if file.is_file() else {}
+
+
+def find_old_names(source: SourceText, include_folder: Path) -> tuple[dict[str, str], list[Problem]]:
+    """Return macros for the old names that plugins' files use, and a warning (RG449) for each."""
+    macros: dict[str, str] = {}
+    warnings: list[Problem] = []
+    own = [file for file in source.files if include_folder.parent not in file.parents]
+    shared = SourceText(tuple(block for block in source.blocks if own and block.origin.file not in own)).text
+    for file, (old, new) in product(own, _old_names(include_folder).items()):
+        name, text = old.strip("<>.()"), strip_comments(read_text(file))
+        pattern = re.escape(old).replace(r"\(\)", r"(?=\s*\()") + r"(?!\w)"
+        match = re.search(r"(?<![\w.])" * (old[0] != ".") + pattern, text)
+        if match and (old[0] == "<" or name.startswith("v_") or mentions(shared, new)):
+            macros |= {name: new} if old[0] != "<" else {}
+            before = text[: match.start()].split("\n")
+            place = Place(shown_file(file), len(before), len(before[-1]) + 1)
+            what = f"'{old}' is now called '{new}'"
+            warnings.append(Problem("RG449", what, place, text.split("\n")[len(before) - 1], "warning"))
+    return macros, warnings
 
 
 def needs(file: Path) -> tuple[str, ...]:

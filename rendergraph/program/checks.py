@@ -18,8 +18,8 @@ from rendergraph.stamps import FileCache
 from rendergraph.steps import Read, Resource, Step
 from rendergraph.textures import FORMATS, TextureDesc
 
-_PASSED: FileCache[None] = FileCache()
-"""Texts in which nothing was wrong."""
+_PASSED: FileCache[tuple[Problem, ...]] = FileCache()
+"""The warnings about texts in which nothing was wrong."""
 Texts = Callable[[], Mapping[str, StageText]]
 """A program's texts, put together where they are looked at."""
 
@@ -42,9 +42,10 @@ def check_texts(
     types: Mapping[str, NodeType],
     resources: Mapping[str, Resource],
     views: Mapping[str, ViewTable],
-) -> None:
-    """Build the program texts of steps and check them."""
+) -> tuple[Problem, ...]:
+    """Build the program texts of steps, check them, and return warnings."""
     problems: list[Problem] = []
+    warnings: list[Problem] = []
     seen: set[object] = set()
     for step in steps:
         kinds = tuple((name, sampler_of(read, resources[read.resource])) for name, read in _sampled(step, resources))
@@ -54,11 +55,12 @@ def check_texts(
         seen.add(key)
         try:
             whole = text_key(step, types, resources, views), _kept(step, resources)
-            _PASSED.get(whole, partial(_check_step, step, types, resources, views))
+            warnings += _PASSED.get(whole, partial(_check_step, step, types, resources, views))
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
+    return tuple(dict.fromkeys(warnings))
 
 
 def _check_step(
@@ -66,11 +68,12 @@ def _check_step(
     types: Mapping[str, NodeType],
     resources: Mapping[str, Resource],
     views: Mapping[str, ViewTable],
-) -> None:
+) -> tuple[Problem, ...]:
     texts = stage_texts(step, types, resources, views)
     check_kept_text(step, partial(dict, texts), types[step.node].cls, resources)
     _check_samplers(step, texts, resources)
     _check_outs(step, texts, types[step.node].cls, resources)
+    return tuple(warning for text in texts.values() for warning in text.warnings)
 
 
 # --- samplers --------------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from rendergraph.errors import InputError, Problem, node_named
 from rendergraph.expand import ViewTable
 from rendergraph.glsl.files import Links
 from rendergraph.glsl.names import calls, declared, mentions, renamed
-from rendergraph.glsl.source import Includes, Origin, SourceBlock, SourceText, generated
+from rendergraph.glsl.source import Includes, Origin, SourceBlock, SourceText, find_old_names, generated
 from rendergraph.program.macros import macro_text, read_defines, sample_macros, used_macros
 from rendergraph.resources import folder
 from rendergraph.stamps import FileCache
@@ -32,11 +32,12 @@ _MANY_LAYERS = 16  # more layers than this are looked up in a loop instead of on
 
 
 class StageText(Struct, frozen=True):
-    """The final text of one stage, with the id of the step's node."""
+    """The final text of one stage, with the id of the step's node, and warnings about it."""
 
     stage: str
     source: SourceText
     node: str = ""
+    warnings: tuple[Problem, ...] = ()
 
     @property
     def of_node(self) -> str:
@@ -199,8 +200,9 @@ class _Program(Struct, frozen=True):
         body = functions.text + source.text
         declarations = _read_declarations(step.reads, self.resources, "", body)
         text = view + declarations + functions + source
-        head = generated([VERSION, *extensions]) + macro_text(used_macros(self.macros, text.text))
-        return StageText(stage, head + text, step.node)
+        aliases, warnings = find_old_names(text, include_folder)
+        head = generated([VERSION, *extensions]) + macro_text({**aliases, **used_macros(self.macros, text.text)})
+        return StageText(stage, head + text, step.node, tuple(warnings))
 
     def _functions(self, stage: str, signature: Signature, includes: Includes) -> SourceText:
         """Return the providers' texts with prefixed names, and the function that joins them."""

@@ -45,7 +45,7 @@ MESH = np.dtype(
 """Where a mesh lies in the streams: first index, number of indices, base vertex, number of vertices, its box."""
 _MATERIAL_ROWS = "base_color emissive surface specular extra phong_diffuse phong_specular phong_ambient"
 MATERIAL = np.dtype([(name, *_VEC4) for name in _MATERIAL_ROWS.split()])
-ENVIRONMENT = np.dtype([("environment_turn", *_VEC4)])
+ENVIRONMENT = np.dtype([("environment_transform", *_VEC4)])
 LIGHT = np.dtype([(name, *_VEC4) for name in ("position", "color", "direction", "cone")])
 _MATRICES = "view projection view_projection inverse_view inverse_projection inverse_view_projection"
 _MATRIX = ("<f4", (4, 4))
@@ -294,7 +294,7 @@ def pack_environment(environment: Environment | None) -> Records:
     """The `environment_block` (shaders/include/environment.glsl): cosine and sine of its turn, and a factor."""
     turn, intensity = (environment.rotate, environment.intensity) if environment is not None else (0.0, 1.0)
     record = np.zeros(1, ENVIRONMENT)
-    record["environment_turn"] = (np.cos(turn), np.sin(turn), intensity, 0.0)
+    record["environment_transform"] = (np.cos(turn), np.sin(turn), intensity, 0.0)
     return record
 
 

@@ -142,8 +142,8 @@ def check(linked: Linked) -> Planned:
 
     planned = plan(expand(linked))
     types = {node.id: node.type for node in linked.graph.nodes}
-    check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
-    return planned
+    warnings = check_texts(planned.plan.schedule.steps, types, planned.plan.resources, planned.expansion.views)
+    return replace(planned, warnings=warnings)
 
 
 def compile(expanded: Expanded, gpu: Gpu) -> Drawing:

@@ -91,6 +91,7 @@ class Expanded(Struct, frozen=True, eq=False):
 
 
 class Planned(Expanded, frozen=True, eq=False):
-    """Steps with their order and their memory."""
+    """Steps with their order and their memory, and the warnings of `check` about their shaders."""
 
     plan: ResourcePlan
+    warnings: tuple[Problem, ...] = ()

@@ -13,7 +13,7 @@ params:
   threshold: {default: 1.0, min: 0, doc: "Luminance, after `gain`, that is taken off; 1 is the display's white."}
 ---*/
 #include <luminance.glsl>
-#include <halving.glsl>
+#include <downsample.glsl>
 
 uniform sampler2D radiance;  // scene-linear
 #ifdef HAS_GAIN
@@ -22,7 +22,7 @@ uniform sampler2D gain;      // one texel: the exposure that the threshold is me
 uniform float threshold;
 out vec4 bright;
 
-vec4 halving_tap(ivec2 texel) {
+vec4 source_texel(ivec2 texel) {
     vec4 here = texelFetch(radiance, texel, 0);
     float exposed = luminance_of(here.rgb);
 #ifdef HAS_GAIN
@@ -36,8 +36,8 @@ vec4 halving_tap(ivec2 texel) {
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
 #ifdef HALVE
-    bright = halved(texel, textureSize(radiance, 0));
+    bright = downsample(texel, textureSize(radiance, 0));
 #else
-    bright = halving_tap(texel);
+    bright = source_texel(texel);
 #endif
 }

@@ -90,7 +90,7 @@ vec3 value_at(int picture, ivec2 place) {
     vec4 found = texel_of(picture, ivec2(place.x, sizes[picture].y - 1 - place.y));
     if (kinds[picture] == GREY) found = found.rrrr;
     found = clamp(found, 0.0, 1.0);
-    return kinds[picture] == ENCODED ? srgb_decoded(found.rgb) : found.rgb;
+    return kinds[picture] == ENCODED ? srgb_to_linear(found.rgb) : found.rgb;
 }
 
 // The mean over what a texel of the sheet covers of a picture, by area; a single texel of one that is enlarged.
@@ -117,18 +117,18 @@ int label_at(int picture, ivec2 place, int dots) {
     if (count == 0 || place.x >= (4 * count + 3) * dots || place.y >= 9 * dots) return 0;
     ivec2 dot = place / dots - 2;
     if (dot.x < 0 || dot.x / 4 >= count) return 1;
-    return dot_of(letters[picture * LETTERS + dot.x / 4], ivec2(dot.x % 4, 4 - dot.y)) ? 2 : 1;
+    return glyph_pixel(letters[picture * LETTERS + dot.x / 4], ivec2(dot.x % 4, 4 - dot.y)) ? 2 : 1;
 }
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     at.y = SHEET_HEIGHT - 1 - at.y;
-    color = vec4(srgb(vec3(background)), 1.0);
+    color = vec4(linear_to_srgb(vec3(background)), 1.0);
     for (int i = 0; i < PICTURES_COUNT; ++i) {
         ivec2 place = at - places[i].xy, shown = places[i].zw;
         if (any(lessThan(place, ivec2(0))) || any(greaterThanEqual(place, shown))) continue;
         vec3 mean = mean_at(i, place, shown);
-        color.rgb = kinds[i] == ENCODED ? srgb(mean) : mean;
+        color.rgb = kinds[i] == ENCODED ? linear_to_srgb(mean) : mean;
         int label = label_at(i, place, max(1, SHEET_HEIGHT / 240));
         if (label > 0) color.rgb = label == 1 ? color.rgb * 0.25 : vec3(1.0);
     }

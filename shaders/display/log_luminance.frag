@@ -1,12 +1,12 @@
 // Logarithms of luminance, averaged to half size: the top of the chain that ends in their mean.
 #include <luminance.glsl>
-#include <halving.glsl>
+#include <downsample.glsl>
 
 uniform sampler2D radiance;  // scene-linear, alpha is coverage
 uniform float delta;         // keeps black finite
 out vec2 logarithms;         // weighted logarithm, weight
 
-vec4 halving_tap(ivec2 texel) {
+vec4 source_texel(ivec2 texel) {
     vec4 here = texelFetch(radiance, texel, 0);
     float l = luminance_of(here.rgb);
     l = l > 0.0 ? min(l, 1e9) : 0.0;  // not a number counts as black: one such pixel must not blind the eye for good
@@ -19,5 +19,5 @@ vec4 halving_tap(ivec2 texel) {
 }
 
 void main() {
-    logarithms = halved(ivec2(gl_FragCoord.xy), textureSize(radiance, 0)).xy;
+    logarithms = downsample(ivec2(gl_FragCoord.xy), textureSize(radiance, 0)).xy;
 }

@@ -28,7 +28,7 @@ void main() {
     int n = at.x / side + 1;
     color.rgb = heat(float(n));
     ivec2 within = ivec2(at.x % side, at.y) / dots;
-    bool marked = n < 10 ? dot_of(n, within - ivec2(4, 3)) :
-        dot_of(n / 10, within - ivec2(2, 3)) || dot_of(n % 10, within - ivec2(6, 3));
+    bool marked = n < 10 ? glyph_pixel(n, within - ivec2(4, 3)) :
+        glyph_pixel(n / 10, within - ivec2(2, 3)) || glyph_pixel(n % 10, within - ivec2(6, 3));
     if (marked) color.rgb = dot(color.rgb, vec3(0.2126, 0.7152, 0.0722)) > 0.4 ? vec3(0.0) : vec3(1.0);
 }

@@ -57,6 +57,6 @@ void main() {
     color.rgb = value.rgb;
 #endif
 #ifdef MEANS_LIGHT
-    color.rgb = srgb(color.rgb);
+    color.rgb = linear_to_srgb(color.rgb);
 #endif
 }

@@ -19,8 +19,8 @@ void main() {
     if (pair.x + pair.y == 0.0) return;
     ivec2 way = level ? ivec2(0, 1) : ivec2(1, 0);
     ivec2 last = textureSize(source, 0) - 1;
-    vec3 before = srgb_decoded(texelFetch(source, max(texel - way, ivec2(0)), 0).rgb);
-    vec3 after = srgb_decoded(texelFetch(source, min(texel + way, last), 0).rgb);
-    vec3 here = srgb_decoded(color.rgb);
-    color.rgb = srgb(here + pair.x * (before - here) + pair.y * (after - here));
+    vec3 before = srgb_to_linear(texelFetch(source, max(texel - way, ivec2(0)), 0).rgb);
+    vec3 after = srgb_to_linear(texelFetch(source, min(texel + way, last), 0).rgb);
+    vec3 here = srgb_to_linear(color.rgb);
+    color.rgb = linear_to_srgb(here + pair.x * (before - here) + pair.y * (after - here));
 }

@@ -26,7 +26,7 @@ vec3 rgb(vec3 c) {
 
 vec3 shown(ivec2 texel) {
     texel = clamp(texel, ivec2(0), textureSize(source, 0) - 1);
-    return ycocg(srgb_decoded(texelFetch(source, texel, 0).rgb));
+    return ycocg(srgb_to_linear(texelFetch(source, texel, 0).rgb));
 }
 
 float depth_at(ivec2 texel) {
@@ -50,7 +50,7 @@ vec2 movement(ivec2 texel) {
     if (!is_nothing(d)) return texelFetch(velocity, nearest, 0).xy;
 #endif
     vec2 uv = (vec2(nearest) + 0.5) * depth_views[0].viewport.zw;
-    return velocity_of_still(depth_views[0], previous_depth_views[0], uv, d);
+    return static_velocity(depth_views[0], previous_depth_views[0], uv, d);
 }
 
 // A look-up that does not blur what is looked up again and again: cubic, by Catmull and Rom, of nine bilinear ones.
@@ -107,5 +107,5 @@ void main() {
     float count = min(floor(old.a + 0.5), most - 1.0) + 1.0;
     vec3 mean = count > 1.0 ? mix(old.rgb, now, 1.0 / count) : now;
     gathered = vec4(rgb(mean), count);
-    color = vec4(srgb(clamp(rgb(mean), 0.0, 1.0)), given.a);
+    color = vec4(linear_to_srgb(clamp(rgb(mean), 0.0, 1.0)), given.a);
 }

@@ -32,7 +32,7 @@ void main() {
         vec3 scene = max(texelFetch(radiance, ivec2(gl_FragCoord.xy), i).rgb, 0.0) * scale;
         sum += clamp(tone_curve(min(scene, 1e9)), 0.0, 1.0);
     }
-    color = vec4(srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
+    color = vec4(linear_to_srgb(sum / float(RADIANCE_SAMPLES)), 1.0);
 #if DITHER
     color.rgb += (interleaved_gradient_noise(gl_FragCoord.xy) - 0.5) * (0.998 / 255.0);  // whole steps stay so
 #endif

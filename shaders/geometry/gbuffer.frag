@@ -30,12 +30,12 @@ out vec4 phong_specular;
 out vec4 phong_ambient;
 #endif
 #ifdef WRITES_VELOCITY
-#include <moved.glsl>
+#include <fragment_velocity.glsl>
 out vec2 velocity;
 #endif
 
 void main() {
-    Surface s = surface_here(PASS_VIEW);
+    Surface s = fragment_surface(PASS_VIEW);
 #ifdef WRITES_ALBEDO
     albedo = vec4(sqrt(s.base_color), 1.0);
 #endif
@@ -55,7 +55,7 @@ void main() {
     grain = vec4(s.tangent, s.anisotropy);
 #endif
 #ifdef WRITES_VELOCITY
-    velocity = moved();
+    velocity = fragment_velocity();
 #endif
     empirical_reflectance(s, materials[MATERIAL_INDEX(v_material)]);
 #ifdef WRITES_PHONG_DIFFUSE

@@ -1,6 +1,6 @@
 // What an alpha mask leaves of a fragment. With several samples a texel each is asked, by alpha as it runs on straight
 // from here: alpha to coverage, with edges where the mask has them instead of a pattern.
-void cut_by_mask(float alpha, float cutoff) {
+void alpha_test(float alpha, float cutoff) {
 #if PASS_SAMPLES > 1
     vec2 slope = vec2(dFdx(alpha), dFdy(alpha));
     int covered = 0;

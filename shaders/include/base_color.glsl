@@ -9,7 +9,7 @@ centroid in vec4 v_color;
 uniform sampler2D base_color_texture;
 #endif
 
-vec4 base_color_at(int material) {
+vec4 fragment_base_color(int material) {
     vec4 color = materials[MATERIAL_INDEX(material)].base_color;
 #ifdef HAS_BASE_COLOR_TEXTURE
     color *= texture(base_color_texture, slot_uv(material, BASE_COLOR_SLOT, UV_SET(BASE_COLOR_UV)));

@@ -1,42 +1,42 @@
 // Microfacet terms. GGX: Walter et al. 2007; height-correlated Smith visibility: Heitz 2014; Fresnel: Schlick 1994.
 #include <math.glsl>
 
-float distribution_ggx(float n_h, float alpha) {
+float distribution_ggx(float NoH, float alpha) {
     float a2 = alpha * alpha;
-    float d = (n_h * a2 - n_h) * n_h + 1.0;
+    float d = (NoH * a2 - NoH) * NoH + 1.0;
     return a2 / (PI * d * d);
 }
 
 // The same for unit vectors: their cross product keeps the digits that 1 - (N.H)^2 loses near a smooth surface's peak.
 float distribution_ggx(vec3 n, vec3 h, float alpha) {
     vec3 sine = cross(n, h);
-    float n_h = max(dot(n, h), 0.0), a = n_h * alpha, d = dot(sine, sine) + a * a;
+    float NoH = max(dot(n, h), 0.0), a = NoH * alpha, d = dot(sine, sine) + a * a;
     return alpha * alpha / (PI * d * d);
 }
 
 // Masking and shadowing over 4 N.L N.V.
-float visibility_smith(float n_l, float n_v, float alpha) {
+float visibility_smith(float NoL, float NoV, float alpha) {
     float a2 = alpha * alpha;
-    float from_viewer = n_l * sqrt(n_v * n_v * (1.0 - a2) + a2);
-    float from_light = n_v * sqrt(n_l * n_l * (1.0 - a2) + a2);
+    float from_viewer = NoL * sqrt(NoV * NoV * (1.0 - a2) + a2);
+    float from_light = NoV * sqrt(NoL * NoL * (1.0 - a2) + a2);
     return 0.5 / (from_viewer + from_light);
 }
 
 // The same with the roots replaced by a straight line (Hammon 2017): up to 15 % off at grazing angles.
-float visibility_smith_fast(float n_l, float n_v, float alpha) {
-    return 0.5 / mix(2.0 * n_l * n_v, n_l + n_v, alpha);
+float visibility_smith_fast(float NoL, float NoV, float alpha) {
+    return 0.5 / mix(2.0 * NoL * NoV, NoL + NoV, alpha);
 }
 
-vec3 fresnel_schlick(vec3 f0, float f90, float v_h) {
-    float x = 1.0 - v_h;
+vec3 fresnel_schlick(vec3 f0, float f90, float VoH) {
+    float x = 1.0 - VoH;
     float x2 = x * x;
     return f0 + (f90 - f0) * (x2 * x2 * x);
 }
 
 // Anisotropic GGX as KHR_materials_anisotropy has it (Burley 2012, Heitz 2014).
-float distribution_ggx_anisotropic(float n_h, float t_h, float b_h, float alpha_t, float alpha_b) {
+float distribution_ggx_anisotropic(float NoH, float ToH, float BoH, float alpha_t, float alpha_b) {
     float a2 = alpha_t * alpha_b;
-    vec3 f = vec3(alpha_b * t_h, alpha_t * b_h, a2 * n_h);
+    vec3 f = vec3(alpha_b * ToH, alpha_t * BoH, a2 * NoH);
     float w2 = a2 / dot(f, f);
     return a2 * w2 * w2 / PI;
 }

@@ -1,8 +1,8 @@
 // Depth into another depth texture.
-#include <each_sample.glsl>
+#include <per_sample.glsl>
 
-uniform STORED depth;
+uniform SAMPLER_2D depth;
 
 void main() {
-    gl_FragDepth = texelFetch(depth, ivec2(gl_FragCoord.xy), HERE).r;
+    gl_FragDepth = texelFetch(depth, ivec2(gl_FragCoord.xy), SAMPLE_INDEX).r;
 }

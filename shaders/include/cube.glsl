@@ -13,7 +13,7 @@ vec3 cube_direction(int face, vec2 place) {
 }
 
 // The middle of a texel of a face of `side` texels, from -1 to 1.
-vec2 cube_place(ivec2 texel, int side) {
+vec2 cube_texel_center(ivec2 texel, int side) {
     return (vec2(texel) + 0.5) * (2.0 / float(side)) - 1.0;
 }
 

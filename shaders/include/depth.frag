@@ -6,15 +6,15 @@ flat in int v_material;
 #endif
 
 #ifdef WRITES_VELOCITY
-#include <moved.glsl>
+#include <fragment_velocity.glsl>
 out vec2 velocity;
 #endif
 
 void main() {
 #ifdef ALPHA_MASK
-    cut_by_mask(base_color_at(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
+    alpha_test(fragment_base_color(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
 #endif
 #ifdef WRITES_VELOCITY
-    velocity = moved();
+    velocity = fragment_velocity();
 #endif
 }

@@ -3,7 +3,7 @@
 #include <transform.glsl>
 
 void main() {
-    pass_mask_on();
-    pass_motion_on();
+    write_alpha_mask_varyings();
+    write_velocity_varyings();
     gl_Position = world_to_clip(object_to_world(in_position));
 }

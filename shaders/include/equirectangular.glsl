@@ -3,7 +3,7 @@
 
 // Radiance in a unit direction, averaged over about `angle` radians. The sampler repeats; rows must not, so that the
 // poles stay apart.
-vec3 picture_radiance(sampler2D picture, vec3 direction, float angle) {
+vec3 equirectangular_radiance(sampler2D picture, vec3 direction, float angle) {
     vec2 size = vec2(textureSize(picture, 0));
     float lod = max(log2(max(angle * size.y / PI, 1e-6)), 0.0);
     float edge = 0.5 * exp2(ceil(lod)) / size.y;

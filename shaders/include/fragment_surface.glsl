@@ -6,7 +6,7 @@
 
 in vec3 v_position;
 #if PASS_SAMPLES > 1
-centroid in vec4 v_place;  // v_position and 1, but on the surface
+centroid in vec4 v_centroid_position;  // v_position and 1, but on the surface
 #endif
 centroid in vec3 v_normal;
 flat in int v_material;
@@ -71,20 +71,20 @@ void tangent_frame(vec3 normal, out vec3 tangent, out vec3 bitangent) {
 #endif
 
 // Everything but lighting. Fragments cut away by an alpha mask end here.
-Surface surface_here(View view) {
+Surface fragment_surface(View view) {
     MaterialData m = materials[MATERIAL_INDEX(v_material)];
     Surface s;
 #if PASS_SAMPLES > 1
-    s.position = v_place.xyz / v_place.w;  // llvmpipe divides by the w of the pixel's middle: the 1 shows it
+    s.position = v_centroid_position.xyz / v_centroid_position.w;  // llvmpipe divides by the w of the pixel's middle: the 1 shows it
 #else
     s.position = v_position;
 #endif
-    s.to_viewer = to_viewer(view, s.position);
+    s.view_dir = view_dir(view, s.position);
     // Derivatives of the window's axes, right then up, so that it looks at the viewer.
     vec3 crossed = cross(dFdx(v_position), dFdy(v_position));
     s.geometric_normal = crossed * inversesqrt(max(dot(crossed, crossed), 1e-37));
 
-    vec4 base = base_color_at(v_material);
+    vec4 base = fragment_base_color(v_material);
     s.base_color = base.rgb;
     s.alpha = base.a;
 
@@ -151,7 +151,7 @@ Surface surface_here(View view) {
 #endif
     derive_reflectance(s, m, specular);
 #ifdef ALPHA_MASK
-    cut_by_mask(s.alpha, m.emissive.a);
+    alpha_test(s.alpha, m.emissive.a);
 #endif
 #ifndef ALPHA_BLEND
     s.alpha = 1.0;

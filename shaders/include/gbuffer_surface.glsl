@@ -4,45 +4,45 @@
 #include <surface.glsl>
 
 #if DEPTH_SAMPLES > 1
-#define STORED sampler2DMS
+#define SAMPLER_2D sampler2DMS
 #else
-#define STORED sampler2D
+#define SAMPLER_2D sampler2D
 #endif
 // Which sample of its texel a fragment lights; one that asks for its own number is run for each.
 #if defined(PER_SAMPLE)
-#define HERE gl_SampleID
+#define SAMPLE_INDEX gl_SampleID
 #elif defined(ONE_SAMPLE)
 uniform int sample_number;
-#define HERE sample_number
-#define position_at position_of_sample
+#define SAMPLE_INDEX sample_number
+#define position_at position_at_sample
 #else
-#define HERE TEXEL_CENTER
+#define SAMPLE_INDEX TEXEL_CENTER
 #endif
 
-uniform STORED albedo;
+uniform SAMPLER_2D albedo;
 #ifdef HAS_NORMAL
-uniform STORED normal;
+uniform SAMPLER_2D normal;
 #endif
 #ifdef HAS_MATERIAL
-uniform STORED material;
+uniform SAMPLER_2D material;
 #endif
 #ifdef HAS_EMISSIVE
-uniform STORED emissive;
+uniform SAMPLER_2D emissive;
 #endif
 #ifdef HAS_SPECULAR
-uniform STORED specular;
+uniform SAMPLER_2D specular;
 #endif
 #ifdef HAS_GRAIN
-uniform STORED grain;
+uniform SAMPLER_2D grain;
 #endif
 #ifdef HAS_PHONG_DIFFUSE
-uniform STORED phong_diffuse;
+uniform SAMPLER_2D phong_diffuse;
 #endif
 #ifdef HAS_PHONG_SPECULAR
-uniform STORED phong_specular;
+uniform SAMPLER_2D phong_specular;
 #endif
 #ifdef HAS_PHONG_AMBIENT
-uniform STORED phong_ambient;
+uniform SAMPLER_2D phong_ambient;
 #endif
 
 #ifdef HAS_NORMAL
@@ -62,7 +62,7 @@ bool surface_at(ivec2 texel, int number, out Surface s) {
     float d;
     s.position = position_at(texel, number, d);
     if (is_nothing(d)) return false;
-    s.to_viewer = to_viewer(depth_views[0], s.position);
+    s.view_dir = view_dir(depth_views[0], s.position);
 #ifdef HAS_LOOKUP
     s.geometric_normal = geometric_normal_at(texel, number, s.position, d);
 #else

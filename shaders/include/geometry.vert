@@ -2,5 +2,5 @@
 #include <geometry_vertex.glsl>
 
 void main() {
-    pass_vertex_on();
+    transform_vertex();
 }

@@ -5,19 +5,19 @@
 #include <radiance.glsl>
 
 #ifdef WRITES_SHADOW_DIFFERENCE
-vec3 shadow_places[2], shadow_normals[2];
+vec3 shadow_positions[2], shadow_normals[2];
 float could_reach = 0.0, changing = 0.0;  // irradiance without shadows, and what of it reaches one of the two places
 #endif
 
 // Light of one of them reflected to the viewer, by the scene's index.
-Reflected reflected_light(Surface s, int light) {
+ReflectedLight direct_lighting(Surface s, int light) {
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
     vec3 to_light;
     vec3 irradiance = irradiance_from(lights[light], s.position, to_light);
     if (dot(s.normal, to_light) > 0.0) {
 #ifdef WRITES_SHADOW_DIFFERENCE
-        float one = shadow(light, shadow_places[0], shadow_normals[0]);
-        float other = shadow(light, shadow_places[1], shadow_normals[1]);
+        float one = shadow(light, shadow_positions[0], shadow_normals[0]);
+        float other = shadow(light, shadow_positions[1], shadow_normals[1]);
         float reaching = luminance_of(irradiance) * dot(s.normal, to_light);
         could_reach += reaching;
         changing += reaching * abs(one - other);
@@ -27,22 +27,22 @@ Reflected reflected_light(Surface s, int light) {
 #endif
         irradiance *= open;
     }
-    Reflected one = reflected(s, to_light);
-    return Reflected(one.diffuse * irradiance, one.specular * irradiance);
+    ReflectedLight one = shade(s, to_light);
+    return ReflectedLight(one.diffuse * irradiance, one.specular * irradiance);
 #else
-    return Reflected(vec3(0.0), vec3(0.0));
+    return ReflectedLight(vec3(0.0), vec3(0.0));
 #endif
 }
 
 // Light of all; with DIRECTIONALS_ONLY of those alone that shine everywhere.
-Reflected reflected_lights(Surface s) {
-    Reflected sum = Reflected(vec3(0.0), vec3(0.0));
+ReflectedLight direct_lighting(Surface s) {
+    ReflectedLight sum = ReflectedLight(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0 && !defined(NO_LIGHTS)
     for (int i = 0; i < LIGHT_COUNT; ++i) {
 #ifdef DIRECTIONALS_ONLY
         if (lights[i].position.w > 0.0) continue;
 #endif
-        Reflected one = reflected_light(s, i);
+        ReflectedLight one = direct_lighting(s, i);
         sum.diffuse += one.diffuse;
         sum.specular += one.specular;
     }

@@ -3,8 +3,8 @@
 #include <material_vertex.glsl>
 #endif
 
-void pass_mask_on() {
+void write_alpha_mask_varyings() {
 #ifdef ALPHA_MASK
-    pass_material_on();
+    write_material_varyings();
 #endif
 }

@@ -14,7 +14,7 @@ in vec4 in_color;
 centroid out vec4 v_color;
 #endif
 
-void pass_material_on() {
+void write_material_varyings() {
     v_material = in_ids.x;
 #ifdef HAS_UV0
     v_uv0 = in_uv0;

@@ -1,5 +1,5 @@
 // Radiance of a surface: its terms put together.
-#include <around.glsl>
+#include <environment_lighting.glsl>
 
 #if defined(UNLIT) || defined(NEEDS_NOTHING)
 #define NO_LIGHTS
@@ -9,15 +9,15 @@
 uniform sampler2D occlusion;
 #endif
 
-const float LARGEST = 65504.0;  // of half floats: what is brighter would be stored as infinity
+const float MAX_HALF_FLOAT = 65504.0;  // of half floats: what is brighter would be stored as infinity
 
 // The part that is the same seen from all sides, which is what lights other surfaces.
-Reflected without_specular(Reflected light) {
-    return Reflected(light.diffuse, vec3(0.0));
+ReflectedLight diffuse_only(ReflectedLight light) {
+    return ReflectedLight(light.diffuse, vec3(0.0));
 }
 
 // The wanted terms of reflected light.
-vec3 terms_of(Reflected light) {
+vec3 selected_terms(ReflectedLight light) {
     vec3 sum = vec3(0.0);
 #if TERMS == TERMS_ALL || TERMS == TERMS_DIFFUSE
     sum += light.diffuse;
@@ -31,7 +31,7 @@ vec3 terms_of(Reflected light) {
 // What an unlit surface shows: its base colour, as emission.
 vec3 unlit_radiance(Surface s) {
 #if TERMS == TERMS_ALL || TERMS == TERMS_EMISSIVE
-    return min(s.base_color, LARGEST);
+    return min(s.base_color, MAX_HALF_FLOAT);
 #else
     return vec3(0.0);
 #endif
@@ -39,7 +39,7 @@ vec3 unlit_radiance(Surface s) {
 
 // Radiance towards the viewer: the wanted terms of what lights and what all around reflect, of the latter what surface
 // and picture leave open.
-vec3 radiance_of(Surface s, Reflected light, Reflected around) {
+vec3 radiance_of(Surface s, ReflectedLight light, ReflectedLight around) {
 #ifdef NO_LIGHTS
     return unlit_radiance(s);
 #else
@@ -51,12 +51,12 @@ vec3 radiance_of(Surface s, Reflected light, Reflected around) {
 #ifdef HAS_OCCLUSION
     s.occlusion *= texelFetch(occlusion, ivec2(gl_FragCoord.xy), 0).r;
 #endif
-#ifdef MIRRORS_ENVIRONMENT
-    sum += around.diffuse * s.diffuse * s.occlusion + around.specular * specular_open(s, s.occlusion);
+#ifdef HAS_ENVIRONMENT_SPECULAR
+    sum += around.diffuse * s.diffuse * s.occlusion + around.specular * specular_occlusion(s, s.occlusion);
 #else
     sum += around.diffuse * s.ambient * s.occlusion;
 #endif
 #endif
-    return min(sum + terms_of(light), LARGEST);
+    return min(sum + selected_terms(light), MAX_HALF_FLOAT);
 #endif
 }

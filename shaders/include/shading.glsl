@@ -1,6 +1,6 @@
 // The shading models, one include each with one signature:
 //
-//     Reflected reflected(Surface surface, vec3 to_light)
+//     ReflectedLight shade(Surface surface, vec3 to_light)
 //
 // Radiance towards the viewer for an irradiance of 1 on a surface that faces the light: the cosine is in it. The
 // diffuse part is proportional to `surface.diffuse`; light computed at vertices leaves that factor to the fragments.
@@ -9,7 +9,7 @@
 // light shows and the base colour alone is looked at.
 #include <surface.glsl>
 
-struct Reflected {
+struct ReflectedLight {
     vec3 diffuse;
     vec3 specular;
 };

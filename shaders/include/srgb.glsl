@@ -1,8 +1,8 @@
 // The sRGB transfer function (IEC 61966-2-1): display-linear to encoded and back, 0 to 1.
-vec3 srgb(vec3 c) {
+vec3 linear_to_srgb(vec3 c) {
     return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, greaterThan(c, vec3(0.0031308)));
 }
 
-vec3 srgb_decoded(vec3 c) {
+vec3 srgb_to_linear(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
 }

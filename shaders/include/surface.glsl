@@ -11,7 +11,7 @@ struct Surface {
     vec3 position;
     vec3 normal;            // unit, for shading
     vec3 geometric_normal;  // unit, of the triangle, towards the viewer
-    vec3 to_viewer;         // unit
+    vec3 view_dir;         // unit
     vec3 tangent;           // unit, along the grain; with NEEDS_GRAIN, as the anisotropic model has it
     vec3 bitangent;
     vec3 base_color;

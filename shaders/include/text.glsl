@@ -7,7 +7,7 @@ const int GLYPHS[46] = int[](
 const int BLANK = 45;
 
 // Whether a dot of a character is set; dots count from the lower left.
-bool dot_of(int character, ivec2 at) {
+bool glyph_pixel(int character, ivec2 at) {
     if (any(lessThan(at, ivec2(0))) || at.x > 2 || at.y > 4) return false;
     return (GLYPHS[character] >> (at.y * 3 + 2 - at.x) & 1) == 1;
 }

@@ -10,8 +10,8 @@ in vec4 in_object2;
 in vec4 in_previous0;  // the same in the frame before
 in vec4 in_previous1;
 in vec4 in_previous2;
-centroid out vec4 v_now;  // where a point is and was, in clip space
-centroid out vec4 v_before;
+centroid out vec4 v_clip_position;  // where a point is and was, in clip space
+centroid out vec4 v_previous_clip_position;
 #endif
 
 invariant gl_Position;
@@ -49,11 +49,11 @@ vec4 world_to_clip(vec3 position) {
 }
 
 // What a fragment needs to know how far its point has moved; `velocity.glsl` says that.
-void pass_motion_on() {
+void write_velocity_varyings() {
 #ifdef WRITES_VELOCITY
     vec4 q = vec4(in_position, 1.0);
     vec3 before = vec3(dot(in_previous0, q), dot(in_previous1, q), dot(in_previous2, q));
-    v_now = world_to_clip(object_to_world(in_position));
-    v_before = PREVIOUS_PASS_VIEW.view_projection * vec4(before, 1.0);
+    v_clip_position = world_to_clip(object_to_world(in_position));
+    v_previous_clip_position = PREVIOUS_PASS_VIEW.view_projection * vec4(before, 1.0);
 #endif
 }

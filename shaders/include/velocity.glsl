@@ -7,7 +7,7 @@ vec2 velocity_between(vec4 now, View view, vec4 before, View previous) {
 }
 
 // The same of a point of the picture at a depth, of what stands still. Where nothing is, it is infinitely far away.
-vec2 velocity_of_still(View view, View previous, vec2 uv, float depth) {
+vec2 static_velocity(View view, View previous, vec2 uv, float depth) {
     vec4 now = vec4(uv * 2.0 - 1.0, depth, 1.0);
     vec3 position = world_position(view, uv, depth);
     vec4 point = vec4(position, 1.0);

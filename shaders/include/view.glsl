@@ -29,7 +29,7 @@ bool nearer(float depth, float other) {
 }
 
 // View-space position of a window position (0 to 1, bottom left first) and a window depth.
-vec3 position_in_view(View v, vec2 uv, float depth) {
+vec3 view_space_position(View v, vec2 uv, float depth) {
     vec4 p = v.inverse_projection * vec4(uv * 2.0 - 1.0, depth, 1.0);
     return p.xyz / p.w;
 }
@@ -37,7 +37,7 @@ vec3 position_in_view(View v, vec2 uv, float depth) {
 // The same in world space. By way of view space, where the numbers near the eye are small: float32 keeps more of them
 // than through the whole inverse at once.
 vec3 world_position(View v, vec2 uv, float depth) {
-    return (v.inverse_view * vec4(position_in_view(v, uv, depth), 1.0)).xyz;
+    return (v.inverse_view * vec4(view_space_position(v, uv, depth), 1.0)).xyz;
 }
 
 // Distance along the view axis in metres of a window position and depth, whatever the projection.
@@ -52,6 +52,6 @@ float linear_depth(View v, float depth) {
 }
 
 // Unit vector from a world-space position to the viewer.
-vec3 to_viewer(View v, vec3 position) {
+vec3 view_dir(View v, vec3 position) {
     return normalize(v.eye.xyz - position * v.eye.w);
 }

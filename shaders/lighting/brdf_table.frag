@@ -20,22 +20,22 @@ vec3 visible_half_vector(vec3 viewer, vec2 point, float alpha) {
 }
 
 void main() {
-    float n_v = v_uv.x * v_uv.x, alpha = max(v_uv.y * v_uv.y, 0.001);
-    vec3 viewer = vec3(sqrt(1.0 - n_v * n_v), 0.0, n_v);
-    float unmasked = 2.0 * n_v / (n_v + sqrt(n_v * n_v * (1.0 - alpha * alpha) + alpha * alpha));
+    float NoV = v_uv.x * v_uv.x, alpha = max(v_uv.y * v_uv.y, 0.001);
+    vec3 viewer = vec3(sqrt(1.0 - NoV * NoV), 0.0, NoV);
+    float unmasked = 2.0 * NoV / (NoV + sqrt(NoV * NoV * (1.0 - alpha * alpha) + alpha * alpha));
     vec2 sum = vec2(0.0);
     for (int i = 0; i < TABLE_SAMPLES; ++i) {
         vec3 h = visible_half_vector(viewer, hammersley(i, TABLE_SAMPLES), alpha);
-        float v_h = max(dot(viewer, h), 0.0);
-        float n_l = 2.0 * v_h * h.z - n_v;
-        if (n_l <= 0.0) continue;
+        float VoH = max(dot(viewer, h), 0.0);
+        float NoL = 2.0 * VoH * h.z - NoV;
+        if (NoL <= 0.0) continue;
 #if SMITH == SMITH_FAST
-        float visible = visibility_smith_fast(n_l, n_v, alpha);
+        float visible = visibility_smith_fast(NoL, NoV, alpha);
 #else
-        float visible = visibility_smith(n_l, n_v, alpha);
+        float visible = visibility_smith(NoL, NoV, alpha);
 #endif
-        float grazing = pow(1.0 - v_h, 5.0);
-        sum += 4.0 * visible * n_l * n_v / unmasked * vec2(1.0 - grazing, grazing);
+        float grazing = pow(1.0 - VoH, 5.0);
+        sum += 4.0 * visible * NoL * NoV / unmasked * vec2(1.0 - grazing, grazing);
     }
     brdf_table = sum / float(TABLE_SAMPLES);
 }

@@ -31,7 +31,7 @@ void main() {
 #ifdef HAS_NORMAL
     View v = depth_views[0];
     vec3 up = normalize(texelFetch(normal, texel, 0).xyz), across = mat3(v.view) * up;
-    vec3 position = position_in_view(v, (vec2(texel) + DEPTH_SAMPLE_POSITIONS[0]) * v.viewport.zw, d);
+    vec3 position = view_space_position(v, (vec2(texel) + DEPTH_SAMPLE_POSITIONS[0]) * v.viewport.zw, d);
     float alike = cos(radians(normal_angle)), steep = sin(radians(depth_angle));
 #endif
     for (int i = 1; i < DEPTH_SAMPLES; ++i) {
@@ -47,7 +47,7 @@ void main() {
         found = found || differs(specular, texel, i);
 #endif
 #ifdef HAS_NORMAL
-        vec3 away = position_in_view(v, (vec2(texel) + DEPTH_SAMPLE_POSITIONS[i]) * v.viewport.zw, other) - position;
+        vec3 away = view_space_position(v, (vec2(texel) + DEPTH_SAMPLE_POSITIONS[i]) * v.viewport.zw, other) - position;
         bool turned = dot(normalize(texelFetch(normal, texel, i).xyz), up) < alike;
         found = found || !nothing && (turned || abs(dot(away, across)) > steep * length(away));
 #endif

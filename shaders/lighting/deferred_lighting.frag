@@ -28,7 +28,7 @@ int opposite(int number) {
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    int number = HERE;
+    int number = SAMPLE_INDEX;
 #ifdef ONE_SAMPLE
     gl_SampleMask[0] = 1 << number;
 #endif
@@ -56,18 +56,18 @@ void main() {
         for (int i = 0; i < 2; ++i) {
             float d;
             int place = i == 0 || number == 0 ? first : opposite(first);
-            shadow_places[i] = position_of_sample(texel, place, d);
-            shadow_normals[i] = geometric_normal_at(texel, place, shadow_places[i], d);
+            shadow_positions[i] = position_at_sample(texel, place, d);
+            shadow_normals[i] = geometric_normal_at(texel, place, shadow_positions[i], d);
         }
 #endif
-        Reflected light = reflected_lights(s);
-        Reflected around = light_around(s);
+        ReflectedLight light = direct_lighting(s);
+        ReflectedLight around = environment_lighting(s);
         radiance = vec4(radiance_of(s, light, around), 1.0);
 #ifdef WRITES_SHADOW_DIFFERENCE
         if (number != 0 && could_reach > 0.0) shadow_difference = min(changing / could_reach, 254.0 / 255.0);
 #endif
 #ifdef WRITES_DIFFUSE
-        diffuse = vec4(radiance_of(s, without_specular(light), without_specular(around)), 1.0);
+        diffuse = vec4(radiance_of(s, diffuse_only(light), diffuse_only(around)), 1.0);
 #endif
     } else {
         radiance = vec4(unlit_radiance(s), 1.0);

@@ -14,11 +14,11 @@ void main() {
 #ifdef WRITES_DIFFUSE
     diffuse = radiance;
 #endif
-    if (surface_at(ivec2(gl_FragCoord.xy), HERE, s) && s.lit > 0.0) {
-        Reflected one = reflected_light(s, light);
-        radiance.rgb = min(terms_of(one), LARGEST);
+    if (surface_at(ivec2(gl_FragCoord.xy), SAMPLE_INDEX, s) && s.lit > 0.0) {
+        ReflectedLight one = direct_lighting(s, light);
+        radiance.rgb = min(selected_terms(one), MAX_HALF_FLOAT);
 #ifdef WRITES_DIFFUSE
-        diffuse.rgb = min(terms_of(without_specular(one)), LARGEST);
+        diffuse.rgb = min(selected_terms(diffuse_only(one)), MAX_HALF_FLOAT);
 #endif
     }
 }

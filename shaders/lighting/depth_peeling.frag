@@ -3,20 +3,20 @@
 #include <pass_view.glsl>
 #include <fragment_surface.glsl>
 #include <lighting.glsl>
-#include <each_sample.glsl>
+#include <per_sample.glsl>
 
-uniform STORED depth;  // of opaque surfaces
+uniform SAMPLER_2D depth;  // of opaque surfaces
 #ifdef PEELED
-uniform STORED before;  // of the layer before
+uniform SAMPLER_2D before;  // of the layer before
 #endif
 out vec4 layer;  // scene-linear, premultiplied; alpha is opacity
 
 void main() {
-    Surface s = surface_here(PASS_VIEW);  // first: it takes derivatives, for which neighbours have to be there
+    Surface s = fragment_surface(PASS_VIEW);  // first: it takes derivatives, for which neighbours have to be there
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    if (nearer(texelFetch(depth, texel, HERE).r, gl_FragCoord.z)) discard;
+    if (nearer(texelFetch(depth, texel, SAMPLE_INDEX).r, gl_FragCoord.z)) discard;
 #ifdef PEELED
-    if (!nearer(texelFetch(before, texel, HERE).r, gl_FragCoord.z)) discard;
+    if (!nearer(texelFetch(before, texel, SAMPLE_INDEX).r, gl_FragCoord.z)) discard;
 #endif
-    layer = vec4(radiance_of(s, reflected_lights(s), light_around(s)) * s.alpha, s.alpha);
+    layer = vec4(radiance_of(s, direct_lighting(s), environment_lighting(s)) * s.alpha, s.alpha);
 }

@@ -14,9 +14,9 @@ void main() {
     if (any(greaterThanEqual(cell.xy, ivec2(side)))) return;
     vec3 sum = vec3(0.0), lean = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        vec2 place = cube_place(2 * cell.xy + ivec2(i & 1, i >> 1), 2 * side);
+        vec2 place = cube_texel_center(2 * cell.xy + ivec2(i & 1, i >> 1), 2 * side);
         vec3 direction = cube_direction(cell.z, place);
-        vec3 light = picture_radiance(map, direction, sqrt(cube_solid_angle(place, 2 * side)));
+        vec3 light = equirectangular_radiance(map, direction, sqrt(cube_solid_angle(place, 2 * side)));
         sum += light;
         // As places of the face, so that of even light it is the middle; in the dark, too.
         vec3 away = abs(direction);

@@ -13,8 +13,8 @@ void main() {
     // Four samples a texel: a sun of one texel of the picture would otherwise count too much or too little.
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 4; ++i) {
-        vec2 place = cube_place(2 * texel.xy + ivec2(i & 1, i >> 1), 2 * side);
-        sum += picture_radiance(map, cube_direction(texel.z, place), sqrt(cube_solid_angle(place, 2 * side)));
+        vec2 place = cube_texel_center(2 * texel.xy + ivec2(i & 1, i >> 1), 2 * side);
+        sum += equirectangular_radiance(map, cube_direction(texel.z, place), sqrt(cube_solid_angle(place, 2 * side)));
     }
     imageStore(cube, texel, vec4(0.25 * sum, 1.0));
 }

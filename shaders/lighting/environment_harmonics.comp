@@ -30,7 +30,7 @@ void main() {
     for (int i = int(gl_LocalInvocationIndex); i < 6 * side * side; i += 256) {
         int face = i / (side * side);
         ivec2 texel = ivec2(i % side, i / side % side);
-        vec2 place = cube_place(texel, side);
+        vec2 place = cube_texel_center(texel, side);
         vec3 d = cube_direction(face, place);
         vec3 light = texelFetch(cells, ivec3(texel, face), level).rgb * cube_solid_angle(place, side);
         sums[0] += light * 0.282095;

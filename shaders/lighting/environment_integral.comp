@@ -13,10 +13,10 @@ uniform writeonly imageCube specular;
 const int COARSE = 2;  // bits of the side of the coarsest level
 
 // GGX's lobe around four normals, seen along them, times N.L; but for a factor.
-vec4 lobes(vec4 n_l, float a2) {
-    n_l = max(n_l, 0.0);
-    vec4 fall = 0.5 * (1.0 + a2) - 0.5 * (1.0 - a2) * n_l;
-    return n_l / (fall * fall);
+vec4 lobes(vec4 NoL, float a2) {
+    NoL = max(NoL, 0.0);
+    vec4 fall = 0.5 * (1.0 + a2) - 0.5 * (1.0 - a2) * NoL;
+    return NoL / (fall * fall);
 }
 
 // A face's area around a direction, over the solid angle.
@@ -42,7 +42,7 @@ void main() {
     vec3 middle = cube_direction(block.z, (4.0 * vec2(block.xy) + 2.0) / float(side) - 1.0);
     vec4 x, y, z;
     for (int k = 0; k < 4; ++k) {
-        vec3 normal = cube_direction(block.z, cube_place(2 * block.xy + ivec2(k & 1, k >> 1), side));
+        vec3 normal = cube_direction(block.z, cube_texel_center(2 * block.xy + ivec2(k & 1, k >> 1), side));
         x[k] = normal.x;
         y[k] = normal.y;
         z[k] = normal.z;
@@ -57,7 +57,7 @@ void main() {
     while (at < 6 << (2 * bits)) {
         int number = at & ((1 << (2 * bits)) - 1), face = at >> (2 * bits);
         ivec2 cell = ivec2(halved_bits(number), halved_bits(number >> 1));
-        vec3 direction = cube_direction(face, cube_place(cell, 1 << bits));
+        vec3 direction = cube_direction(face, cube_texel_center(cell, 1 << bits));
         float area = squeezed(direction) / float(1 << (2 * bits));
         float cosine = dot(middle, direction), width2 = 4.0 * area, reach = 0.75 * sqrt(width2) + radius;
         bool seen = cosine > -reach;

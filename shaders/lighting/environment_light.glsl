@@ -43,10 +43,10 @@ vec3 mirrored_light(vec3 d, float roughness) {
 }
 
 vec3 light_from(vec3 direction, float lobe) {
-    vec3 d = in_environment(direction);
+    vec3 d = world_to_environment(direction);
     vec3 light;
     if (lobe > 1.0) light = diffuse_light(d);
     else if (lobe >= 0.0) light = mirrored_light(d, lobe);
-    else light = picture_radiance(map, d, -lobe);
-    return light * environment_turn.z;
+    else light = equirectangular_radiance(map, d, -lobe);
+    return light * environment_transform.z;
 }

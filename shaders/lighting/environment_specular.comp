@@ -29,7 +29,7 @@ void work_out_samples() {
 void main() {
     ivec3 texel = ivec3(gl_GlobalInvocationID);
     int side = imageSize(specular).x;
-    vec3 normal = cube_direction(texel.z, cube_place(texel.xy, side));
+    vec3 normal = cube_direction(texel.z, cube_texel_center(texel.xy, side));
     vec3 sum = vec3(0.0);
     work_out_samples();
     vec3 tangent = any_tangent(normal);

@@ -1,6 +1,6 @@
 // Varyings between the vertex and the geometry shader, which hands them on under their own names.
 #define v_position g_position
-#define v_place g_place
+#define v_centroid_position g_centroid_position
 #define v_normal g_normal
 #define v_material g_material
 #define v_object g_object

@@ -3,5 +3,5 @@
 #include <geometry_vertex.glsl>
 
 void main() {
-    pass_vertex_on();
+    transform_vertex();
 }

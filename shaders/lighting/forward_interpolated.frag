@@ -11,8 +11,8 @@ out vec4 diffuse;  // the same without its specular part
 #endif
 
 void main() {
-    Surface s = surface_here(PASS_VIEW);
-    Reflected light = Reflected(v_diffuse, v_specular);
+    Surface s = fragment_surface(PASS_VIEW);
+    ReflectedLight light = ReflectedLight(v_diffuse, v_specular);
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) {
         float lit = shadow(shadow_lights[k], s.position, s.geometric_normal);
@@ -22,12 +22,12 @@ void main() {
 #endif
     light.diffuse *= s.diffuse;
 #ifdef HAS_ENVIRONMENT
-    Reflected around = Reflected(v_around_diffuse, v_around_specular);
+    ReflectedLight around = ReflectedLight(v_around_diffuse, v_around_specular);
 #else
-    Reflected around = light_around(s);
+    ReflectedLight around = environment_lighting(s);
 #endif
     radiance = vec4(radiance_of(s, light, around) * s.alpha, s.alpha);
 #ifdef WRITES_DIFFUSE
-    diffuse = vec4(radiance_of(s, without_specular(light), without_specular(around)) * s.alpha, s.alpha);
+    diffuse = vec4(radiance_of(s, diffuse_only(light), diffuse_only(around)) * s.alpha, s.alpha);
 #endif
 }

@@ -9,10 +9,10 @@ out vec4 diffuse;  // the same without its specular part
 #endif
 
 void main() {
-    Surface s = surface_here(PASS_VIEW);
-    Reflected light = reflected_lights(s), around = light_around(s);
+    Surface s = fragment_surface(PASS_VIEW);
+    ReflectedLight light = direct_lighting(s), around = environment_lighting(s);
     radiance = vec4(radiance_of(s, light, around) * s.alpha, s.alpha);
 #ifdef WRITES_DIFFUSE
-    diffuse = vec4(radiance_of(s, without_specular(light), without_specular(around)) * s.alpha, s.alpha);
+    diffuse = vec4(radiance_of(s, diffuse_only(light), diffuse_only(around)) * s.alpha, s.alpha);
 #endif
 }

@@ -8,8 +8,8 @@ layout(triangle_strip, max_vertices = 3) out;
 
 in vec3 g_position[];
 #if PASS_SAMPLES > 1
-centroid in vec4 g_place[];
-centroid out vec4 v_place;
+centroid in vec4 g_centroid_position[];
+centroid out vec4 v_centroid_position;
 #endif
 centroid in vec3 g_normal[];
 flat in int g_material[];
@@ -56,7 +56,7 @@ void main() {
 #endif
         v_position = g_position[i];
 #if PASS_SAMPLES > 1
-        v_place = g_place[i];
+        v_centroid_position = g_centroid_position[i];
 #endif
         v_normal = g_normal[i];
         v_material = g_material[i];

@@ -5,7 +5,7 @@
 #include "vertex_light_varyings.glsl"
 
 void main() {
-    pass_vertex_on();
+    transform_vertex();
     VertexLight light = vertex_light(v_material, v_position, normalize(v_normal));
     v_diffuse = light.rest.diffuse;
     v_specular = light.rest.specular;

@@ -12,18 +12,18 @@ out vec4 diffuse;  // the same without its specular part
 #endif
 
 void main() {
-    Surface s = surface_here(PASS_VIEW);
+    Surface s = fragment_surface(PASS_VIEW);
 #ifdef FIRST_PASS
-    Reflected none = Reflected(vec3(0.0), vec3(0.0)), around = light_around(s);
+    ReflectedLight none = ReflectedLight(vec3(0.0), vec3(0.0)), around = environment_lighting(s);
     radiance = vec4(radiance_of(s, none, around), 1.0);
 #ifdef WRITES_DIFFUSE
-    diffuse = vec4(radiance_of(s, none, without_specular(around)), 1.0);
+    diffuse = vec4(radiance_of(s, none, diffuse_only(around)), 1.0);
 #endif
 #else
-    Reflected one = reflected_light(s, light);
-    radiance = vec4(min(terms_of(one), LARGEST), 0.0);
+    ReflectedLight one = direct_lighting(s, light);
+    radiance = vec4(min(selected_terms(one), MAX_HALF_FLOAT), 0.0);
 #ifdef WRITES_DIFFUSE
-    diffuse = vec4(min(terms_of(without_specular(one)), LARGEST), 0.0);
+    diffuse = vec4(min(selected_terms(diffuse_only(one)), MAX_HALF_FLOAT), 0.0);
 #endif
 #endif
 }

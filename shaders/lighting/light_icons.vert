@@ -57,5 +57,5 @@ void main() {
         : l.direction.w == 1.0        ? point_light(l, radius, part, turn)
                                       : spot_light(l, radius, part, turn, last);
     gl_Position = PASS_VIEW.view_projection * vec4(place, 1.0);
-    g_tint = srgb(l.color.rgb / max(max(l.color.r, max(l.color.g, l.color.b)), 1e-9));
+    g_tint = linear_to_srgb(l.color.rgb / max(max(l.color.r, max(l.color.g, l.color.b)), 1e-9));
 }

@@ -3,13 +3,13 @@
 #include <pass_view.glsl>
 #include <lights.glsl>
 #include <math.glsl>
-#include <around.glsl>
+#include <environment_lighting.glsl>
 
 struct VertexLight {
-    Reflected around;
-    Reflected rest;  // of lights without shadows
+    ReflectedLight around;
+    ReflectedLight rest;  // of lights without shadows
 #if SHADOW_LIGHT_COUNT > 0
-    Reflected shadowed[SHADOW_LIGHT_COUNT];
+    ReflectedLight shadowed[SHADOW_LIGHT_COUNT];
 #endif
 };
 
@@ -19,9 +19,9 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     s.position = position;
     s.normal = normal;
     s.geometric_normal = normal;
-    s.to_viewer = to_viewer(PASS_VIEW, position);
+    s.view_dir = view_dir(PASS_VIEW, position);
 #ifdef DOUBLE_SIDED
-    if (dot(s.normal, s.to_viewer) < 0.0) s.normal = -s.normal;
+    if (dot(s.normal, s.view_dir) < 0.0) s.normal = -s.normal;
 #endif
     s.base_color = m.base_color.rgb;
     s.metallic = m.surface.x;
@@ -34,8 +34,8 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     s.diffuse = vec3(1.0);
 
     VertexLight sum;
-    sum.around = light_around(s);
-    sum.rest = Reflected(vec3(0.0), vec3(0.0));
+    sum.around = environment_lighting(s);
+    sum.rest = ReflectedLight(vec3(0.0), vec3(0.0));
 #if LIGHT_COUNT > 0
 #if SHADOW_LIGHT_COUNT > 0
     for (int k = 0; k < SHADOW_LIGHT_COUNT; ++k) sum.shadowed[k] = sum.rest;
@@ -43,7 +43,7 @@ VertexLight vertex_light(int material, vec3 position, vec3 normal) {
     for (int i = 0; i < LIGHT_COUNT; ++i) {
         vec3 to_light;
         vec3 irradiance = irradiance_from(lights[i], position, to_light);
-        Reflected one = reflected(s, to_light);
+        ReflectedLight one = shade(s, to_light);
         one.diffuse *= irradiance;
         one.specular *= irradiance;
         bool apart = false;

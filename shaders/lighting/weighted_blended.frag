@@ -24,8 +24,8 @@ float weight_of(float z) {
 
 void main() {
     View view = PASS_VIEW;
-    Surface s = surface_here(view);
-    vec3 color = radiance_of(s, reflected_lights(s), light_around(s));
+    Surface s = fragment_surface(view);
+    vec3 color = radiance_of(s, direct_lighting(s), environment_lighting(s));
     float z = max(linear_depth(view, gl_FragCoord.z), 0.0) / unit;
     sums = vec4(color, 1.0) * s.alpha * weight_of(z);
     left = s.alpha;

@@ -1,14 +1,14 @@
 // The mean of blended surfaces, with the opacity that all of them have together.
-#include <each_sample.glsl>
+#include <per_sample.glsl>
 
-uniform STORED sums;  // colour and opacity, weighed
-uniform STORED left;  // what shows of the background
+uniform SAMPLER_2D sums;  // colour and opacity, weighed
+uniform SAMPLER_2D left;  // what shows of the background
 out vec4 radiance;    // scene-linear, premultiplied; alpha is opacity
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    vec4 sum = texelFetch(sums, texel, HERE);
+    vec4 sum = texelFetch(sums, texel, SAMPLE_INDEX);
     if (sum.a == 0.0) discard;
-    float opacity = 1.0 - texelFetch(left, texel, HERE).r;
+    float opacity = 1.0 - texelFetch(left, texel, SAMPLE_INDEX).r;
     radiance = vec4(sum.rgb / sum.a, 1.0) * opacity;
 }

@@ -46,7 +46,7 @@ void main() {
 #ifdef HAS_VELOCITY
     vec2 moved = texelFetch(velocity, texel, 0).xy;
 #else
-    vec2 moved = velocity_of_still(v, previous_depth_views[0], uv, d);
+    vec2 moved = static_velocity(v, previous_depth_views[0], uv, d);
 #endif
     // Both pictures are jittered, each in its own way.
     vec2 place = (uv - v.jitter.xy - moved + previous_depth_views[0].jitter.xy) * v.viewport.xy - 0.5;

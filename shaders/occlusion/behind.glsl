@@ -16,5 +16,5 @@ vec3 light_from_behind(View v, ivec2 there, vec3 position, vec4 here, float w, f
     float scale = clip_w(v, seen.w) / w;
     float area = share * scale * scale / max(abs(dot(seen.xyz, sight)), 0.05);
     vec3 sent = texelFetch(back_diffuse, texel_for(there, size, screen), 0).rgb;
-    return sent * disc_transfer(apart, area / SENDING_DISCS, facing, dot(here.xyz, offset) / apart);
+    return sent * disc_form_factor(apart, area / SENDING_DISCS, facing, dot(here.xyz, offset) / apart);
 }

@@ -11,7 +11,7 @@ uniform float thickness;  // in radii
 #endif
 #include "quad.glsl"
 #include "value.glsl"
-#include <disc_to_disc.glsl>
+#include <disc_form_factor.glsl>
 uniform sampler2D surfaces;
 uniform ivec2 screen;
 uniform float radius;  // metres
@@ -106,7 +106,7 @@ vec4 gathered_at(View v, ivec2 texel, vec2 middle, vec3 position, vec4 here) {
 #endif
                 sent = look_up(diffuse, texel_for(there, size, screen), screen).rgb;
                 float towards = dot(here.xyz, offset) / apart;
-                light += sent * disc_transfer(apart, ring / SENDING_DISCS / slant, facing, towards);
+                light += sent * disc_form_factor(apart, ring / SENDING_DISCS / slant, facing, towards);
             }
 #endif
 #ifdef BUNNELL

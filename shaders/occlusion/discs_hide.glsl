@@ -1,6 +1,6 @@
 // What discs hide of the sky, the other of `ssao_disc`'s two forms (M. Bunnell, "Dynamic Ambient Occlusion and Indirect
 // Lighting", GPU Gems 2, 2005).
-#include <disc_to_disc.glsl>
+#include <disc_form_factor.glsl>
 
 // A large disc hides less than its parts would. All are as large as if there were this many of them, so that how dark
 // it is does not depend on how many samples are taken.

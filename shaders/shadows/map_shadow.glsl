@@ -31,7 +31,7 @@ bool place_in_layer(int layer, vec3 position, vec3 normal, out vec3 place) {
     vec3 up = (back[1].xyz - position * back[1].w) * texel.y;
     float lean = abs(dot(across, normal)) + abs(dot(up, normal));
     vec3 moved = normal * (normal_offset * MAP_HALF_WIDTH * lean);
-    moved += to_viewer(view, position) * (bias * max(length(across), length(up)));
+    moved += view_dir(view, position) * (bias * max(length(across), length(up)));
     clip += view.view_projection * vec4(moved, 0.0);
     place = clip.xyz / clip.w;
 #ifdef MAP_SLOPE

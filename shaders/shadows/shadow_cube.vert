@@ -4,6 +4,6 @@
 #include <transform.glsl>
 
 void main() {
-    pass_mask_on();
+    write_alpha_mask_varyings();
     gl_Position = vec4(object_to_world(in_position), 1.0);
 }

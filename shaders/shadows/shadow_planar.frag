@@ -9,7 +9,7 @@ out vec4 visibility;
 
 void main() {
 #ifdef ALPHA_MASK
-    cut_by_mask(base_color_at(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
+    alpha_test(fragment_base_color(v_material).a, materials[MATERIAL_INDEX(v_material)].emissive.a);
 #endif
     visibility = vec4(0.0);
 }

@@ -16,7 +16,7 @@ const float ON_IT = 1e-4;  // metres: what lies in the plane casts nothing on it
 
 void main() {
     Projection p = all_projections[layer];
-    pass_mask_on();
+    write_alpha_mask_varyings();
     vec3 position = object_to_world(in_position);
     float height = dot(p.plane, vec4(position, 1.0));
     vec4 fallen = p.onto * vec4(position, 1.0);

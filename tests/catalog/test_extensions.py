@@ -21,11 +21,11 @@ from rendergraph.resources import folder
 HEAD = "from rendergraph.api import Extension, MeshData, Semantic\n"
 TOON = """// Three steps of light.
 #include "steps.glsl"
-Reflected reflected(Surface s, vec3 to_light) {
-    return Reflected(s.diffuse * stepped(max(dot(s.normal, to_light), 0.0)), vec3(0.0));
+ReflectedLight shade(Surface s, vec3 light_dir) {
+    return ReflectedLight(s.diffuse * stepped(max(dot(s.normal, light_dir), 0.0)), vec3(0.0));
 }
 """
-STEPS = "float stepped(float n_l) { return floor(n_l * 3.0) / 3.0; }\n"
+STEPS = "float stepped(float NoL) { return floor(NoL * 3.0) / 3.0; }\n"
 Write = Callable[..., Path]
 
 
@@ -186,8 +186,8 @@ CHOICES = """EXTENSION = Extension(choices={
 })"""
 COMBED = """// Looks at everything there is.
 #pragma needs(phong, grain)
-Reflected reflected(Surface s, vec3 to_light) {
-    return Reflected(s.diffuse * max(dot(s.normal, to_light), 0.0), s.f0 * (s.anisotropy + 0.001 * s.exponent));
+ReflectedLight shade(Surface s, vec3 light_dir) {
+    return ReflectedLight(s.diffuse * max(dot(s.normal, light_dir), 0.0), s.f0 * (s.anisotropy + 0.001 * s.exponent));
 }
 """
 HALVE = "// Half of it.\nvec3 tone_curve(vec3 color) { return 0.5 * color; }\n"
@@ -250,7 +250,7 @@ def test_a_pragma_that_is_written_otherwise_is_said(write: Write) -> None:
 
 
 def test_a_mistake_in_a_plugins_glsl_has_its_file_and_line(gl: rg.Session, write: Write) -> None:
-    home = write(CHOICES, combed_glsl=COMBED, halve_glsl=HALVE, steps_glsl="\nfloat stepped(float n_l) { return n; }\n")
+    home = write(CHOICES, combed_glsl=COMBED, halve_glsl=HALVE, steps_glsl="\nfloat stepped(float NoL) { return n; }\n")
     for name in ("forward", "deferred"):
         with pytest.raises(InputError, match=r"steps\.glsl:2:\d+: RG410 .*'?n'? undeclared") as caught:
             image(gl, name, home, light__shading="toon")

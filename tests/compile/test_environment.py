@@ -61,7 +61,7 @@ def plugins(tmp_path: Path) -> Path:
         " copied = texelFetch(picture, ivec2(texel.x, textureSize(picture, 0).y - 1 - texel.y), 0); }"
     )
     (folder / "turned.frag").write_text(
-        "#include <environment.glsl>\nout vec4 turned; void main() { turned = environment_turn; }"
+        "#include <environment.glsl>\nout vec4 turned; void main() { turned = environment_transform; }"
     )
     (folder / "hold.frag").write_text(
         "uniform sampler2D picture; uniform float gain; out vec4 made;"
@@ -140,7 +140,7 @@ def test_what_is_kept_may_be_made_of_it_and_is_made_once(gl: rg.Session, plugins
     assert [entry["node"] for entry in frame.passes] == ["seen"]  # the frame that was drawn beforehand has paid
     (plugins / "hold.frag").write_text(
         "#include <environment.glsl>\nuniform sampler2D picture; uniform float gain; out vec4 made;"
-        "void main() { made = gain * textureLod(picture, vec2(0.5), 0.0) * environment_turn.z; }"
+        "void main() { made = gain * textureLod(picture, vec2(0.5), 0.0) * environment_transform.z; }"
     )
     with pytest.raises(InputError, match=r"RG439 .*how bright the environment is and how it is turned"):
         pipeline(plugins, nodes, {"made": "hold.made"}, scene=scene).check()

@@ -238,7 +238,7 @@ def test_surfaces_are_shaded_where_they_are_and_lie_as_their_triangle(bench: Any
 #include <fragment_surface.glsl>
 out vec4 where, middle, lies;
 void main() {
-    Surface s = surface_here(PASS_VIEW);
+    Surface s = fragment_surface(PASS_VIEW);
     where = vec4(s.position, 1.0);
     middle = vec4(v_position, 1.0);
     lies = vec4(s.geometric_normal, 1.0);

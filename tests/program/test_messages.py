@@ -336,7 +336,7 @@ CASES = {
     "the vertex stage": (
         DRAWN,
         {
-            "wrong.vert": "#include <geometry_vertex.glsl>\nvoid main() {\n    pass_vertex_on();\n    v_positon.x = 1.0;\n}"
+            "wrong.vert": "#include <geometry_vertex.glsl>\nvoid main() {\n    transform_vertex();\n    v_positon.x = 1.0;\n}"
         },
         r"wrong\.vert:4:\d+: RG410 node 'a': vertex shader: .*v_positon",
     ),
@@ -344,9 +344,9 @@ CASES = {
         DRAWN,
         {
             "wrong.vert": "in vec3 in_position;\nvoid main() { gl_Position = vec4(in_position, 1.0); }",
-            "wrong.frag": "\nin vec2 v_place;\nout vec4 color;\nvoid main() { color = v_place.xyxy; }",
+            "wrong.frag": "\nin vec2 v_missing;\nout vec4 color;\nvoid main() { color = v_missing.xyxy; }",
         },
-        r"wrong\.frag:2:9: RG411 node 'a': the stages vertex, fragment do not link: .*v_place",
+        r"wrong\.frag:2:9: RG411 node 'a': the stages vertex, fragment do not link: .*v_missing",
     ),
     "an attribute misspelt": (
         DRAWN,

@@ -49,7 +49,7 @@ def test_what_a_lighting_step_may_use() -> None:
     assert found["LIGHT_SPOTS 1"] == "the scene's lights"
     assert found["float shadow(int light, vec3 position, vec3 normal)"] == "texture 'visibility_0'"
     assert found["camera_block { View camera; }"] == "include/view.glsl"
-    assert "reflected_light()" in found["include/lighting.glsl"]
+    assert "direct_lighting()" in found["include/lighting.glsl"]
     assert found["vec2 v_uv"] == "vertex shader, include/fullscreen.vert"
     assert found["out vec4 radiance"].startswith("light.radiance, ")
 

@@ -1,5 +1,5 @@
 // No light at all: the base colour is shown as it is, by whoever adds the terms up.
 #pragma needs(nothing)
-Reflected reflected(Surface s, vec3 to_light) {
-    return Reflected(vec3(0.0), vec3(0.0));
+ReflectedLight shade(Surface s, vec3 to_light) {
+    return ReflectedLight(vec3(0.0), vec3(0.0));
 }

@@ -12,10 +12,10 @@ import numpy.typing as npt
 import pytest
 
 Floats = npt.NDArray[np.float64]
-SET = """Surface s; s.normal = n; s.to_viewer = v; s.tangent = t; s.bitangent = b; s.base_color = base;
+SET = """Surface s; s.normal = n; s.view_dir = v; s.tangent = t; s.bitangent = b; s.base_color = base;
 s.metallic = surface.x; s.roughness = surface.y; s.anisotropy = surface.z; s.exponent = surface.w;
 s.diffuse = base * (1.0 - s.metallic); s.f0 = mix(vec3(0.04), base, s.metallic); s.f90 = 1.0;
-Reflected r = reflected(s, l);"""
+ReflectedLight r = shade(s, l);"""
 DIFFUSE = SET + "result.rgb = r.diffuse;"
 SPECULAR = SET + "result.rgb = r.specular;"
 

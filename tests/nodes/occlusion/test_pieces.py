@@ -60,7 +60,7 @@ def test_disc_occlusion(evaluate: Evaluate) -> None:
     r, area = rng.uniform(0.01, 3, 500), rng.uniform(1e-4, 4, 500)
     emitter, receiver = rng.uniform(-1, 1, 500), rng.uniform(-1, 1, 500)
     found = evaluate(
-        "disc_to_disc.glsl",
+        "disc_form_factor.glsl",
         {"r": r, "area": area, "emitter": emitter, "receiver": receiver},
         "result.x = disc_occlusion(r, area, emitter, receiver);",
     )[:, 0]
@@ -75,7 +75,7 @@ def test_disc_overhead_hides_its_share_of_the_hemisphere(evaluate: Evaluate) -> 
     distance = np.full(20, 0.7)
     area = np.pi * (distance * np.tan(half_angle)) ** 2
     found = evaluate(
-        "disc_to_disc.glsl", {"r": distance, "area": area}, "result.x = disc_occlusion(r, area, 1.0, 1.0);"
+        "disc_form_factor.glsl", {"r": distance, "area": area}, "result.x = disc_occlusion(r, area, 1.0, 1.0);"
     )
     np.testing.assert_allclose(found[:, 0], 1 - np.cos(half_angle), atol=1e-5)
 

@@ -2,13 +2,13 @@
 #pragma needs(phong)
 const float DARK = 0.35, MIDDLE = 0.7;
 
-Reflected reflected(Surface s, vec3 to_light) {
-    float n_l = dot(s.normal, to_light);
-    float tone = DARK * smoothstep(0.0, 0.02, n_l)
-        + (MIDDLE - DARK) * smoothstep(0.3, 0.32, n_l)
-        + (1.0 - MIDDLE) * smoothstep(0.65, 0.67, n_l);
-    vec3 half_way = normalize(to_light + s.to_viewer);
-    float highlight = pow(max(dot(s.normal, half_way), 1e-6), 4.0 * s.exponent);
+ReflectedLight shade(Surface s, vec3 light_dir) {
+    float NoL = dot(s.normal, light_dir);
+    float tone = DARK * smoothstep(0.0, 0.02, NoL)
+        + (MIDDLE - DARK) * smoothstep(0.3, 0.32, NoL)
+        + (1.0 - MIDDLE) * smoothstep(0.65, 0.67, NoL);
+    vec3 half_vector = normalize(light_dir + s.view_dir);
+    float highlight = pow(max(dot(s.normal, half_vector), 1e-6), 4.0 * s.exponent);
     // The root of ks: as it is, what is not metal would hardly show a highlight.
-    return Reflected(s.diffuse * tone, sqrt(s.f0) * smoothstep(0.45, 0.55, highlight) * step(0.0, n_l));
+    return ReflectedLight(s.diffuse * tone, sqrt(s.f0) * smoothstep(0.45, 0.55, highlight) * step(0.0, NoL));
 }

@@ -9,6 +9,6 @@ float disc_occlusion(float apart, float area, float cos_emitter, float cos_recei
 
 // How much of one disc's radiance another receives as irradiance over pi, of which a white surface sends all on: the
 // form factor, which for a disc as large as the sky is 1.
-float disc_transfer(float apart, float area, float cos_emitter, float cos_receiver) {
+float disc_form_factor(float apart, float area, float cos_emitter, float cos_receiver) {
     return area * max(cos_emitter, 0.0) * max(cos_receiver, 0.0) / (PI * apart * apart + area);
 }

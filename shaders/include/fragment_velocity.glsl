@@ -1,0 +1,10 @@
+// How far a fragment's point has moved since the frame before, of what `transform.glsl` passes on.
+#include <previous_pass_view.glsl>
+#include <velocity.glsl>
+
+centroid in vec4 v_clip_position;
+centroid in vec4 v_previous_clip_position;
+
+vec2 fragment_velocity() {
+    return velocity_between(v_clip_position, PASS_VIEW, v_previous_clip_position, PREVIOUS_PASS_VIEW);
+}
