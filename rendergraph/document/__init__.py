@@ -12,8 +12,18 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
 
-from rendergraph.document.parsing import YamlLimits, over_limit, parse, scalar
-from rendergraph.document.values import BROKEN, Document, Source, Value, from_plain, kind_of, said, shown
+from rendergraph.document.parsing import YamlLimits as YamlLimits
+from rendergraph.document.parsing import over_limit
+from rendergraph.document.parsing import parse as parse
+from rendergraph.document.parsing import scalar as scalar
+from rendergraph.document.values import BROKEN as BROKEN
+from rendergraph.document.values import Document as Document
+from rendergraph.document.values import Source as Source
+from rendergraph.document.values import Value as Value
+from rendergraph.document.values import from_plain as from_plain
+from rendergraph.document.values import kind_of as kind_of
+from rendergraph.document.values import said as said
+from rendergraph.document.values import shown as shown
 from rendergraph.errors import InputError, Place, Problem
 from rendergraph.stamps import record_read
 
@@ -71,22 +81,3 @@ def is_standard_input(name: str | Path | None) -> bool:
 def _standard_input(stream: TextIO | None, most: int) -> bytes:
     """The bytes of the stream, which can be read once only."""
     return stream.buffer.read(most + 1) if stream is not None else b""
-
-
-__all__ = [
-    "BROKEN",
-    "Document",
-    "Source",
-    "Value",
-    "YamlLimits",
-    "from_plain",
-    "is_standard_input",
-    "kind_of",
-    "load",
-    "parse",
-    "read_bytes",
-    "read_text",
-    "said",
-    "scalar",
-    "shown",
-]

@@ -9,19 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rendergraph.expand.finalize import check_kept, finalize_resources
-from rendergraph.expand.model import CAMERA, Expansion, ViewTable
-from rendergraph.expand.recording import define_parameters, param_uniforms, record_all
+from rendergraph.expand.model import CAMERA as CAMERA
+from rendergraph.expand.model import Expansion as Expansion
+from rendergraph.expand.model import ViewTable as ViewTable
+from rendergraph.expand.recording import define_parameters as define_parameters
+from rendergraph.expand.recording import param_uniforms as param_uniforms
+from rendergraph.expand.recording import record_all
 from rendergraph.expand.versions import assign_versions
 from rendergraph.link import Endpoint, Graph
-
-__all__ = [
-    "CAMERA",
-    "Expansion",
-    "ViewTable",
-    "define_parameters",
-    "expand",
-    "param_uniforms",
-]
 
 
 def expand(graph: Graph, wanted: Mapping[str, Endpoint] | None = None) -> Expansion:

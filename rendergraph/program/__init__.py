@@ -14,30 +14,16 @@ knows; the same for other functions, by their name.
 
 from __future__ import annotations
 
-from rendergraph.program.checks import (
-    Texts,
-    check_kept_text,
-    check_texts,
-    named_reads,
-    unfit_outputs,
-    unfit_sampler,
-    used_blocks,
-)
-from rendergraph.program.macros import positions_macro
-from rendergraph.program.text import StageText, StepTexts, prefix, stage_texts, text_key
-
-__all__ = [
-    "StageText",
-    "StepTexts",
-    "Texts",
-    "check_kept_text",
-    "check_texts",
-    "named_reads",
-    "positions_macro",
-    "prefix",
-    "stage_texts",
-    "text_key",
-    "unfit_outputs",
-    "unfit_sampler",
-    "used_blocks",
-]
+from rendergraph.program.checks import Texts as Texts
+from rendergraph.program.checks import check_kept_text as check_kept_text
+from rendergraph.program.checks import check_texts as check_texts
+from rendergraph.program.checks import named_reads as named_reads
+from rendergraph.program.checks import unfit_outputs as unfit_outputs
+from rendergraph.program.checks import unfit_sampler as unfit_sampler
+from rendergraph.program.checks import used_blocks as used_blocks
+from rendergraph.program.macros import positions_macro as positions_macro
+from rendergraph.program.text import StageText as StageText
+from rendergraph.program.text import StepTexts as StepTexts
+from rendergraph.program.text import prefix as prefix
+from rendergraph.program.text import stage_texts as stage_texts
+from rendergraph.program.text import text_key as text_key
