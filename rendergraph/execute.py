@@ -13,7 +13,6 @@ import numpy.typing as npt
 from msgspec import Struct, field
 
 from rendergraph.compile import Executable
-from rendergraph.compile.executable import source_of_view
 from rendergraph.declare import Node, Port, Views
 from rendergraph.declare.blame import author_problem
 from rendergraph.document import shown
@@ -218,10 +217,10 @@ class Runner(Struct, eq=False):
         self.drawn += 1
         if views.changed or moved:
             executable.arrange(moved=moved, cull=self.cull)
-            executable.touched |= {source_of_view(table) for table in views.changed}
+            executable.touched |= {("view", table) for table in views.changed}
             views.changed.clear()
         if views.moved_before:
-            executable.touched |= {source_of_view(table, before=True) for table in views.moved_before}
+            executable.touched |= {("view before", table) for table in views.moved_before}
             views.moved_before.clear()
         fresh = executable.fresh or not executable.device.owned
         if fresh:

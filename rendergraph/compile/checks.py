@@ -1,78 +1,81 @@
-"""What a linked program looks at, held against what its step gives it; said at the shader's own line."""
+"""What a linked program uses, compared with what its step provides; mistakes are at the shader's own line."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from itertools import product
 from typing import Any
 
 from rendergraph.declare import Node
 from rendergraph.errors import InputError, Problem, suggestion
 from rendergraph.gl.programs import Program, Uniform, outputs_of
+from rendergraph.glsl.globals import globals_of
 from rendergraph.program import Texts, named_reads, unfit_outputs, unfit_sampler
 from rendergraph.steps import Read, Resource, Step, Write
+from rendergraph.textures import BufferDesc
 
 # Text: it takes a millisecond to compile, and most pipelines declare no vertices of their own.
 _FORMAT = r"(?P<count>\d*)(?P<kind>[fiux])(?P<bytes>[1248]?)(?P<step>(?:/[vi])?)\Z"
+_ROUNDED = 16  # bytes that some drivers round a block's size up to
 
 
-def check_uniforms(
-    step: Step, program: Program, uniforms: Mapping[str, Any], sampled: Collection[str], texts: Texts
+def check_program(
+    step: Step,
+    program: Program,
+    texts: Texts,
+    resources: Mapping[str, Resource],
+    uniforms: Mapping[str, Any],
+    blocks: Collection[str],
+    sampled: Collection[str],
+    cls: type[Node],
 ) -> None:
-    """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0.
+    """Raise the mistakes of the first check that finds some; drivers would read and write garbage without a word.
 
     Args:
-        step: a step.
-        program: its program.
-        uniforms: what it sets.
-        sampled: the names of the textures that it binds.
-        texts: see `Texts`.
-
-    Raises:
-        InputError: the program looks at something that the step does not give (RG430, RG434), or takes other
-            numbers than it is given (RG436).
+        uniforms: name to value of all that the step sets.
+        blocks: names of the blocks that have a binding point.
+        sampled: names of the textures that the step binds.
     """
+    for mistakes in (
+        _uniforms(step, program, uniforms, sampled, texts),
+        _samplers(step, program, resources, texts),
+        _blocks(step, program, blocks, texts),
+        _outputs(step, program, cls, resources, texts),
+        _stored(step, program, resources, texts),
+    ):
+        _raise_if_any(mistakes)
+
+
+def _raise_if_any(mistakes: Iterator[Problem]) -> None:
+    if problems := list(dict.fromkeys(mistakes)):
+        raise InputError(problems)
+
+
+def _uniforms(
+    step: Step, program: Program, uniforms: Mapping[str, Any], sampled: Collection[str], texts: Texts
+) -> Iterator[Problem]:
+    """A sampler that nothing is bound to would silently read another pass's texture, an unset uniform is 0."""
     uses: tuple[Read | Write, ...] = (*step.reads, *step.writes)
     images = {use.name for use in uses if use.use == "image"}
     files = ", ".join(file for _, file in step.shaders)
-    problems = []
     for name, uniform in program.uniforms.items():
         if not uniform.is_opaque and name not in uniforms:
             hint = suggestion(name, [known for known, _ in step.uniforms])
-            text = f"{files} looks at uniform '{name}', which nothing sets{hint}"
-            problems.append(_placed(step.problem("RG434", text), name, texts))
+            code, text = "RG434", f"{files} looks at uniform '{name}', which nothing sets{hint}"
         elif uniform.is_opaque and name not in images and name not in sampled:
             slot = name.endswith("_texture") and step.kind == "geometry"
             guard = f"; not every material has it, so it stands inside #ifdef HAS_{name.upper()}" if slot else ""
-            text = (
-                f"{files} samples '{name}', but the step reads no texture of that name; "
-                f"it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
-            )
-            problems.append(_placed(step.problem("RG430", text), name, texts))
-        elif not uniform.is_opaque and (wrong := misfit(uniform, uniforms[name])) is not None:
-            problems.append(_placed(step.problem("RG436", f"{files} {wrong}"), name, texts))
-    if problems:
-        raise InputError(problems)
+            text = f"{files} samples '{name}', but the step reads no texture of that name; "
+            code, text = "RG430", f"{text}it reads {', '.join(sorted(sampled)) or 'none'}{guard}"
+        elif not uniform.is_opaque and (mismatch := _mismatch(uniform, uniforms[name])) is not None:
+            code, text = "RG436", f"{files} {mismatch}"
+        else:
+            continue
+        yield _placed(step.problem(code, text), name, texts)
 
 
-def check_samplers(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> None:
-    """A sampler of another kind than its texture reads black, silently.
-
-    Raises:
-        InputError: there is such a sampler (RG447).
-    """
-    problems = []
-    for name, read in named_reads(step):
-        uniform = program.uniforms.get(name)
-        if read.use == "sample" and uniform is not None:
-            problem = unfit_sampler(step, uniform.glsl, read, resources)
-            problems += [_placed(problem, name, texts)] if problem is not None else []
-    if problems:
-        raise InputError(problems)
-
-
-def misfit(uniform: Uniform, value: Any) -> str | None:
+def _mismatch(uniform: Uniform, value: Any) -> str | None:
     """What a uniform and the value that it is given disagree about: the driver would read beyond the numbers."""
     numbers = value if isinstance(value, tuple | list) else (value,)
     if len(numbers) % uniform.number_count or not 1 <= len(numbers) // uniform.number_count <= uniform.size:
@@ -84,78 +87,85 @@ def misfit(uniform: Uniform, value: Any) -> str | None:
     return None
 
 
-def check_blocks(step: Step, program: Program, given: Collection[str], texts: Texts) -> None:
-    """A buffer that nothing is bound to would be written nowhere, or over another node's.
+def _samplers(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:
+    """A sampler of another kind than its texture reads black, silently."""
+    for name, read in named_reads(step):
+        uniform = program.uniforms.get(name)
+        if read.use == "sample" and uniform is not None:
+            problem = unfit_sampler(step, uniform.glsl, read, resources)
+            yield from [_placed(problem, name, texts)] if problem is not None else []
 
-    Raises:
-        InputError: the program has a block that the step does not give (RG430).
-    """
+
+def _blocks(step: Step, program: Program, given: Collection[str], texts: Texts) -> Iterator[Problem]:
+    """A buffer that nothing is bound to would be written nowhere, or over another node's."""
     files = ", ".join(file for _, file in step.shaders)
     uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
-    own = sorted({use.name for use in uses if use.use == "buffer"})
-    problems = [
-        _placed(
-            step.problem(
-                "RG430",
-                f"{files} looks at block '{name}', but the step has no buffer of that name; it has "
-                f"{', '.join(own) or 'none'}",
-            ),
-            name,
-            texts,
-        )
-        for name in (*program.storage, *program.blocks)
-        if name not in given
-    ]
-    if problems:
-        raise InputError(problems)
+    own = ", ".join(sorted({use.name for use in uses if use.use == "buffer"})) or "none"
+    for name in (*program.storage, *program.blocks):
+        if name not in given:
+            text = f"{files} looks at block '{name}', but the step has no buffer of that name; it has {own}"
+            yield _placed(step.problem("RG430", text), name, texts)
 
 
-def check_outputs(
+def _outputs(
     step: Step, program: Program, cls: type[Node], resources: Mapping[str, Resource], texts: Texts
-) -> None:
-    """Check that a program writes every target, and nothing else, in the kind of number that the target holds.
-
-    Raises:
-        InputError: it does not (RG437, RG447, RG448).
-    """
+) -> Iterator[Problem]:
+    """A program must write every target, and nothing else, in the kind of number that the target holds."""
     written = outputs_of(program)
-    problems = [_placed(one, one.subject, texts) for one in unfit_outputs(step, written, cls, resources)]
+    yield from (_placed(one, one.subject, texts) for one in unfit_outputs(step, written, cls, resources))
     targets = [write.name for write in step.writes if write.use == "color"]
     shader = dict(step.shaders).get("fragment", "the step")
     for name in targets if len(targets) > 1 else ():  # a single one may have any name, or be discarded everywhere
         if name not in written:
             hint = suggestion(name, written.keys() - set(targets))
-            problems.append(step.problem("RG437", f"{shader} writes no output '{name}'{hint}", name))
-    if problems:
-        raise InputError(problems)
+            yield step.problem("RG437", f"{shader} writes no output '{name}'{hint}", name)
+
+
+def _stored(step: Step, program: Program, resources: Mapping[str, Resource], texts: Texts) -> Iterator[Problem]:
+    """Order rests on nobody writing what a step reads; and beyond a buffer's end a shader finds nothing."""
+    writes = {write.name: write for write in step.writes}
+    uses: dict[str, Read | Write] = {**dict(named_reads(step)), **writes}
+    stored = {name: use.use for name, use in uses.items() if use.use in ("image", "buffer")}
+    only_read = [name for name in stored.keys() - writes.keys() if name in program.uniforms or name in program.storage]
+    short = {}
+    for name in stored:
+        desc, least = resources[uses[name].resource].desc, program.storage_bytes.get(name, 0)
+        if isinstance(desc, BufferDesc) and -(-desc.bytes // _ROUNDED) * _ROUNDED < least:
+            short[name] = f"takes {least} bytes, but '{uses[name].resource}' holds {desc.bytes}"
+    for stage in texts().values() if only_read or short else ():
+        for found in globals_of(stage.source.text).declared:
+            own, problems = uses[found.name].name if found.name in uses else "", []
+            if found.storage == "buffer" and found.name in short:
+                problems.append(step.problem("RG438", f"block '{own}' {short.pop(found.name)}"))
+            if found.name in only_read and "readonly" not in found.qualifiers:
+                right = f"uniform readonly {found.type} {own}" if found.type else f"readonly buffer {own}"
+                text = f"'{own}' is only read, so it is declared `{right}`; what a step writes stands in `out`"
+                problems.append(step.problem("RG457", f"{stored[found.name]} {text}"))
+            place, line = stage.source.place(found.at)
+            yield from [problem.relocate(place, line) if place else problem for problem in problems]
 
 
 def check_attributes(step: Step, program: Program, given: Mapping[str, str], texts: Texts) -> None:
     """A vertex attribute that no buffer holds would be (0, 0, 0, 1) at every vertex, or what another draw left.
 
-    Args:
-        step: a geometry or draw step.
-        program: its program.
-        given: attribute to its moderngl format, `3f` or `2i`.
-        texts: see `Texts`.
-
-    Raises:
-        InputError: the vertex shader reads another one, or one of the wrong type (RG428).
+    `given` are attributes with their moderngl formats, `3f` or `2i`.
     """
-    problems = []
+    _raise_if_any(_attributes(step, program, given, texts))
+
+
+def _attributes(step: Step, program: Program, given: Mapping[str, str], texts: Texts) -> Iterator[Problem]:
     vertex = dict(step.shaders).get("vertex", "")
-    holder = "the scene" if step.kind == "geometry" else "no buffer of `attributes`"
+    is_of_scene = step.kind == "geometry"
+    lacks = "which the scene does not have" if is_of_scene else "which no buffer of `attributes` holds"
     for name, shape in attributes_of(program).items():
+        text = f"{vertex} reads vertex attribute '{name}'"
         if name not in given:
-            lacks = f"which {holder} does not have" if step.kind == "geometry" else f"which {holder} holds"
-            text = f"{vertex} reads vertex attribute '{name}', {lacks}{suggestion(name, given)}"
+            text += f", {lacks}{suggestion(name, given)}"
         elif (shape == "f") != ("f" in given[name]) and shape != "f":
-            text = f"{vertex} reads vertex attribute '{name}' as whole numbers, but it holds floats ({given[name]})"
+            text += f" as whole numbers, but it holds floats ({given[name]})"
         else:
             continue
-        problems.append(_placed(step.problem("RG428", text), name, texts))
-    if problems:
-        raise InputError(problems)
+        yield _placed(step.problem("RG428", text), name, texts)
 
 
 def attributes_of(program: Program) -> dict[str, str]:
@@ -180,36 +190,25 @@ def _placed(problem: Problem, name: str, texts: Texts) -> Problem:
 
 
 def layout_for(layout: str, program: Program) -> tuple[str, list[str]]:
-    """A buffer's layout for a program that looks at some of it: what it does not look at becomes padding.
+    """Return a buffer's layout for a program as moderngl's format, and the names that the program uses.
 
-    Args:
-        layout: formats, then names, as `steps.draw` takes it.
-        program: the program.
-
-    Returns:
-        moderngl's format and the names in it, which may be none.
+    What it does not use becomes padding.
     """
-    words = layout.split()
-    formats = [word for word in words if re.match(_FORMAT, word)]
-    names = words[len(formats) :]
-    wanted = set(attributes_of(program))
-    kept: list[str] = []
-    waiting = iter(names)
-    for number, word in enumerate(formats):
-        match = re.match(_FORMAT, word)
-        assert match is not None  # it did a moment ago
-        if match["kind"] == "x":
-            continue
-        name = next(waiting)
-        if name in wanted:
-            kept.append(name)
-        else:
-            size = int(match["count"] or 1) * int(match["bytes"] or 4)
-            formats[number] = f"{size}x{match['step']}"
-    return " ".join(formats), kept
+    parts, used = _layout_parts(layout), attributes_of(program)
+    formats = []
+    for match, name in parts:
+        size = int(match["count"] or 1) * int(match["bytes"] or 4)
+        formats.append(f"{size}x{match['step']}" if name and name not in used else match[0])
+    return " ".join(formats), [name for _, name in parts if name in used]
 
 
 def attribute_formats(layout: str) -> dict[str, str]:
+    return {name: match[0] for match, name in _layout_parts(layout) if name}
+
+
+def _layout_parts(layout: str) -> list[tuple[re.Match[str], str]]:
+    """The formats of a layout such as `3f 4x 2f in_position in_uv`, each with its name, empty for padding."""
     words = layout.split()
-    formats = [word for word in words if re.match(_FORMAT, word)]
-    return dict(zip(words[len(formats) :], [word for word in formats if "x" not in word], strict=True))
+    formats = [match for word in words if (match := re.match(_FORMAT, word))]
+    names = iter(words[len(formats) :])
+    return [(match, "" if match["kind"] == "x" else next(names)) for match in formats]

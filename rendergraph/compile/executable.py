@@ -14,7 +14,7 @@ from msgspec import Struct, field
 
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES
 from rendergraph.compile.memory import Call
-from rendergraph.compile.reuse import Reuse
+from rendergraph.compile.reuse import Reuse, Source
 from rendergraph.expand import CAMERA
 from rendergraph.gl.programs import Program
 from rendergraph.gl.state import Pieces, changes
@@ -152,7 +152,7 @@ class Executable(Struct, eq=False, dict=True):
     shares_kept: bool = True
     filled: dict[str, bytes] = field(default_factory=dict)
     filled_before: set[str] = field(default_factory=set)
-    touched: set[str] = field(default_factory=set)
+    touched: set[Source] = field(default_factory=set)
     _steady: list[list[FrameStep]] = field(default_factory=list)
     _parts: dict[tuple[int, tuple[int, ...]], list[FrameStep]] = field(default_factory=dict)
     _seen: Mapping[str, int] = field(default_factory=dict)
@@ -214,7 +214,7 @@ class Executable(Struct, eq=False, dict=True):
         buffer.write(data)
         if now != before:
             self.filled[id] = now
-            self.touched.add(source_of_buffer(id))
+            self.touched.add(("buffer", id))
 
     def updated(self) -> None:
         """All nodes have been updated: note the regions and buffers that are others than in the frame before."""
@@ -224,7 +224,7 @@ class Executable(Struct, eq=False, dict=True):
             drawn = region.scissor, region.depth_bounds
             if drawn != region.drawn:
                 region.drawn = drawn
-                self.touched.add(source_of_region(node, number))
+                self.touched.add(("region", node, number))
 
     def take_over(self) -> None:
         """Another executable has drawn meanwhile: shared programs hold its uniforms, shared textures its texels."""
@@ -257,7 +257,7 @@ class Executable(Struct, eq=False, dict=True):
             self._parts[key] = self._listed(parity, positions)
         return self._parts[key]
 
-    def _looks(self) -> list[frozenset[str]]:
+    def _looks(self) -> list[frozenset[Source]]:
         """For each step, what it looks at beside what other steps have made."""
         resources, found = self.plan.resources, []
         for compiled in self.steps[0]:
@@ -265,23 +265,23 @@ class Executable(Struct, eq=False, dict=True):
             blocks = {
                 b for draw in compiled.all_draws for text in draw.program.texts.values() for b in used_blocks(text)
             }
-            views = {"camera_block": source_of_view(CAMERA)}
+            views: dict[str, Source] = {"camera_block": ("view", CAMERA)}
             if step.view is not None:
-                views["pass_view_block"] = source_of_view(step.view)
-                views["previous_pass_view_block"] = source_of_view(step.view, before=True)
+                views["pass_view_block"] = "view", step.view
+                views["previous_pass_view_block"] = "view before", step.view
             for before, read in named(step):
                 table = resources[read.resource].view
                 if table is not None:
-                    views[f"{before}{read.name}_view_block"] = source_of_view(table, before=read.previous)
-                    views[f"{before}previous_{read.name}_view_block"] = source_of_view(table, before=True)
+                    views[f"{before}{read.name}_view_block"] = "view before" if read.previous else "view", table
+                    views[f"{before}previous_{read.name}_view_block"] = "view before", table
             sources = {views.get(block, block) for block in blocks}
-            sources |= {source_of_step(step.key), *(source_of_buffer(id) for id in touched_ids(step))}
+            sources |= {("step", step.key), *(("buffer", id) for id in touched_ids(step))}
             if step.kind == "geometry":
-                sources |= {"instances", source_of_view(step.view or "")}
+                sources |= {"instances", ("view", step.view or "")}
             if any(name in draw.program.object for draw in compiled.all_draws for name in PREVIOUS_ATTRIBUTES):
                 sources.add("instances before")
             if step.region is not None:
-                sources.add(source_of_region(step.node, step.region))
+                sources.add(("region", step.node, step.region))
             found.append(frozenset(sources))
         return found
 
@@ -348,7 +348,7 @@ class Executable(Struct, eq=False, dict=True):
 
     def set_uniforms(self, values: Mapping[StepKey, Step]) -> None:
         changed = self.changed(values)
-        self.touched |= {source_of_step(key) for key in changed}
+        self.touched |= {("step", key) for key in changed}
         self.due = self._with_dependents(self.due | (changed & self.kept.keys()))
         for compiled in (c for steps_of in self.steps for c in steps_of):
             step = values[compiled.step.key]
@@ -391,26 +391,6 @@ class Executable(Struct, eq=False, dict=True):
             query.release()
         self.timers.clear()
         self.occlusion_queries.clear()
-
-
-def source_of_step(key: StepKey) -> str:
-    """A step's own parameters, as something that values are made of (`Reuse`)."""
-    return f"step {key[0]} {key[1]}"
-
-
-def source_of_view(table: str, *, before: bool = False) -> str:
-    """A table of views, or what it was in the frame before, likewise."""
-    return f"view {table} before" if before else f"view {table}"
-
-
-def source_of_buffer(id: str) -> str:
-    """What the CPU writes into a buffer, likewise."""
-    return f"buffer {id}"
-
-
-def source_of_region(node: str, number: int) -> str:
-    """The part of the picture that steps are drawn in, likewise."""
-    return f"region {node} {number}"
 
 
 def named(step: Step) -> list[tuple[str, Read]]:

@@ -33,40 +33,28 @@ Decode = Callable[[ImageSource, bool], npt.NDArray[Any]]
 DecodeLight = Callable[[ImageSource | MadeImage], npt.NDArray[Any]]
 """The picture around a scene, likewise."""
 
-_TRILINEAR = 0x2703
 _ANISOTROPY = 8  # texels along the longer side of what a pixel sees of a texture
-_MIN = {
-    "nearest": 0x2600,
-    "linear": 0x2601,
-    "nearest_mipmap_nearest": 0x2700,
-    "linear_mipmap_nearest": 0x2701,
-    "nearest_mipmap_linear": 0x2702,
-    "linear_mipmap_linear": _TRILINEAR,
+_STREAMS = {
+    "in_position": ("positions", "3f"),
+    "in_normal": ("normals", "3f"),
+    "in_tangent": ("tangents", "4f"),
+    "in_uv0": ("uv0", "2f"),
+    "in_uv1": ("uv1", "2f"),
+    "in_color": ("colors", "4f"),
 }
-_MAG = {"nearest": 0x2600, "linear": 0x2601}
-_WRAP = {"repeat": 0x2901, "mirror": 0x8370, "clamp": 0x812F}
-SCENE_ATTRIBUTES = {
-    "in_position": "3f",
-    "in_normal": "3f",
-    "in_tangent": "4f",
-    "in_uv0": "2f",
-    "in_uv1": "2f",
-    "in_color": "4f",
-    "in_object0": "4f",
-    "in_object1": "4f",
-    "in_object2": "4f",
-    "in_ids": "2i",
-    "in_previous0": "4f",
-    "in_previous1": "4f",
-    "in_previous2": "4f",
-}
-"""What a vertex shader that draws the scene may read, with moderngl's formats."""
+"""Vertex attributes with the arrays of `PackedScene` and moderngl's formats."""
 _ABSENT = {"in_tangent": (0.0, 0.0, 0.0, 0.0), "in_uv0": (0.0, 0.0), "in_uv1": (0.0, 0.0), "in_color": (1.0,) * 4}
 """What an attribute holds that no mesh of the scene has; `pack` fills the same in for a mesh that lacks it."""
 _INSTANCE_FORMAT = (("in_object0", "4f"), ("in_object1", "4f"), ("in_object2", "4f"), ("in_ids", "2i"))
 PREVIOUS_ATTRIBUTES = ("in_previous0", "in_previous1", "in_previous2")
 """The same rows in the frame before."""
 _PREVIOUS_FORMAT = (*((name, "4f") for name in PREVIOUS_ATTRIBUTES), ("", "2i"))
+SCENE_ATTRIBUTES = {
+    **{name: layout for name, (_, layout) in _STREAMS.items()},
+    **dict(_INSTANCE_FORMAT),
+    **dict.fromkeys(PREVIOUS_ATTRIBUTES, "4f"),
+}
+"""What a vertex shader that draws the scene may read, with moderngl's formats."""
 _MOST_RUNS = 32  # of neighbouring records that are uploaded one by one; what lies between them goes along beyond
 _PADDING = {"4f": "16x", "2i": "8x"}
 
@@ -95,7 +83,7 @@ class GpuScene(Struct, eq=False, dict=True):
     _streams: dict[str, tuple[moderngl.Buffer, str]] = {}
     _constants: dict[str, moderngl.Buffer] = {}
     _images: dict[tuple[ImageSource, bool], GpuTexture] = {}
-    _samplers: dict[tuple[int, ...], int] = {}
+    _samplers: dict[tuple[str, ...], int] = {}
     _blocks: dict[str, tuple[moderngl.Buffer, bool]] = {}
     _environment: GpuTexture | None = None
     _before: moderngl.Buffer | None = None
@@ -103,14 +91,8 @@ class GpuScene(Struct, eq=False, dict=True):
 
     def __post_init__(self) -> None:
         ctx, packed = self.device.ctx, self.packed
-        for name, array, layout in (
-            ("in_position", packed.positions, "3f"),
-            ("in_normal", packed.normals, "3f"),
-            ("in_tangent", packed.tangents, "4f"),
-            ("in_uv0", packed.uv0, "2f"),
-            ("in_uv1", packed.uv1, "2f"),
-            ("in_color", packed.colors, "4f"),
-        ):
+        for name, (field_name, layout) in _STREAMS.items():
+            array = getattr(packed, field_name)
             if array is not None and array.size:
                 self._streams[name] = (ctx.buffer(array.tobytes()), layout)
         buffer = ctx.buffer(packed.indices.tobytes() or bytes(4))
@@ -212,10 +194,10 @@ class GpuScene(Struct, eq=False, dict=True):
     def texture(self, texture: Texture) -> tuple[int, int]:
         """GL names of a material texture and its sampler."""
         image = self._images[texture.image, texture.srgb].glo
-        wraps = (_WRAP[texture.wrap_s], _WRAP[texture.wrap_t])
-        key = (_MIN.get(texture.min_filter, _TRILINEAR), _MAG[texture.mag_filter], *wraps)
+        key = (texture.min_filter, texture.mag_filter, texture.wrap_s, texture.wrap_t)
         if key not in self._samplers:
-            steps = min(_ANISOTROPY, self.device.limits["anisotropy"]) if key[0] == _TRILINEAR else 1
+            is_trilinear = texture.min_filter == "linear_mipmap_linear"
+            steps = min(_ANISOTROPY, self.device.limits["anisotropy"]) if is_trilinear else 1
             self._samplers[key] = textures.create_gl_sampler(self.device, *key, anisotropy=steps)
         return image, self._samplers[key]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import moderngl
@@ -279,7 +279,7 @@ class Memory(Struct, eq=False, dict=True):
         calls: list[Call] = []
         for level in range(texture.desc.mips) if mip is None else (mip,):
             target = self.framebuffer([Attachment(texture, level, layer)], None, texture.desc.mip_size(level))
-            calls += [target.use, ClearTarget(self.device, target, 0, texture.desc.format, value)]
+            calls += [target.use, clear_target(self.device, target, 0, texture.desc.format, value)]
         return calls
 
     def _attach(self, framebuffer: int, point: int, attachment: Attachment) -> None:
@@ -326,29 +326,15 @@ def _key(attachment: Attachment | None) -> tuple[object, ...] | None:
     return None if attachment is None else (attachment.texture.glo, attachment.mip, attachment.layer)
 
 
-class ClearTarget:
-    """Clears one attachment of a bound framebuffer, colour or depth, prepared once."""
-
-    def __init__(
-        self,
-        device: Device,
-        framebuffer: moderngl.Framebuffer,
-        index: int | None,
-        format: str,
-        value: float | tuple[float, ...],
-    ) -> None:
-        raw, glo, family = device.raw, framebuffer.glo, FORMATS[format].family
-        self._args: tuple[int | float, ...]
-        dtype = {"uint": np.uint32, "int": np.int32}.get(family, np.float32)
-        self._data = texel(value, 4, dtype)  # kept alive: the call holds its address
-        address = self._data.ctypes.data
-        if family == "depth":
-            self._call, self._args = raw.glClearNamedFramebufferfv, (glo, 0x1801, 0, address)
-        else:
-            name = {"uint": "glClearNamedFramebufferuiv", "int": "glClearNamedFramebufferiv"}.get(
-                family, "glClearNamedFramebufferfv"
-            )
-            self._call, self._args = getattr(raw, name), (glo, 0x1800, index or 0, address)
-
-    def __call__(self) -> None:
-        self._call(*self._args)
+def clear_target(
+    device: Device, framebuffer: moderngl.Framebuffer, index: int | None, format: str, value: float | tuple[float, ...]
+) -> Call:
+    """Return the call that clears one attachment of a bound framebuffer, by its number or None for depth."""
+    family = FORMATS[format].family
+    ending = {"uint": "uiv", "int": "iv"}.get(family, "fv")
+    data = texel(value, 4, {"uint": np.uint32, "int": np.int32}.get(family, np.float32))
+    buffer = 0x1801 if family == "depth" else 0x1800
+    function = getattr(device.raw, f"glClearNamedFramebuffer{ending}")
+    call = partial(function, framebuffer.glo, buffer, index or 0, data.ctypes.data)
+    call.data = data  # type: ignore[attr-defined]  # the array travels with the call: its address stays good
+    return call

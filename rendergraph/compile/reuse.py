@@ -26,6 +26,9 @@ from rendergraph.steps import Step
 Value: TypeAlias = tuple[str, int]
 """Resource id and version."""
 
+Source: TypeAlias = "str | tuple[object, ...]"
+"""A block of the scene or of the frame, or `("view", table)`, `("step", key)` for parameters, `("buffer", id)`, …"""
+
 _Slot: TypeAlias = int | str  # a physical, by index; a history, whose two take turns, by its id
 _State: TypeAlias = frozenset[tuple[_Slot, Value]]
 
@@ -48,16 +51,16 @@ class Reuse(Struct, eq=False, dict=True):
     """
 
     plan: ResourcePlan
-    look: Callable[[], Sequence[frozenset[str]]]
+    look: Callable[[], Sequence[frozenset[Source]]]
     _state: _State | None = None
     _complete: bool = False
-    _known: dict[tuple[_State, frozenset[str]], tuple[tuple[int, ...], _State]] = field(default_factory=dict)
+    _known: dict[tuple[_State, frozenset[Source]], tuple[tuple[int, ...], _State]] = field(default_factory=dict)
 
     def forget(self) -> None:
         """Nothing is there any more."""
         self._state, self._complete = None, False
 
-    def choose(self, changed: frozenset[str]) -> tuple[int, ...] | None:
+    def choose(self, changed: frozenset[Source]) -> tuple[int, ...] | None:
         """The positions of the steps that the next frame runs, in order, except for kept values; None for all steps.
 
         `changed` are the sources that have changed since the last frame was chosen.
@@ -77,7 +80,7 @@ class Reuse(Struct, eq=False, dict=True):
 
     # Working it out ---------------------------------------------------------------------------------------------------
 
-    def _chosen(self, state: _State, changed: frozenset[str]) -> tuple[tuple[int, ...], _State]:
+    def _chosen(self, state: _State, changed: frozenset[Source]) -> tuple[tuple[int, ...], _State]:
         stale = self._stale(changed)
         held: dict[_Slot, Value] = {
             slot: value for slot, value in state if isinstance(slot, int) and self._makers[value] not in stale
@@ -112,7 +115,7 @@ class Reuse(Struct, eq=False, dict=True):
             now.update(touched.leaves)
         return [(slot, value) for slot, value in self._goals if now.get(slot) != value], now
 
-    def _stale(self, changed: frozenset[str]) -> set[int]:
+    def _stale(self, changed: frozenset[Source]) -> set[int]:
         """The steps whose values are no longer what they would make."""
         stale: set[int] = set()
         for position, touched in enumerate(self._touched):
@@ -124,7 +127,7 @@ class Reuse(Struct, eq=False, dict=True):
     # What holds for the plan ------------------------------------------------------------------------------------------
 
     @cached_property
-    def _looks(self) -> Sequence[frozenset[str]]:
+    def _looks(self) -> Sequence[frozenset[Source]]:
         return self.look()
 
     @cached_property

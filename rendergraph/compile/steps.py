@@ -12,22 +12,13 @@ from msgspec.structs import replace
 
 from rendergraph.allocate import ResourcePlan
 from rendergraph.catalog import NodeType
-from rendergraph.compile.checks import (
-    attribute_formats,
-    check_attributes,
-    check_blocks,
-    check_outputs,
-    check_samplers,
-    check_uniforms,
-    layout_for,
-)
+from rendergraph.compile.checks import attribute_formats, check_attributes, check_program, layout_for
 from rendergraph.compile.executable import CompiledStep, Draw, Executable, SortedDraws, named, step_uniforms
 from rendergraph.compile.geometry import GeometryCompiler, MultiDraw
 from rendergraph.compile.gpu_scene import PREVIOUS_ATTRIBUTES, SCENE_ATTRIBUTES, GpuScene
 from rendergraph.compile.limits import check_plan, groups_of
-from rendergraph.compile.memory import Call, ClearTarget, Memory, Region, TexturePool
+from rendergraph.compile.memory import Call, Memory, Region, TexturePool, clear_target
 from rendergraph.compile.programs import ProgramCache
-from rendergraph.compile.stored import check_stored
 from rendergraph.compile.transfers import clear_buffer, image_calls, transfer_calls
 from rendergraph.compile.units import Units
 from rendergraph.compile.views import FIXED_BLOCKS, ViewBuffers
@@ -134,16 +125,13 @@ class _Compiler(Struct, eq=False, dict=True):
 
     def _step(self, step: Step, position: int, parity: int) -> CompiledStep:
         compiled = CompiledStep(step)
-        {
+        drawing = {
             "fullscreen": self._fullscreen,
             "geometry": self._geometry,
             "draw": self._draw,
             "compute": self._compute,
-            "clear": self._transfer,
-            "mipmaps": self._transfer,
-            "resolve": self._transfer,
-            "copy": self._transfer,
-        }[step.kind](step, compiled, parity)
+        }
+        drawing.get(step.kind, self._transfer)(step, compiled, parity)
         self._watch(step, compiled)
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
@@ -309,12 +297,9 @@ class _Compiler(Struct, eq=False, dict=True):
             if before + read.name in program.uniforms:
                 names = tuple(self.memory.part(read.resource, p, read).glo for p in range(self.memory.parities))
                 uniforms[before + read.name] = self.units.unit(names, self.memory.sampler(read.sampler), binds)
-        check_kept_text(step, texts, self.types[step.node].cls, self.plan.resources)
-        check_uniforms(step, program, uniforms, {*sampled, *materials}, texts)
-        check_samplers(step, program, self.plan.resources, texts)
-        check_blocks(step, program, blocks, texts)
-        check_outputs(step, program, self.types[step.node].cls, self.plan.resources, texts)
-        check_stored(step, program, reads, self.plan.resources, texts)
+        cls, resources, sampled = self.types[step.node].cls, self.plan.resources, {*sampled, *materials}
+        check_kept_text(step, texts, cls, resources)
+        check_program(step, program, texts, resources, uniforms, blocks, sampled, cls)
         return program, binds, uniforms
 
     def _sample_positions(self, step: Step) -> dict[str, str]:
@@ -373,7 +358,7 @@ class _Compiler(Struct, eq=False, dict=True):
         if FORMATS[texture.desc.format].family == "depth_stencil":
             # Through a framebuffer it would heed the stencil's write mask, which is whatever a step before has stated.
             return Clear(self.device, texture, write.clear, mip=write.mip or 0, layer=write.layer)
-        return ClearTarget(self.device, target, number, texture.desc.format, write.clear)
+        return clear_target(self.device, target, number, texture.desc.format, write.clear)
 
     def _state(
         self, step: Step, *, depth_default: bool, cull: str | None = None, clockwise: bool = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from functools import cache, cached_property
 from typing import Any
 
@@ -60,21 +60,17 @@ class Device(Struct, eq=False, dict=True):
             texture.release()
         return self._sample_positions[count]
 
-    def current(self) -> AbstractContextManager[Any]:
+    @contextmanager
+    def current(self) -> Iterator[None]:
         """Return a context manager for everything that touches GL.
 
         It makes an owned context the thread's current one and restores the previous one afterwards. A borrowed one,
         which its owner makes current, is set to what drawing needs and given back as it was.
         """
-        return self._owned() if self.owned else self._borrowed()
-
-    @contextmanager
-    def _owned(self) -> Iterator[None]:
-        with previous_context(), self.ctx:
-            yield
-
-    @contextmanager
-    def _borrowed(self) -> Iterator[None]:
+        if self.owned:
+            with previous_context(), self.ctx:
+                yield
+            return
         saved = SavedState(self.raw, self.ctx)
         try:
             settle(self.raw)

@@ -287,33 +287,37 @@ def poison_value(format_name: str) -> float:
 
 # --- samplers --------------------------------------------------------------------------------------------------------
 
-_MIN_FILTERS = {"nearest": 0x2600, "linear": 0x2601, "trilinear": 0x2703}
-_MAG_FILTERS = {"nearest": 0x2600, "linear": 0x2601, "trilinear": 0x2601}
+_FILTERS = {
+    "nearest": 0x2600, "linear": 0x2601, "nearest_mipmap_nearest": 0x2700, "linear_mipmap_nearest": 0x2701,
+    "nearest_mipmap_linear": 0x2702, "linear_mipmap_linear": 0x2703,
+}  # fmt: skip
 _WRAPS = {"clamp": 0x812F, "repeat": 0x2901, "mirror": 0x8370, "border": 0x812D}
 
 
 def create_sampler(device: Device, sampler: Sampler) -> int:
     """Create a sampler; its border is 1 in every channel (open and lit), and 0 for comparisons (no occluder)."""
-    names = (_MIN_FILTERS[sampler.filter], _MAG_FILTERS[sampler.filter], _WRAPS[sampler.wrap], _WRAPS[sampler.wrap])
-    return create_gl_sampler(device, *names, compare=sampler.compare, anisotropy=sampler.anisotropy)
+    is_trilinear = sampler.filter == "trilinear"
+    filters = ("linear_mipmap_linear", "linear") if is_trilinear else (sampler.filter, sampler.filter)
+    wraps = sampler.wrap, sampler.wrap
+    return create_gl_sampler(device, *filters, *wraps, compare=sampler.compare, anisotropy=sampler.anisotropy)
 
 
 def create_gl_sampler(
     device: Device,
-    min_filter: int,
-    mag_filter: int,
-    wrap_s: int,
-    wrap_t: int,
+    min_filter: str,
+    mag_filter: str,
+    wrap_s: str,
+    wrap_t: str,
     *,
     compare: bool = False,
     anisotropy: int = 1,
 ) -> int:
     raw = device.raw
     glo = raw.make("glCreateSamplers")
-    raw.glSamplerParameteri(glo, 0x2801, min_filter)
-    raw.glSamplerParameteri(glo, 0x2800, mag_filter)
-    raw.glSamplerParameteri(glo, 0x2802, wrap_s)
-    raw.glSamplerParameteri(glo, 0x2803, wrap_t)
+    raw.glSamplerParameteri(glo, 0x2801, _FILTERS[min_filter])
+    raw.glSamplerParameteri(glo, 0x2800, _FILTERS[mag_filter])
+    raw.glSamplerParameteri(glo, 0x2802, _WRAPS[wrap_s])
+    raw.glSamplerParameteri(glo, 0x2803, _WRAPS[wrap_t])
     border = (ctypes.c_float * 4)(*[0.0 if compare else 1.0] * 4)
     raw.glSamplerParameterfv(glo, 0x1004, ctypes.byref(border))
     if compare:

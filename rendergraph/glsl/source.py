@@ -87,6 +87,15 @@ class SourceText(Struct, frozen=True, dict=True):
     def text(self) -> str:
         return "".join(["\n".join([*block.lines, ""]) for block in self.blocks])
 
+    def place(self, at: int) -> tuple[Place | None, str]:
+        """Return the place in the author's file of a character of the text, and its line."""
+        number = self.text.count("\n", 0, at)
+        origin, line = self.origins[number], self.lines[number]
+        if origin.column:  # a layout was put into the author's line
+            start = max(0, line.find("layout("))
+            line = line[:start] + line[start + origin.column :]
+        return origin.place(at - self.text.rfind("\n", 0, at)), line
+
     def __add__(self, other: SourceText) -> SourceText:
         return SourceText(self.blocks + other.blocks)
 

@@ -73,10 +73,9 @@ def declared_at(source: SourceText, names: Sequence[str], *, mentions: bool = Tr
     """
     declared = {one.name: one.at for one in globals_of(source.text).declared} if names else {}
     for name in names:
-        at = declared.get(name)
-        number = source.text.count("\n", 0, at) if at is not None else 0
-        if at is not None and (place := source.origins[number].place(at - source.text.rfind("\n", 0, at))):
-            return place, source.lines[number]
+        own, text = source.place(declared[name]) if name in declared else (None, "")
+        if own is not None:
+            return own, text
         pattern = re.compile(rf"\b{re.escape(name)}\b")
         for line, origin in zip(source.lines, source.origins, strict=True) if mentions else ():
             match = pattern.search(line)
