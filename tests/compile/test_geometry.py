@@ -160,7 +160,7 @@ def test_a_node_that_makes_nothing_but_views_is_updated(draw: Draw) -> None:
     text = "nodes: {b: {type: back}, t: {type: through, inputs: {view: b.views}}}\noutputs: {depth: t.depth}"
     frame = draw(text, Back, Through, scene=scene)
     assert frame["depth"].max() > 0.0
-    assert frame.info.culled == {}
+    assert frame.culled == {}
 
 
 class Turned(Node):
