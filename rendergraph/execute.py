@@ -111,8 +111,12 @@ class FrameContext(Struct, eq=False):
         name = f"{self.node.id}.{port.name}"
         if name not in self.executable.plan.placement:
             return  # nobody reads the buffer in this pipeline
-        if self.executable.plan.resources[name].role == "kept":
+        role = self.executable.plan.resources[name].role
+        if role == "kept":
             raise Misuse(f"it writes '{port.name}', which is kept, in each frame; take `kept=True` away", "RG433")
+        if role == "history":
+            text = f"it writes '{port.name}', which holds last frame's values; write an Internal and copy it in a step"
+            raise Misuse(text, "RG433")
         array = np.ascontiguousarray(values)
         if array.dtype.kind not in "biuf":
             raise Misuse(f"write is given {type(values).__name__} of {array.dtype}, not an array of numbers", "RG433")
@@ -176,10 +180,11 @@ class Runner(Struct, eq=False):
         memory, plan = self.executable.memory, self.executable.plan
         for name, places in plan.placement.items():
             resource = plan.resources[name]
-            if resource.role != "history" or isinstance(resource.desc, BufferDesc):
-                continue
-            for parity in range(len(places)):
-                textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
+            for parity in range(len(places)) if resource.role == "history" else ():
+                if isinstance(resource.desc, BufferDesc):
+                    memory.buffer(name, parity).clear()
+                else:
+                    textures.Clear(self.executable.device, memory.texture(name, parity), resource.first)()
 
     def run(
         self, index: int, time: float, delta: float, scene: Scene, camera: ViewMatrices, *, timed: bool = False
@@ -322,7 +327,7 @@ class Runner(Struct, eq=False):
         desc = executable.plan.resources[resource].desc
         if isinstance(desc, BufferDesc):
             executable.device.ctx.finish()
-            return np.frombuffer(executable.memory.buffer(resource).read(desc.bytes), np.uint8)
+            return np.frombuffer(executable.memory.buffer(resource, self._parity).read(desc.bytes), np.uint8)
         texture = executable.memory.texture(resource, self._parity)
         texels = textures.read(executable.device, texture, mip=mip, layer=layer, stencil=stencil)
         return texels[0] if desc.kind == "texture2d" or layer is not None else texels

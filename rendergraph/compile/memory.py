@@ -108,7 +108,7 @@ class TexturePool(Struct, eq=False):
 class Memory(Struct, eq=False, dict=True):
     """Everything a pipeline allocates for one size.
 
-    `parity` is the frame number's: history textures swap their two copies with it. `regions` are those that steps are
+    `parity` is the frame number's: histories swap their two copies with it. `regions` are those that steps are
     drawn in, by node and number; `environment` gives the scene's own texture, which the scene keeps.
     """
 
@@ -167,9 +167,7 @@ class Memory(Struct, eq=False, dict=True):
 
     def texture(self, resource: str, parity: int = 0, *, previous: bool = False) -> GpuTexture:
         """A resource's texture in its own format."""
-        places = self.plan.placement[resource]
-        place = places[(parity + previous) % 2] if len(places) == 2 else places[0]
-        base = self.physicals[place]
+        base = self.physicals[self._place(resource, parity, previous)]
         desc = self._desc(resource)
         if isinstance(base, MemoryBlock):
             return base.textures[desc]
@@ -177,6 +175,10 @@ class Memory(Struct, eq=False, dict=True):
         if desc.format == base.desc.format:
             return base
         return self._view(base, desc.format, None, None)
+
+    def _place(self, resource: str, parity: int, previous: bool) -> int:
+        places = self.plan.placement[resource]
+        return places[(parity + previous) % 2] if len(places) == 2 else places[0]
 
     def _desc(self, resource: str) -> TextureDesc:
         desc = self.plan.resources[resource].desc
@@ -190,8 +192,8 @@ class Memory(Struct, eq=False, dict=True):
             return texture
         return self._view(texture, texture.desc.format, read.mip, read.layer)
 
-    def buffer(self, resource: str) -> moderngl.Buffer:
-        found = self.physicals[self.plan.placement[resource][0]]
+    def buffer(self, resource: str, parity: int = 0, *, previous: bool = False) -> moderngl.Buffer:
+        found = self.physicals[self._place(resource, parity, previous)]
         assert isinstance(found, moderngl.Buffer), f"{resource} is a texture"
         return found
 

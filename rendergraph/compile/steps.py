@@ -92,7 +92,7 @@ class _Compiler(Struct, eq=False, dict=True):
         self.units = Units(self.device, self.memory.parities)
         self.geometry = GeometryCompiler(self.scene)
         self._barrier = partial(self.device.raw.glMemoryBarrier, _ALL_BARRIERS)
-        self._geometry_draws: dict[tuple[str, int], list[Draw] | SortedDraws] = {}
+        self._geometry_draws: dict[tuple[str, int, int], list[Draw] | SortedDraws] = {}
         # In a context of somebody else's such a query may be under way: there all is drawn.
         asked = {(step.node, step.if_drawn) for step in self.plan.schedule.steps} if self.device.owned else set()
         self._queries = {
@@ -135,7 +135,7 @@ class _Compiler(Struct, eq=False, dict=True):
         self._watch(step, compiled)
         stored = [write for write in step.writes if write.use in ("buffer", "image") and step.kind != "clear"]
         compiled.before += [
-            clear_buffer(self.device, self.memory, write)
+            clear_buffer(self.device, self.memory, write, parity)
             for write in stored
             if write.use == "buffer" and write.load == "clear"
         ]
@@ -161,7 +161,7 @@ class _Compiler(Struct, eq=False, dict=True):
             last.append(after.end_conditional)
 
     def _fullscreen(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        program, binds, uniforms = self._program(step, {})
+        program, binds, uniforms = self._program(step, parity, {})
         self._target(step, compiled, parity)
         vertex_array = self.programs.vertex_array(program, ("none",), [])
         call = partial(vertex_array.render, moderngl.TRIANGLES, 3, 0, 1)
@@ -193,7 +193,7 @@ class _Compiler(Struct, eq=False, dict=True):
                 draw.binds.append(self.units.bind(draw.textures[name][0], unit))
 
     def _draw(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        program, binds, uniforms = self._program(step, {"PASS_VIEW_COUNT": view_count(step, self.view_tables)})
+        program, binds, uniforms = self._program(step, parity, {"PASS_VIEW_COUNT": view_count(step, self.view_tables)})
         self._target(step, compiled, parity)
         content: list[tuple[Any, ...]] = []
         names: list[int] = []
@@ -201,7 +201,7 @@ class _Compiler(Struct, eq=False, dict=True):
         for layout, resource in step.attributes:
             held |= attribute_formats(layout)
             formats, wanted = layout_for(layout, program)
-            buffer = self.memory.buffer(resource)
+            buffer = self.memory.buffer(resource, parity)
             if wanted:
                 content.append((buffer, formats, *wanted))
             names.append(buffer.glo)
@@ -211,7 +211,7 @@ class _Compiler(Struct, eq=False, dict=True):
         mode = _TOPOLOGY[step.topology]
         if isinstance(step.vertices, str):
             call: Call = partial(
-                vertex_array.render_indirect, self.memory.buffer(step.vertices), mode, 1, first=step.command
+                vertex_array.render_indirect, self.memory.buffer(step.vertices, parity), mode, 1, first=step.command
             )
         else:
             call = partial(vertex_array.render, mode, step.vertices, 0, step.instances)
@@ -223,7 +223,7 @@ class _Compiler(Struct, eq=False, dict=True):
 
         def make(multi_draw: MultiDraw) -> Draw:
             program, binds, uniforms = self._program(
-                step, {**defines, **multi_draw.defines}, materials=multi_draw.textures
+                step, parity, {**defines, **multi_draw.defines}, materials=multi_draw.textures
             )
             check_attributes(step, program, SCENE_ATTRIBUTES, self._texts(step, {**defines, **multi_draw.defines}))
             for slot, (texture, sampler) in multi_draw.textures.items():
@@ -233,8 +233,9 @@ class _Compiler(Struct, eq=False, dict=True):
             state = self._state(step, depth_default=True, cull=multi_draw.cull, clockwise=multi_draw.clockwise)
             return Draw(program, uniforms, state, multi_draw.call(vertex_array), binds, vertex_array)
 
-        key = step.key
-        if key not in self._geometry_draws:  # one set of command buffers for both parities
+        turns = any(use.use == "buffer" and len(self.plan.placement[use.resource]) == 2 for use in step.all_reads)
+        key = (*step.key, parity if turns else 0)
+        if key not in self._geometry_draws:  # one set of command buffers for both parities, unless buffers differ
             self._geometry_draws[key] = self.geometry.draws(step, make)
         made = self._geometry_draws[key]
         if isinstance(made, SortedDraws):
@@ -243,7 +244,7 @@ class _Compiler(Struct, eq=False, dict=True):
             compiled.draws += made
 
     def _compute(self, step: Step, compiled: CompiledStep, parity: int) -> None:
-        program, binds, uniforms = self._program(step, {})
+        program, binds, uniforms = self._program(step, parity, {})
         calls, units = image_calls(self.device, self.memory, step, parity)
         compiled.before += calls
         uniforms |= {name: unit for name, unit in units.items() if name in program.uniforms}
@@ -256,7 +257,7 @@ class _Compiler(Struct, eq=False, dict=True):
     # Parts ----------------------------------------------------------------------------------------------------------
 
     def _program(
-        self, step: Step, defines: Mapping[str, str], *, materials: Collection[str] = ()
+        self, step: Step, parity: int, defines: Mapping[str, str], *, materials: Collection[str] = ()
     ) -> tuple[Program, list[Call], dict[str, Any]]:
         """The program of a step with blocks bound and samplers given units."""
         outputs = [write.name for write in step.writes if write.use == "color"]
@@ -273,7 +274,9 @@ class _Compiler(Struct, eq=False, dict=True):
             view = self.plan.resources[use.resource].view
             if use.use == "buffer" and before + use.name not in blocks:
                 blocks[before + use.name] = storage
-                buffers.append(partial(self.memory.buffer(use.resource).bind_to_storage_buffer, storage))
+                previous = isinstance(use, Read) and use.previous
+                buffer = self.memory.buffer(use.resource, parity, previous=previous)
+                buffers.append(partial(buffer.bind_to_storage_buffer, storage))
                 storage += 1
             elif view is not None and isinstance(use, Read):
                 if use.previous:  # what was drawn last frame has last frame's view

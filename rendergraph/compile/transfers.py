@@ -27,13 +27,15 @@ def transfer_calls(device: Device, memory: Memory, step: Step, parity: int) -> l
         return [partial(device.raw.glGenerateTextureMipmap, texture.glo) for texture in textures]
     calls: list[Call] = []
     for write in step.writes:
-        calls += [clear_buffer(device, memory, write)] if write.use == "buffer" else _clear(memory, write, parity)
+        calls += (
+            [clear_buffer(device, memory, write, parity)] if write.use == "buffer" else _clear(memory, write, parity)
+        )
     return calls
 
 
-def clear_buffer(device: Device, memory: Memory, write: Write) -> Call:
+def clear_buffer(device: Device, memory: Memory, write: Write, parity: int) -> Call:
     """Zeros by the device itself: moderngl's clear maps the buffer, and so waits for whoever still reads it."""
-    glo = memory.buffer(write.resource).glo
+    glo = memory.buffer(write.resource, parity).glo
     return partial(device.raw.glClearNamedBufferData, glo, _R8UI, _RED_INTEGER, _UNSIGNED_BYTE, None)
 
 
@@ -71,7 +73,8 @@ def _clear(memory: Memory, write: Write, parity: int) -> list[Call]:
 def _copy(device: Device, memory: Memory, step: Step, parity: int) -> list[Call]:
     (read,), (write,) = step.reads, step.writes
     if isinstance(memory.plan.resources[read.resource].desc, BufferDesc):
-        return [partial(device.ctx.copy_buffer, memory.buffer(write.resource), memory.buffer(read.resource))]
+        source, target = memory.buffer(read.resource, parity), memory.buffer(write.resource, parity)
+        return [partial(device.ctx.copy_buffer, target, source)]
     return list(textures.copies(device, memory.texture(read.resource, parity), memory.texture(write.resource, parity)))
 
 

@@ -149,8 +149,8 @@ def _alone(name: str, port: Port) -> Iterator[str]:
             return
         if port.bytes == 0:
             yield f"port '{name}' is a buffer without bytes; say bytes=…, from 1 up"
-        if isinstance(port, History):
-            yield f"'{name}' is a History of a buffer; only textures keep last frame's values"
+        if port.first not in (None, 0):
+            yield f"port '{name}' is a buffer, which holds 0 before the first frame, not {port.first!r}"
         if not callable(port.clear) and port.clear not in (None, 0):
             yield f"port '{name}' is a buffer, which can only be cleared to 0, not to {port.clear!r}"
 

@@ -11,6 +11,7 @@ from rendergraph.errors import InputError, Problem
 from rendergraph.expand.model import Expansion, VersionedSteps, follow_forwards
 from rendergraph.link import Endpoint, Graph
 from rendergraph.steps import Read, Resource, Role, Step, Write
+from rendergraph.textures import BufferDesc
 
 
 def finalize_resources(graph: Graph, found: VersionedSteps, wanted: Mapping[str, Endpoint]) -> Expansion:
@@ -52,9 +53,8 @@ def _mark_roles(
         if str(end) in previous and str(end) not in resources:  # its node is idle: it stays as it first was
             port, info = graph[end.node].node.ports()[end.port], graph.textures[end]
             assert isinstance(port, WrittenPort)
-            assert info.desc is not None
-            first = port.first or 0.0
-            resources[str(end)] = Resource(str(end), info.desc, "history", first, info.view, info.lights)
+            desc, first = info.desc or BufferDesc(info.bytes), port.first or 0.0
+            resources[str(end)] = Resource(str(end), desc, "history", first, info.view, info.lights)
     for name in set(shown.values()) | previous:
         resource = resources[name]
         role: Role = "history" if name in previous else "output"

@@ -242,7 +242,8 @@ class _VersionAssignment:
         read = []
         if load == "load" and (continued or old > 0):
             read = [Read(name, resource, old, "attach", mip=part.mip, layer=part.layer)]
-        if use == "buffer" and old == 0 and type(recording.node.node).update is not Node.update:
+        updates = type(recording.node.node).update is not Node.update and not isinstance(port, History)
+        if use == "buffer" and old == 0 and updates:
             read = [Read(name, resource, 0, "attach")]  # what `update` wrote before the frame must still be there
         if request.kind == "mipmaps":
             read = [Read(name, resource, old, "attach")]

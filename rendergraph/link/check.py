@@ -46,7 +46,7 @@ class Checker(Struct, eq=False):
         given, taken = port_kind(source, info), port.kind
         if isinstance(port, InOut) and port.like is not None and given in TEXTURE_KINDS:
             taken = given  # type: ignore[assignment]
-        if link.source.previous and (isinstance(port, InOut) or given in ("function", "view", "buffer")):
+        if link.source.previous and (isinstance(port, InOut) or given in ("function", "view")):
             what = "continues a texture of this frame" if isinstance(port, InOut) else f"takes a {given}"
             text = f"'{draft.spec.id}.{port.name}' {what}, which has no last frame's value; remove '@previous'"
             self.problems.append(link.value.problem("RG127", text))

@@ -51,7 +51,7 @@ DECLARATIONS = {
     'more = Output(Radiance, clear=(0, 0, 0, 0, 0), doc="D.")  # here': "port 'more': clear is (0, 0, 0, 0, 0), not a number, up to four of them, None or a function of node and facts",
     'more = Output(Radiance, kind="buffer", doc="D.")  # here': "port 'more' is a buffer without bytes; say bytes=…, from 1 up",
     'more = Output(Radiance, kind="buffer", bytes=8, clear=1.0, doc="D.")  # here': "port 'more' is a buffer, which can only be cleared to 0, not to 1.0",
-    'more = History(kind="buffer", bytes=8)  # here': "'more' is a History of a buffer; only textures keep last frame's values",
+    'more = History(kind="buffer", bytes=8, first=1.0)  # here': "port 'more' is a buffer, which holds 0 before the first frame, not 1.0",
     'more = History(Radiance, first="white")  # here': "port 'more': first is 'white', not a number or None",
     'more = Views(count=-1, doc="D.")  # here': "port 'more': count is -1, not a whole number from 0 up, a function of node and facts or None",
     'more = Views(lights=(0,), doc="D.")  # here': "port 'more': lights is (0,), not a function of node and facts or None",

@@ -9,7 +9,6 @@ import pytest
 
 from rendergraph.api import ADD, Depth, History, InOut, Input, Luminance, Node, Output, State, Steps
 from rendergraph.api import Any as AnyTexel
-from rendergraph.declare import declaration_mistakes
 from rendergraph.errors import InputError
 
 if TYPE_CHECKING:
@@ -252,18 +251,80 @@ outputs: {image: half.color}"""
     assert np.all(draw(text, Nothing, Halve, Needy, shaders=CONTINUED, frames=range(1, 3))["image"] == 4)
 
 
-def test_buffers_have_no_history() -> None:
-    class Tally(Node):
-        """Keeps a buffer."""
+class Walkers(Node):
+    """Two points that step one texel to the right in each frame, kept in a buffer and drawn from it."""
 
-        color = Output(AnyTexel, doc="Nothing.")
-        count = History(kind="buffer", bytes=16)
+    color = Output(AnyTexel, format="r32f", clear=0.0, doc="1 where a walker is.")
+    walkers = History(kind="buffer", bytes=16)
 
-    (mistake,) = declaration_mistakes(Tally)
-    assert (mistake.subject, mistake.text) == (
-        "count",
-        "'count' is a History of a buffer; only textures keep last frame's values",
+    def record(self, steps: Steps) -> None:
+        steps.compute("walk.comp", groups=(1, 1, 1), before=self.walkers.previous, out=self.walkers)
+        steps.draw(
+            "walker.frag",
+            vertex="walker.vert",
+            vertices=2,
+            topology="points",
+            attributes={"2f in_position": self.walkers},
+            before=self.walkers.previous,
+        )
+
+
+class Tally(Node):
+    """Counts frames in a buffer that another node hands back."""
+
+    before = Input(AnyTexel, kind="buffer", doc="The count before.")
+    count = Output(AnyTexel, kind="buffer", bytes=4, doc="The count.")
+    color = Output(Luminance, format="r32f", doc="The count.")
+
+    def record(self, steps: Steps) -> None:
+        steps.compute("tally.comp", groups=(1, 1, 1), out=self.count, before=self.before)
+        steps.fullscreen("count.frag", out=self.color, count=self.count)
+
+
+def test_a_buffer_keeps_last_frames_values(bench: Any) -> None:
+    shaders = {
+        "walk.comp": """layout(local_size_x = 2) in;
+            layout(std430) readonly buffer before { vec2 old[]; };
+            layout(std430) buffer walkers { vec2 position[]; };
+            void main() {
+                uint i = gl_GlobalInvocationID.x;  // all begins as 0
+                position[i] = old[i] + vec2(1.0, i);
+            }""",
+        "walker.vert": """in vec2 in_position;
+            void main() {
+                gl_Position = vec4((in_position + 0.5) / vec2(8.0, 4.0) - 1.0, 0.5, 1.0);
+                gl_PointSize = 1.0;
+            }""",
+        "walker.frag": """layout(std430) readonly buffer before { vec2 old[]; };
+            out float color; void main() { color = 1.0 + old[0].x; }""",
+    }
+    frames = bench.frames(
+        "nodes: {a: {type: walkers}}\noutputs: {image: a.color}",
+        Walkers,
+        shaders=shaders,
+        frames=range(1, 5),
     )
+    for number, frame in enumerate(frames, 1):
+        rows, columns = np.nonzero(frame["image"][::-1, :, 0])
+        assert set(zip(columns, rows, strict=True)) == {(number, 0), (number, number)}
+        assert frame["image"].max() == number
+
+
+def test_a_buffer_is_handed_back_from_the_last_frame(bench: Any) -> None:
+    shaders = {
+        "tally.comp": """layout(local_size_x = 1) in;
+            layout(std430) readonly buffer before { uint old; };
+            layout(std430) buffer count { uint now; };
+            void main() { now = old + 1u; }""",
+        "count.frag": """layout(std430) readonly buffer count { uint now; };
+            out float color; void main() { color = float(now); }""",
+    }
+    text = "nodes: {a: {type: tally, inputs: {before: a.count@previous}}}\noutputs: {image: a.color}"
+    for reuse in (False, True):
+        frames = bench.frames(text, Tally, shaders=shaders, frames=range(1, 4), reuse=reuse)
+        assert [float(frame["image"].mean()) for frame in frames] == [1, 2, 3]
+    for mode in ({"alias": False}, {"poison": True, "shuffle": 3}):
+        assert bench.draw(text, Tally, shaders=shaders, frames=range(1, 4), **mode)["image"].mean() == 3
 
 
 class Seen(Node):
