@@ -228,6 +228,14 @@ def test_every_verb_and_shipped_file_is_listed(generated: Path) -> None:
         assert all(f"## {file.stem}\n" in text for file in folder.glob("*.yaml"))
 
 
+@pytest.mark.parametrize("page", ["docs/how-it-works.md", "CONTRIBUTING.md", "tests/README.md"])
+def test_the_files_that_a_page_names_exist(page: str) -> None:
+    folders = ("rendergraph", "nodes", "shaders", "tests", "docs")
+    files = [str(path) for folder in folders for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".frag")]
+    named = re.findall(r"`((?:\w+/)*\w+\.(?:py|frag))`", (ROOT / page).read_text(encoding="utf-8"))
+    assert [name for name in named if not any(file.endswith(f"/{name}") for file in files)] == []
+
+
 def test_every_shipped_pipeline_is_in_the_gallery() -> None:
     pages = "".join(page.read_text(encoding="utf-8") for page in (DOCS / "gallery").glob("*.md"))
     shown = set(re.findall(r"\{literalinclude\} \.\./\.\./pipelines/([\w-]+)\.yaml", pages))
