@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from rendergraph.authoring.check_process import CheckLimits, check_node
 from rendergraph.authoring.report import Report
-from rendergraph.authoring.scaffold import KINDS, NewNode, new_node
+from rendergraph.authoring.scaffold import KINDS, NewNode, new_node, new_project
 
-__all__ = ["KINDS", "CheckLimits", "NewNode", "Report", "check_node", "new_node"]
+__all__ = ["KINDS", "CheckLimits", "NewNode", "Report", "check_node", "new_node", "new_project"]

@@ -1,4 +1,4 @@
-"""A new node from a template: module, shader, pipeline and test, all of them or none.
+"""A new node or project from templates: module, shader, pipeline and test, all of them or none.
 
 Templates are the files of the folder `templates`, with `@words@` to fill in.
 """
@@ -9,20 +9,24 @@ import contextlib
 import json
 import keyword
 import re
+import shlex
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from rendergraph import api
 from rendergraph.catalog import Catalog
 from rendergraph.declare import RESERVED_NAMES
 from rendergraph.errors import InputError, Place, Problem, RenderError
+from rendergraph.keys import as_markdown, file_schema
 from rendergraph.resources import folder
+from rendergraph.scene.scene_keys import SCENE
 from rendergraph.schema import schema
+from rendergraph.settings import nearest_settings
 
 Kind = Literal["fullscreen", "compute", "geometry", "shader-only"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -42,6 +46,13 @@ _IN_PACKAGE = {
     "pipeline": 'ROOT / "pipelines" / "@name@.yaml"',
     "plugins": ", plugins=PLUGINS",
 }
+_IN_PROJECT = {
+    "imports": "from pathlib import Path",
+    "where": "PROJECT = Path(__file__).parents[1]",
+    "pipeline": 'PROJECT / "@file@.yaml"',
+    "plugins": ', plugins=[PROJECT / "@nodes@"]',
+}
+_PROJECT_NODE = "lens_falloff"
 _ROOTS = ("nodes", "shaders")
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
 _LONGEST_NAME = 40
@@ -57,8 +68,33 @@ class NewNode:
     commands: tuple[str, ...]
 
 
+def new_project(where: Path) -> NewNode:
+    """Write a project into a folder, which need not exist: a pipeline, a scene, a node and settings that find it.
+
+    Raises:
+        InputError: a file of it exists already; nothing has been written then.
+        RenderError: writing failed; nothing is left behind.
+    """
+    node = _files(_PROJECT_NODE, "fullscreen", nodes="nodes", file="pipeline")
+    words = {"name": _PROJECT_NODE, "id": _PROJECT_NODE, "type": _PROJECT_NODE, "nodes": "nodes"}
+    words["schema"] = f"./{SCHEMA_FILE}"
+    own = {file.name.removesuffix(".in"): _fill(file, words) for file in _templates("project")}
+    more = {".gitignore": own.pop("gitignore"), "scene.schema.json": _json(as_markdown(file_schema(SCENE)))}
+    files = node | own
+    _refuse_existing(where, files)
+    more[SCHEMA_FILE] = _schema(files, by_path=False)
+    files |= {path: text for path, text in more.items() if not (where / path).exists()}
+    _write(where, files)
+    commands = ["rendergraph run pipeline.yaml", "rendergraph new-node glow", "rendergraph run glow.yaml"]
+    if where.resolve() != Path.cwd():
+        commands.insert(0, f"cd {shlex.quote(str(where))}")
+    return NewNode(_PROJECT_NODE, "fullscreen", tuple(where / path for path in files), tuple(commands))
+
+
 def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, where: Path = Path()) -> NewNode:
     """Write a working node into a folder; with `package`, as a folder that can be installed.
+
+    In the folder of a project its module and shader go into the project's folder of nodes, where they are found.
 
     Raises:
         InputError: the name cannot be used, or a file of it exists already; nothing has been written then.
@@ -67,24 +103,39 @@ def new_node(name: str, kind: Kind = "fullscreen", *, package: bool = False, whe
     mistake = _name_mistake(name, set(Catalog.discover().names()))
     if mistake:
         raise InputError(Problem("RG530", f"a node cannot be called '{name}': {mistake}"))
-    files = _files(name, kind, package=package)
+    nodes, is_found = ("", False) if package else _project_nodes(where)
+    files = _files(name, kind, package=package, nodes=nodes)
     _refuse_existing(where, [name] if package else files)
     pipeline = next(file for file in files if file.endswith(".yaml"))
     schema_file = (Path(pipeline).parent / SCHEMA_FILE).as_posix()
     has_schema = (where / schema_file).exists()
+    by_path = kind == "shader-only" and not package and not nodes
     if not has_schema:
-        files[schema_file] = _schema(files, by_path=kind == "shader-only" and not package)
+        files[schema_file] = _schema(files, by_path=by_path)
     _write(where, files)
-    plugin = "--plugin ." if package else "" if kind == "shader-only" else f"--plugin {name}.py"
+    plugin = "--plugin ." if package else "" if by_path or is_found else f"--plugin {name}.py"
     inside = [path.removeprefix(f"{name}/") if package else path for path in files]
     source = next(p for p in inside if Path(p).name == (f"{name}.frag" if kind == "shader-only" else f"{name}.py"))
     run = pipeline.removeprefix(f"{name}/") if package else pipeline
     commands = [f"rendergraph run {run} {plugin}".rstrip(), f"rendergraph check-node {source}", "pytest"]
     if has_schema:
-        commands.append(f"rendergraph schema --plugin . -o {SCHEMA_FILE}")
+        commands.append(f"rendergraph schema {'' if is_found else '--plugin . '}-o {SCHEMA_FILE}")
     if package:
         commands = [f"cd {name}", *commands, "pip install -e ."]
     return NewNode(name, kind, tuple(Path(path) for path in files), tuple(commands))
+
+
+def _project_nodes(where: Path) -> tuple[str, bool]:
+    """Return the project's folder of nodes, for a new node in the project's folder, and whether such a node is found.
+
+    In another folder the first is empty: a new node's files are written beside each other.
+    """
+    here, project = where.resolve(), nearest_settings(where.resolve())
+    plugins = [path.resolve() for path in project.plugins if path.is_dir()] if project else []
+    if any(here.is_relative_to(folder) for folder in plugins):
+        return "", True
+    below = [folder for folder in plugins if project and project.folder == here and folder.is_relative_to(here)]
+    return (below[0].relative_to(here).as_posix(), True) if below else ("", False)
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
@@ -126,18 +177,30 @@ def _is_installed(name: str) -> bool:
 # --- what is written --------------------------------------------------------------------------------------------------
 
 
-def _files(name: str, kind: Kind, *, package: bool) -> dict[str, str]:
+def _files(name: str, kind: Kind, *, package: bool = False, nodes: str = "", file: str = "") -> dict[str, str]:
+    """Return the files of a node by path.
+
+    Args:
+        name: of the node.
+        kind: of template.
+        package: in a folder that can be installed.
+        nodes: the project's folder of nodes; empty where all files stand beside each other.
+        file: name of the pipeline, without its ending; the node's by default.
+    """
+    by_path = kind == "shader-only" and not package and not nodes
     words = {
         "name": name,
+        "file": file or name,
+        "nodes": nodes,
         "Class": class_name(name),
         "id": f"my_{name}" if name in _IDS_OF_FORWARD else name,
-        "type": f"./{name}.frag" if kind == "shader-only" and not package else name,
+        "type": f"./{name}.frag" if by_path else name,
         "package": f"rendergraph_{name}",
         "dashed": name.replace("_", "-"),
         "schema": f"./{SCHEMA_FILE}",
         "summary": _summary(kind),
-    } | (_IN_PACKAGE if package else _IN_PLACE)
-    if kind == "shader-only" and not package:
+    } | (_IN_PACKAGE if package else _IN_PROJECT if nodes else _IN_PLACE)
+    if by_path:
         words["plugins"] = ""
     files = {}
     if package:
@@ -145,14 +208,17 @@ def _files(name: str, kind: Kind, *, package: bool) -> dict[str, str]:
         files |= {
             f"{name}/{home}/__init__.py": f'"""{home.capitalize()} of `{words["package"]}`."""\n' for home in _ROOTS
         }
-    for file in _templates(kind):
-        stem, suffix = file.name.removesuffix(".in").split(".")
-        target = f"test_{name}.py" if stem == "test" else f"{name}.{suffix}"
+    homes = {"test": "tests", "node": nodes} if nodes else {}
+    for template in _templates(kind):
+        stem, suffix = template.name.removesuffix(".in").split(".")
+        target = f"test_{name}.py" if stem == "test" else f"{words['file'] if stem == 'pipeline' else name}.{suffix}"
         if package:
             is_module = suffix == "py" or kind == "shader-only"  # a shader that is a node is among the nodes
-            home = {"pipeline": "pipelines", "test": "tests"}.get(stem, "nodes" if is_module else "shaders")
-            target = f"{name}/{home}/{target}"
-        files[target] = _fill(file, words)
+            homes = {"pipeline": "pipelines", "test": "tests", "node": "nodes" if is_module else "shaders"}
+            target = f"{name}/{homes[stem]}/{target}"
+        elif home := homes.get(stem):
+            target = f"{home}/{target}"
+        files[target] = _fill(template, words)
     return files
 
 
@@ -184,7 +250,11 @@ def _schema(files: Mapping[str, str], *, by_path: bool) -> str:
         for path, text in files.items():
             if Path(path).suffix in (".py", ".frag", ".comp") and not Path(path).name.startswith(("test_", "_")):
                 (node / Path(path).name).write_text(text, encoding="utf-8")
-        return json.dumps(schema(Catalog.discover([] if by_path else [node])), indent=2, ensure_ascii=False) + "\n"
+        return _json(schema(Catalog.discover([] if by_path else [node])))
+
+
+def _json(document: Any) -> str:
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
 def _refuse_existing(where: Path, paths: Iterable[str]) -> None:
@@ -200,10 +270,10 @@ def _write(where: Path, files: Mapping[str, str]) -> None:
     try:
         for path, text in files.items():
             target = where / path
-            for parent in reversed(target.relative_to(where).parents[:-1]):
-                if not (where / parent).is_dir():
-                    (where / parent).mkdir()
-                    made.append(where / parent)
+            for parent in reversed([target.parent, *target.parent.parents]):
+                if not parent.is_dir():
+                    parent.mkdir()
+                    made.append(parent)
             with target.open("x", encoding="utf-8") as file:
                 made.append(target)
                 file.write(text)

@@ -34,6 +34,7 @@ VERBS = (
     *_LISTS,
     "explain",
     "schema",
+    "init",
     "new-node",
     "check-node",
     "doctor",
@@ -51,6 +52,10 @@ _SYNONYMS = {
     "benchmark": "bench",
     "profile": "bench",
     "help": "explain",
+    "open": "view",
+    "new": "init",
+    "create": "init",
+    "start": "init",
 }
 """What other programs call our verbs."""
 

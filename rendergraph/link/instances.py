@@ -125,6 +125,11 @@ _LINK = re.compile(r"([^.@]+)(?:\.([^.@]+))?(?:@previous)?\Z")
 def unknown_type(spec: PipelineSpec, catalog: Catalog, name: str) -> str:
     if name in spec.unrun:
         return f"node type '{name}' is Python, which a pipeline file cannot load; pass --plugin {spec.unrun[name]}"
+    file = spec.path.with_name(f"{name}.py") if spec.path is not None else Path()
+    if file.is_file():
+        return (
+            f"node type '{name}' is Python beside the file and not loaded by itself; pass --plugin {shown_file(file)}"
+        )
     text = f"there is no node type '{shown(name)}'"
     near = nearest(name, catalog.names())
     if near is not None:

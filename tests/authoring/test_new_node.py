@@ -225,6 +225,76 @@ def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
     assert main(["new-node", "more", "--kind", "cubist"]) == 2
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [(), ("a study",)])
+def test_a_project_and_a_new_node_in_it_run_without_options(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", *words]) == 0
+    out, err = capsys.readouterr()
+    home = Path(*words)
+    assert all(Path(line).is_file() for line in out.splitlines())
+    assert {path.name for path in home.iterdir()} == {
+        *("pipeline.yaml", "scene.yaml", "nodes", "tests", "rendergraph.toml", ".gitignore"),
+        *("rendergraph.schema.json", "scene.schema.json"),
+    }
+    typed = [shlex.split(line) for line in err.splitlines()[1:]]
+    assert [one[0] for one in typed] == [*(["cd"] if words else []), *["rendergraph"] * 3]
+    monkeypatch.chdir(home)
+    for command in typed[-3:]:
+        assert main([*command[1:], *(["--size", "64x36"] if command[1] == "run" else [])]) == 0, command
+    out, err = capsys.readouterr()
+    assert "warning" not in err
+    assert "--plugin" not in err
+    assert Path("pipeline.png").stat().st_size > 1000 < Path("glow.png").stat().st_size
+    assert {path.stem for path in Path("nodes").glob("*.py")} == {"lens_falloff", "glow"}
+    for schema, node in (("rendergraph.schema.json", "lens_falloff"), ("scene.schema.json", "base_color")):
+        assert node in Path(schema).read_text()
+    if not words:
+        assert " passed" in run("pytest -q -p no:cacheprovider -W error tests", Path.cwd()).stdout
+
+
+def test_a_project_overwrites_nothing(cli_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in (".gitignore", "rendergraph.schema.json"):
+        (cli_folder / name).write_text("mine\n")
+    assert main(["init"]) == 0
+    assert (cli_folder / ".gitignore").read_text() == (cli_folder / "rendergraph.schema.json").read_text() == "mine\n"
+    before = {path: path.stat().st_mtime_ns for path in cli_folder.rglob("*")}
+    capsys.readouterr()
+    assert main(["init"]) == 3
+    assert "pipeline.yaml: RG531 'pipeline.yaml' already exists and was not changed" in capsys.readouterr().err
+    assert {path: path.stat().st_mtime_ns for path in cli_folder.rglob("*")} == before
+    (cli_folder / "empty").mkdir()
+    (cli_folder / "empty" / "scene.yaml").write_text("mine\n")
+    assert main(["init", "empty"]) == 3
+    assert [path.name for path in (cli_folder / "empty").iterdir()] == ["scene.yaml"]
+
+
+@pytest.mark.parametrize("inside", ["nodes", "other"])
+def test_a_node_in_another_folder_of_a_project_says_how_it_is_found(
+    inside: str, cli_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (cli_folder / "rendergraph.toml").write_text('plugins = ["nodes"]\n')
+    for name in {"nodes", inside}:
+        (cli_folder / name).mkdir()
+    monkeypatch.chdir(cli_folder / inside)
+    (cli_folder / inside / "rendergraph.schema.json").write_text("{}\n")  # not under test, and slow to write
+    assert main(["new-node", "glow"]) == 0
+    assert ("--plugin glow.py" in capsys.readouterr().err) == (inside == "other")
+    assert Path("glow.frag").is_file()
+    assert main(["check", "glow.yaml"]) == (0 if inside == "nodes" else 3)
+    if inside == "other":
+        assert "RG102 node type 'glow' is Python beside the file" in (err := capsys.readouterr().err)
+        assert "pass --plugin glow.py\n" in err
+
+
+@pytest.fixture
+def cli_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 def test_templates_are_shipped_as_data() -> None:
     found = {path.relative_to(folder("rendergraph")) for path in folder("rendergraph").rglob("*.in")}
     assert {path.parts[:2] for path in found} == {("authoring", "templates")}
