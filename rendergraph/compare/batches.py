@@ -40,38 +40,23 @@ Key: TypeAlias = "tuple[int, str]"
 """Number of a graph and id of one of its nodes."""
 
 
-@dataclass(frozen=True)
-class MergedGraph:
-    """Several graphs as one, and for each of them its nodes' ids to ids in the merged graph."""
-
-    graph: Graph
-    names: tuple[Mapping[str, str], ...]
-
-    def output(self, number: int, name: str) -> str:
-        """Return the name of a graph's output in the merged graph."""
-        return f"{number}/{name}"
-
-
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Variants that are rendered in the same frames, by their numbers."""
+    """Variants that are rendered in the same frames.
+
+    Attributes:
+        numbers: of the variants.
+        names: of each variant, its nodes' ids to ids in the merged graph.
+        planned: the merged graph.
+    """
 
     numbers: tuple[int, ...]
-    merged: MergedGraph
+    names: tuple[Mapping[str, str], ...]
     planned: Planned
 
     @property
     def pass_count(self) -> int:
         return len(passes(self.planned.plan))
-
-
-@dataclass(frozen=True, eq=False)
-class RenderedVariant:
-    """The outputs of one variant of a batch by name."""
-
-    number: int
-    arrays: Mapping[str, Pixels]
-    device: Mapping[str, object]
 
 
 def batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int = MOST_BYTES) -> list[Batch]:
@@ -114,12 +99,12 @@ def _cut(classes: Sequence[tuple[int, ...]], most: int) -> int:
 def fitting_batches(variants: Sequence[Planned], numbers: Sequence[int], most_bytes: int) -> list[Batch]:
     """Return these variants in one batch, or halved until each batch fits."""
     chosen = [variants[number] for number in numbers]
-    merged = merge([variant.linked.graph for variant in chosen])
+    graph, names = merge([variant.linked.graph for variant in chosen])
     try:
-        planned = stages.plan(stages.expand(replace(chosen[0].linked, graph=merged.graph)))
+        planned = stages.plan(stages.expand(replace(chosen[0].linked, graph=graph)))
         small = planned.plan.memory.allocated_bytes <= most_bytes and len(planned.expansion.views) <= MOST_VIEWS
         if small or len(numbers) == 1:
-            return [Batch(tuple(numbers), merged, planned)]
+            return [Batch(tuple(numbers), names, planned)]
     except InputError:
         # Each graph has a legal order and the merged one has none: readers of two continued textures wait for each
         # other across graphs. This is so rare that halving is good enough.
@@ -129,13 +114,12 @@ def fitting_batches(variants: Sequence[Planned], numbers: Sequence[int], most_by
     return [part for own in (numbers[:half], numbers[half:]) for part in fitting_batches(variants, own, most_bytes)]
 
 
-def render_batch(gpu: Gpu, variants: Sequence[Planned], batch: Batch, frame: int) -> Iterator[RenderedVariant]:
-    """Render a batch up to a frame, and yield its variants."""
+def render_batch(gpu: Gpu, batch: Batch, frame: int) -> Iterator[tuple[int, dict[str, Pixels]]]:
+    """Render a batch up to a frame, and yield the number and the outputs of each variant."""
     rendered = stages.draw_last(batch.planned.for_frames(range(1, frame + 1), warm_up=False), gpu)  # not measured
     for place, number in enumerate(batch.numbers):
-        outputs = variants[number].linked.graph.outputs
-        arrays = {name: rendered[batch.merged.output(place, name)] for name in outputs}
-        yield RenderedVariant(number, arrays, rendered.device)
+        own = f"{place}/"
+        yield number, {name.removeprefix(own): rendered[name] for name in rendered if name.startswith(own)}
 
 
 def measure_batch(
@@ -152,7 +136,7 @@ def measure_batch(
         times.append(stages.draw_last(timed, gpu).times)
     for place, number in enumerate(batch.numbers):
         variant = variants[number]
-        names = {name: batch.merged.names[place][name] for name in passes(variant.plan)}
+        names = {name: batch.names[place][name] for name in passes(variant.plan)}
         yield number, times_repeated(times, node_types(variant), names)
 
 
@@ -164,8 +148,11 @@ def node_types(planned: Planned) -> dict[str, str]:
 # --- merging ---------------------------------------------------------------------------------------------------------
 
 
-def merge(graphs: Sequence[Graph]) -> MergedGraph:
-    """Return one graph that renders the outputs of all of them; they must have one scene and one size."""
+def merge(graphs: Sequence[Graph]) -> tuple[Graph, tuple[dict[str, str], ...]]:
+    """Return one graph for graphs of one scene and one size, and of each its nodes' ids to ids in that graph.
+
+    Output `image` of the second graph is called `1/image` there.
+    """
     classes = _equivalence_classes(graphs)
     ids = _class_ids(classes)
     names = tuple(
@@ -183,7 +170,7 @@ def merge(graphs: Sequence[Graph]) -> MergedGraph:
         outputs |= {f"{number}/{name}": _renamed(end, own) for name, end in graph.outputs.items()}
     first = graphs[0]
     merged = Graph(first.name, nodes, outputs, first.size, first.lights, textures)
-    return MergedGraph(replace(merged, objects=first.objects, environment=first.environment), names)
+    return replace(merged, objects=first.objects, environment=first.environment), names
 
 
 def _renamed(end: Endpoint, names: Mapping[str, str]) -> Endpoint:

@@ -33,7 +33,7 @@ class Listing:
         for at, group in enumerate(self.groups):
             for place, number in enumerate(group.numbers):
                 for name in passes(self.prepared.runs[number].planned.plan):
-                    shared.setdefault(name, set()).add((at, group.merged.names[place][name]))
+                    shared.setdefault(name, set()).add((at, group.names[place][name]))
                     alone[name] = alone.get(name, 0) + 1
         return {name: (len(different), alone[name]) for name, different in shared.items()}
 

@@ -14,21 +14,25 @@ import numpy as np
 from msgspec import Struct, structs
 
 from rendergraph.compare.batches import MOST_BYTES
-from rendergraph.compare.fingerprint import file_digest, run_key
+from rendergraph.compare.fingerprint import file_digest, run_key, worker_digest
 from rendergraph.compare.results import Pixels, Reference
 from rendergraph.compare.space import Axes, Space, pipelines, run_name, unique_names
 from rendergraph.errors import InputError, Option, Place, Problem
+from rendergraph.farm.bundle import relocate_selection
 from rendergraph.metrics import Encoding, check_sizes
+from rendergraph.session import stages
 from rendergraph.session.picture_metadata import frame_metadata, is_picture, pipeline_metadata
 from rendergraph.session.pipeline import Pipeline, load
 from rendergraph.textures import FORMATS
 
 if TYPE_CHECKING:
-    from rendergraph.farm import Executor
+    from rendergraph.catalog import Catalog
+    from rendergraph.farm import Executor, Worker
     from rendergraph.farm.executors import ExecutorChoice
     from rendergraph.link import Graph
     from rendergraph.session.gpu import Gpu
     from rendergraph.session.progress import Progress
+    from rendergraph.session.selection import Selection
     from rendergraph.session.values import Linked, Planned
 
 METRIC = "metric"
@@ -108,9 +112,16 @@ class SweepOptions(Struct, frozen=True, kw_only=True, eq=False):
 class Run:
     """One variant of a comparison, or one combination of a sweep, which has settings and a folder.
 
-    `reference_key` is what decides the picture that it is measured against.
+    Other processes get it without its plan, and plan it again.
+
+    Attributes:
+        number: from 0; -1 for a pipeline that is only the reference.
+        reference_key: what decides the picture that it is measured against.
+        selection, digest: the pipeline, and what its picture depends on, as they were when the run's task was created.
+        is_rendered: its picture exists already; only times are needed.
     """
 
+    number: int
     name: str
     planned: Planned
     output: str
@@ -118,6 +129,13 @@ class Run:
     settings: Mapping[str, str] = field(default_factory=dict)
     folder: Path = Path()
     reference_key: str = ""
+    selection: Selection | None = None
+    digest: str = ""
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    is_rendered: bool = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "planned": None}
 
     @cached_property
     def key(self) -> str:
@@ -129,10 +147,25 @@ class Run:
         """The picture's file; light keeps its values."""
         return self.folder / (f"{self.output}.png" if self.output == "image" else f"{self.output}.exr")
 
-    @property
-    def metadata(self) -> dict[str, str]:
-        """The metadata of its picture."""
-        return {**pipeline_metadata(self.planned.linked), **frame_metadata(self.frame, 30.0)}
+    def for_task(self, *, is_rendered: bool = False) -> Run:
+        """Return the run with everything that other processes need to plan it again and to write its picture."""
+        linked, digest = self.planned.linked, worker_digest(self.planned)
+        metadata = {**pipeline_metadata(linked), **frame_metadata(self.frame, 30.0)}
+        return replace(self, selection=linked.selection, digest=digest, metadata=metadata, is_rendered=is_rendered)
+
+    def plan(self, worker: Worker, catalog: Catalog | None = None) -> Planned:
+        """Return the planned pipeline; the catalog of another run saves the time to create one.
+
+        Raises:
+            InputError: it is not what it was when its task was created.
+        """
+        if self.planned is not None or self.selection is None:
+            return self.planned
+        planned = stages.plan(stages.expand(Pipeline(relocate_selection(self.selection, worker.root), catalog).link()))
+        if worker_digest(planned) != self.digest:
+            text = f"input files of '{self.name}' differ on worker '{worker.name}' from those when the work began"
+            raise InputError(Problem("RG642", f"{text}: a file has changed, or another version is installed there"))
+        return planned
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +250,10 @@ def prepare_variants(
     picture = read_picture(reference, graphs[0].size, names[0]) if isinstance(reference, Path) else None
     output, encoding = compared_output(graphs, picture[1] if picture else None, measured=options.metric is not None)
     called = [*names, *(graph.name for graph in graphs[len(variants) :])]
-    runs = [Run(name, each, output, options.frame) for name, each in zip(called, planned, strict=True)]
+    runs = [
+        Run(number if number < len(variants) else -1, name, each, output, options.frame)
+        for number, (name, each) in enumerate(zip(called, planned, strict=True))
+    ]
     return Prepared(
         runs=tuple(runs[: len(variants)]),
         output=output,

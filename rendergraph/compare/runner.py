@@ -17,7 +17,6 @@ from rendergraph.compare.tasks import (
     ReferenceResult,
     ReferenceTask,
     RenderedResult,
-    RunSpec,
     TaskError,
     TimingResult,
     VariantTask,
@@ -58,7 +57,7 @@ class Runner:
             self._distribute(farm, self.reference)
         elif self.prepared.other is not None or 0 in self.results:
             kind: Literal["variant", "pipeline"] = "variant" if self.prepared.other is None else "pipeline"
-            base = RunSpec.of(self.prepared.base, -1)
+            base = self.prepared.base.for_task()
             farm.submit(ReferenceTask(base.name, base, kind, self.prepared.encoding, self.options.frame))
         elif self._waiting:
             first = self._waiting.pop(0)
@@ -103,8 +102,7 @@ class Runner:
         return min(self._outputs, total), total
 
     def _submit(self, farm: Executor, numbers: Sequence[int]) -> None:
-        base = RunSpec.of(self.prepared.base, -1 if self.prepared.other else 0)
-        farm.submit(ComparisonTask(**self._work(numbers), base=base))
+        farm.submit(ComparisonTask(**self._work(numbers), base=self.prepared.base.for_task()))
 
     def _work(self, numbers: Sequence[int]) -> dict[str, Any]:
         """Return what every task of runs has."""
@@ -113,7 +111,7 @@ class Runner:
         return {
             "name": f"{first} and {len(numbers) - 1} more" if len(numbers) > 1 else first,
             "needs": (self._handle,) if self._handle else (),
-            "runs": tuple(RunSpec.of(runs[n], n, is_rendered=n in self.results) for n in numbers),
+            "runs": tuple(runs[n].for_task(is_rendered=n in self.results) for n in numbers),
             "encoding": self.prepared.encoding,
             **{name: getattr(options, name) for name in ("frame", "frames", "repeats", "most_bytes")},
         }
@@ -129,7 +127,7 @@ class Runner:
     def _take(self, farm: Executor, output: Any, worker: str) -> None:
         """Store an output of a task; a task that was begun again yields some of them twice."""
         if isinstance(output, ReferenceResult):
-            self.device = output.device
+            self.device = output.origin["device"]
             if self.reference is None:
                 self._distribute(farm, output.reference)
             return
@@ -143,7 +141,7 @@ class Runner:
 
     def _rendered(self, output: RenderedResult) -> None:
         run = self.prepared.runs[output.number]
-        self.device = output.device
+        self.device = output.origin["device"]
         self.results[output.number] = Result.of(run.name, run.planned, settings=run.settings, **output.measured)
 
     def _timed(self, output: TimingResult, worker: str) -> None:
@@ -216,7 +214,7 @@ class SweepRunner(Runner):
         super()._rendered(output)
         number = output.number
         self.records[number] = self.folder.keep(
-            self.prepared.runs[number], self.results[number], output.picture, output.device, output.machine
+            self.prepared.runs[number], self.results[number], output.picture, output.origin
         )
 
     def _timed(self, output: TimingResult, worker: str) -> None:
@@ -227,7 +225,7 @@ class SweepRunner(Runner):
         run, record = self.prepared.runs[number], self.records[number]
         beaten = self._beaten()
         record = record.without_picture() if number in beaten else record
-        self.records[number] = record.timed(output.times, output.device, output.machine)
+        self.records[number] = record.timed(output.times, output.origin)
         self.folder.write(run, self.records[number])
         self._drop_pictures(beaten)
         self.alone += self.results[number].pass_count

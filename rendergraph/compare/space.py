@@ -13,7 +13,7 @@ import math
 import random
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -93,6 +93,12 @@ class Axis:
     span: Span | None = None
     written: str = field(default="", compare=False)
 
+    def __post_init__(self) -> None:
+        if self.span is None and not self.values:
+            raise ValueError(f"axis '{self.path}' has no values; write {self.path}=VALUE,VALUE,…")
+        for value in repeated(self.values):
+            raise ValueError(f"axis '{self.path}' has the value {value} twice")
+
     @property
     def text(self) -> str:
         """The values as `-x` takes them."""
@@ -135,10 +141,15 @@ class Space:
         """
         if isinstance(axes, Space):
             return axes
-        if isinstance(axes, str):
-            axes = [axes]
-        given = [_from_python(path, values) for path, values in axes.items()] if isinstance(axes, Mapping) else axes
-        return cls(tuple(map(_axis, given)), tuple(map(tuple, zipped)), **sampling)
+        try:
+            if isinstance(axes, Mapping):
+                made = [_from_python(path, values) for path, values in axes.items()]
+            else:
+                given = [axes] if isinstance(axes, str) else axes
+                made = [axis if isinstance(axis, Axis) else parse_axis(axis) for axis in given]
+        except ValueError as error:
+            raise InputError(Problem("RG524", str(error))) from None
+        return cls(tuple(made), tuple(map(tuple, zipped)), **sampling)
 
     @property
     def groups(self) -> list[tuple[Axis, ...]]:
@@ -176,19 +187,44 @@ class Space:
 
     def check(self, *, spans: bool = False) -> None:
         """Check the axes as a whole; `spans` allows continuous ranges without samples, as for an optimiser."""
-        problems = [Problem("RG524", text) for text in _axis_mistakes(self.axes)]
-        problems += _zip_problems(self.axes, self.zipped)
-        if self.samples is None and not spans and self.chosen is None:
-            for axis in self.axes:
-                if axis.span is not None:
-                    step = f"{axis.span.text}:{'COUNT' if axis.span.log else 'STEP'}"
-                    text = f"axis '{axis.path}' is a continuous range; add a step ({step}) or use --samples"
-                    problems.append(Problem("RG524", text, Place(Option("-x", f"{axis.path}={axis.text}"))))
+        allows_spans = spans or self.samples is not None or self.chosen is not None
+        problems = [
+            Problem("RG524", text, Place(option) if option else None)
+            for text, option in (*self._zip_mistakes(), *self._axis_mistakes(allows_spans))
+        ]
         if not problems and (count := self.count()) > MOST_RUNS:
             ways = "use fewer values, split the sweep, or use --samples"
             problems.append(Problem("RG524", f"the axes make {count} runs, more than {MOST_RUNS}; {ways}"))
         if problems:
             raise InputError(problems)
+
+    def _axis_mistakes(self, allows_spans: bool) -> Iterator[tuple[str, Option | None]]:
+        if not self.axes:
+            yield "the sweep has no axis; add one: -x NODE.PARAM=VALUE,VALUE", None
+        for path in repeated(axis.path for axis in self.axes):
+            yield f"two axes have the path '{path}'; put all values into one", None
+        for axis in self.axes:
+            if axis.span is not None and not allows_spans:
+                step = f"{axis.span.text}:{'COUNT' if axis.span.log else 'STEP'}"
+                text = f"axis '{axis.path}' is a continuous range; add a step ({step}) or use --samples"
+                yield text, Option("-x", f"{axis.path}={axis.text}")
+
+    def _zip_mistakes(self) -> Iterator[tuple[str, Option]]:
+        by_path = {axis.path: axis for axis in self.axes}
+        for group in self.zipped:
+            option = Option("--zip", ",".join(group))
+            if missing := [path for path in group if path not in by_path]:
+                yield f"unknown axis '{missing[0]}'{suggestion(missing[0], by_path)}", option
+                continue
+            if len(group) < 2:
+                yield "expected two axes or more", option
+            counts = [len(by_path[path].values) or "a continuous range" for path in group]
+            if len(set(counts)) > 1:
+                has = ", ".join(f"'{path}' has {count}" for path, count in zip(group, counts, strict=True))
+                yield f"zipped axes need the same number of values: {has}", option
+        for path in repeated(path for group in self.zipped for path in group):
+            group = next(group for group in self.zipped if path in group)
+            yield f"axis '{path}' is zipped more than once", Option("--zip", ",".join(group))
 
 
 Axes: TypeAlias = "Space | str | Sequence[Axis | str] | Mapping[str, Any]"
@@ -208,9 +244,7 @@ def parse_axis(text: str) -> Axis:
 
 def axis_of(path: str, text: str) -> Axis:
     """Return the axis of a path from its values and ranges, separated by commas; a ValueError describes a mistake."""
-    if not text.strip():
-        raise ValueError(f"axis '{path}' has no values; write {path}=VALUE,VALUE,…")
-    parts = [part.strip() for part in _split(text)]
+    parts = [part.strip() for part in _split(text)] if text.strip() else []
     if "" in parts:
         raise ValueError(f"axis '{path}' has an empty value in '{text}'")
     values: list[str] = []
@@ -224,8 +258,6 @@ def axis_of(path: str, text: str) -> Axis:
             values += (part,) if parsed is None else parsed
     except ValueError as error:
         raise ValueError(f"axis '{path}': {error}") from None
-    for value in repeated(values):
-        raise ValueError(f"axis '{path}' has the value {value} twice")
     return Axis(path, tuple(values), None, text.strip() if len(values) > len(parts) else "")
 
 
@@ -325,51 +357,12 @@ def repeated(values: Iterable[str]) -> list[str]:
     return [value for value, count in Counter(values).items() if count > 1]
 
 
-def _axis(given: Axis | str) -> Axis:
-    if isinstance(given, Axis):
-        return given
-    try:
-        return parse_axis(given)
-    except ValueError as error:
-        raise InputError(Problem("RG524", str(error))) from None
-
-
-def _from_python(path: str, values: Iterable[Any] | str) -> Axis | str:
+def _from_python(path: str, values: Iterable[Any] | str) -> Axis:
     if isinstance(values, str):
-        return f"{path}={values}"
+        return axis_of(path, values)
     if not isinstance(values, Iterable):
         values = [values]
     return Axis(path, tuple(value if isinstance(value, str) else json.dumps(value) for value in values))
-
-
-def _axis_mistakes(axes: Sequence[Axis]) -> Iterable[str]:
-    if not axes:
-        yield "the sweep has no axis; add one: -x NODE.PARAM=VALUE,VALUE"
-    for path in repeated(axis.path for axis in axes):
-        yield f"two axes have the path '{path}'; put all values into one"
-    for axis in axes:
-        if axis.span is None and not axis.values:
-            yield f"axis '{axis.path}' has no values"
-        for value in repeated(axis.values):
-            yield f"axis '{axis.path}' has the value {value} twice"
-
-
-def _zip_problems(axes: Sequence[Axis], zipped: Sequence[Sequence[str]]) -> list[Problem]:
-    by_path = {axis.path: axis for axis in axes}
-    mistakes: list[tuple[Sequence[str], str]] = []
-    for group in zipped:
-        if missing := [path for path in group if path not in by_path]:
-            mistakes.append((group, f"unknown axis '{missing[0]}'{suggestion(missing[0], by_path)}"))
-            continue
-        if len(group) < 2:
-            mistakes.append((group, "expected two axes or more"))
-        counts = [len(by_path[path].values) or "a continuous range" for path in group]
-        if len(set(counts)) > 1:
-            has = ", ".join(f"'{path}' has {count}" for path, count in zip(group, counts, strict=True))
-            mistakes.append((group, f"zipped axes need the same number of values: {has}"))
-    for path in repeated(path for group in zipped for path in group):
-        mistakes.append((next(group for group in zipped if path in group), f"axis '{path}' is zipped more than once"))
-    return [Problem("RG524", text, Place(Option("--zip", ",".join(group)))) for group, text in mistakes]
 
 
 # --- runs ------------------------------------------------------------------------------------------------------------

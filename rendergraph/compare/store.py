@@ -83,9 +83,8 @@ class RunRecord(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             return NO_TIMES
         return Times(self.frames, self.frame_ms, self.gpu_ms, self.cpu_ms, self.passes, self.repeats)
 
-    def timed(self, times: Times, device: Mapping[str, object], machine: Mapping[str, str]) -> RunRecord:
-        fields = {name: getattr(times, name) for name in times.__struct_fields__}
-        return structs.replace(self, **fields, device=dict(device), machine=dict(machine))
+    def timed(self, times: Times, origin: Mapping[str, Any]) -> RunRecord:
+        return structs.replace(self, **structs.asdict(times), **origin)
 
     def without_picture(self) -> RunRecord:
         return structs.replace(self, picture=None, picture_sha256=None)
@@ -245,9 +244,7 @@ class SweepFolder:
         """Write what is studied here; to be called before the first picture is written."""
         _write_json(self.path / STUDY, study)
 
-    def keep(
-        self, run: Run, result: Result, picture: bytes, device: Mapping[str, object], machine: Mapping[str, str]
-    ) -> RunRecord:
+    def keep(self, run: Run, result: Result, picture: bytes, origin: Mapping[str, Any]) -> RunRecord:
         """Write a run's picture and its `run.json`, still without times, and return the record."""
         make_folder(run.folder)
         write_file(run.picture, picture)
@@ -258,8 +255,7 @@ class SweepFolder:
             "picture": f"{run.folder.name}/{run.picture.name}",
             "picture_sha256": hashlib.sha256(picture).hexdigest(),
             "size": run.planned.linked.graph.size,
-            "device": device,
-            "machine": machine,
+            **origin,
         }
         record = msgspec.convert(jsonable(document), RunRecord)
         _describe(run, record)

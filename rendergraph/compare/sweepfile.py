@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 
 from msgspec import Struct
 
-from rendergraph.compare.space import MOST_RUNS, RANGE, Axis, Sampling, Space, axis_of, repeated
+from rendergraph.compare.space import MOST_RUNS, RANGE, Axis, Sampling, Space, axis_of
 from rendergraph.document import Value, load
 from rendergraph.errors import InputError, Problem
 from rendergraph.keys import Codes, Key, MapOf, Table, Validator, plain
@@ -138,7 +138,7 @@ def read_sweep(path: Path) -> SweepFile:
     sampled = {key: values[key] for key in ("samples", "sampling", "seed") if key in values}
     return SweepFile(
         pipeline=values["pipeline"],
-        space=Space(tuple(axes), tuple(map(tuple, values.get("zip", ()))), **sampled),
+        space=Space(tuple(filter(None, axes)), tuple(map(tuple, values.get("zip", ()))), **sampled),
         options=options,
         reference=values.get("reference"),
         scene=values.get("scene"),
@@ -158,16 +158,14 @@ def value_text(value: Value) -> str:
     return plain if isinstance(plain, str) else json.dumps(plain)
 
 
-def _axis(path: str, given: Value, validator: Validator) -> Axis:
-    if isinstance(given.data, str):
-        try:
+def _axis(path: str, given: Value, validator: Validator) -> Axis | None:
+    try:
+        if isinstance(given.data, str):
             return axis_of(path, given.data)
-        except ValueError as error:
-            validator.report(given, _CODES.wrong, str(error))
-    values = [value_text(value) for value in _items(given)]
-    for value in repeated(values):
-        validator.report(given, _CODES.wrong, f"axis '{path}' has the value {value} twice")
-    return Axis(path, tuple(values))
+        return Axis(path, tuple(map(value_text, _items(given))))
+    except ValueError as error:
+        validator.report(given, _CODES.wrong, str(error))
+    return None
 
 
 def _items(value: Value | None) -> Sequence[Value]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from rendergraph.compare.batches import Batch, fitting_batches, measure_batch, node_types, render_batch
 from rendergraph.compare.divergence import every_output, first_difference
-from rendergraph.compare.fingerprint import worker_digest
 from rendergraph.compare.prepare import Run
 from rendergraph.compare.results import (
     Pixels,
@@ -23,78 +21,22 @@ from rendergraph.compare.timing import Times, times_of
 from rendergraph.diff import diff
 from rendergraph.errors import InputError, Problem, RenderError
 from rendergraph.farm import Handle, Task, Worker
-from rendergraph.farm.bundle import map_remote_paths, relocate_selection
+from rendergraph.farm.bundle import map_remote_paths
 from rendergraph.farm.tasks import is_retryable
 from rendergraph.metrics import Encoding
 from rendergraph.session import stages
 from rendergraph.session.frame import figures_of
-from rendergraph.session.pipeline import Pipeline
 
 if TYPE_CHECKING:
-    from rendergraph.catalog import Catalog
     from rendergraph.execute import FrameTimes
     from rendergraph.link import Graph
     from rendergraph.session.gpu import Gpu
-    from rendergraph.session.selection import Selection
     from rendergraph.session.values import Planned
 
+Origin: TypeAlias = Mapping[str, Mapping[str, Any]]
+"""The GL device and the machine of a worker: `device`, `machine`."""
 FRAMES_PER_TURN = 2
 """Few, so that other work of the machine affects all variants alike."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunSpec:
-    """A run as a worker needs it.
-
-    Attributes:
-        digest: of what the picture depends on, as it was when the work began.
-        extension: of the picture's file.
-        metadata: of the picture.
-        is_rendered: its picture exists already; only times are needed.
-        planned: the pipeline, where the worker is the process that planned it.
-    """
-
-    number: int
-    name: str
-    selection: Selection
-    digest: str
-    output: str
-    extension: str
-    metadata: Mapping[str, str]
-    is_rendered: bool
-    planned: Planned | None = field(default=None, repr=False)
-
-    @classmethod
-    def of(cls, run: Run, number: int, *, is_rendered: bool = False) -> RunSpec:
-        return cls(
-            number=number,
-            name=run.name,
-            selection=run.planned.linked.selection,
-            digest=worker_digest(run.planned),
-            output=run.output,
-            extension=run.picture.suffix,
-            metadata=run.metadata,
-            is_rendered=is_rendered,
-            planned=run.planned,
-        )
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "planned": None}
-
-    def plan(self, worker: Worker, catalog: Catalog | None = None) -> Planned:
-        """Return the planned pipeline; the catalog of another run saves the time to make one.
-
-        Raises:
-            InputError: it is not what it was when the work began.
-        """
-        if self.planned is not None:
-            return self.planned
-        pipeline = Pipeline(relocate_selection(self.selection, worker.root), catalog)
-        planned = stages.plan(stages.expand(pipeline.link()))
-        if worker_digest(planned) != self.digest:
-            text = f"input files of '{self.name}' differ on worker '{worker.name}' from those when the work began"
-            raise InputError(Problem("RG642", f"{text}: a file has changed, or another version is installed there"))
-        return planned
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +44,7 @@ class ReferenceResult:
     """The reference has been rendered."""
 
     reference: Reference
-    device: Mapping[str, object]
+    origin: Origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +54,7 @@ class RenderedResult:
     number: int
     measured: Mapping[str, Any]
     picture: bytes
-    device: Mapping[str, object]
-    machine: Mapping[str, str]
+    origin: Origin
     warnings: tuple[Problem, ...] = ()
 
 
@@ -123,8 +64,7 @@ class TimingResult:
 
     number: int
     times: Times
-    device: Mapping[str, object]
-    machine: Mapping[str, str]
+    origin: Origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +94,7 @@ class VariantTask(Task):
 
     name: str
     needs: tuple[Handle, ...]
-    runs: tuple[RunSpec, ...]
+    runs: tuple[Run, ...]
     encoding: Encoding
     frame: int
     frames: int
@@ -167,7 +107,7 @@ class VariantTask(Task):
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
         """Yield each run's picture, then its times, batch after batch; a faulty run ends only itself."""
-        runs: list[tuple[RunSpec, Planned]] = []
+        runs: list[tuple[Run, Planned]] = []
         for run in self.runs:
             try:
                 runs.append((run, run.plan(worker, runs[-1][1].linked.catalog if runs else None)))
@@ -199,23 +139,21 @@ class VariantTask(Task):
                     yield TaskError(runs[first][0].number, _mapped(error, worker))
 
     def _batch(
-        self, worker: Worker, batch: Batch, runs: Sequence[tuple[RunSpec, Planned]], reference: Reference | None
+        self, worker: Worker, batch: Batch, runs: Sequence[tuple[Run, Planned]], reference: Reference | None
     ) -> Iterator[TaskEvent]:
         planned = [each for _, each in runs]
         unrendered = [place for place in batch.numbers if not runs[place][0].is_rendered]
-        if unrendered:
-            for rendered in list(render_batch(worker.gpu, planned, batch, self.frame)):
-                if rendered.number not in unrendered:
-                    continue
-                run, own = runs[rendered.number]
-                if reference is None:
-                    reference = _reference(run, rendered.arrays, self.encoding)
-                    yield ReferenceResult(reference, rendered.device)
-                yield _rendered(run, own, rendered.arrays, reference, rendered.device, worker, encode=True)
-        device = worker.gpu.device.as_json()
+        for place, arrays in list(render_batch(worker.gpu, batch, self.frame)) if unrendered else ():
+            if place not in unrendered:
+                continue
+            run, own = runs[place]
+            if reference is None:
+                reference = _reference(run, arrays, self.encoding)
+                yield ReferenceResult(reference, _origin(worker))
+            yield _rendered(run, own, arrays, reference, worker, encode=True)
         warm = bool(unrendered)
         for place, times in measure_batch(worker.gpu, planned, batch, self.frames, self.repeats, warm=warm):
-            yield TimingResult(runs[place][0].number, times, device, _machine(worker))
+            yield TimingResult(runs[place][0].number, times, _origin(worker))
         yield PassCount(batch.pass_count)
 
 
@@ -223,25 +161,23 @@ class VariantTask(Task):
 class ComparisonTask(VariantTask):
     """Runs of any structure, each rendered by itself; they take turns in measuring, and are compared with a base."""
 
-    base: RunSpec
+    base: Run
 
     def run(self, worker: Worker) -> Iterator[TaskEvent]:
         """Yield the pictures of all runs with their first differences, then their times."""
-        gpu = worker.gpu
         planned = [run.plan(worker) for run in self.runs]
         reference = self.reference(worker)
         for run, each in zip(self.runs, planned, strict=True):
-            frame = stages.draw_last(each.for_frames(range(1, self.frame + 1)), gpu)
+            frame = stages.draw_last(each.for_frames(range(1, self.frame + 1)), worker.gpu)
             if reference is None:
                 reference = _reference(run, frame.arrays, self.encoding)
-                yield ReferenceResult(reference, frame.device)
-            rendered = _rendered(run, each, frame.arrays, reference, frame.device, worker, warnings=frame.warnings)
+                yield ReferenceResult(reference, _origin(worker))
+            rendered = _rendered(run, each, frame.arrays, reference, worker, warnings=frame.warnings)
             yield replace(rendered, measured={**rendered.measured, **self._difference(run, each, worker)})
-        for run, each, times in zip(self.runs, planned, _take_turns(gpu, planned, self.frames), strict=True):
-            device = gpu.device.as_json()
-            yield TimingResult(run.number, times_of(times, node_types(each)), device, _machine(worker))
+        for run, each, times in zip(self.runs, planned, _take_turns(worker.gpu, planned, self.frames), strict=True):
+            yield TimingResult(run.number, times_of(times, node_types(each)), _origin(worker))
 
-    def _difference(self, run: RunSpec, planned: Planned, worker: Worker) -> dict[str, Any]:
+    def _difference(self, run: Run, planned: Planned, worker: Worker) -> dict[str, Any]:
         graph, key = planned.linked.graph, ("outputs", self.base.digest, self.frame)
         if run.number == self.base.number:
             return {"difference": diff(graph, graph)}
@@ -260,19 +196,19 @@ class ReferenceTask(Task):
     """The reference, where it is not one of the runs that are rendered."""
 
     name: str
-    spec: RunSpec
+    base: Run
     kind: Literal["variant", "pipeline"]
     encoding: Encoding
     frame: int
 
     def run(self, worker: Worker) -> Iterator[ReferenceResult]:
-        planned = self.spec.plan(worker)
+        planned = self.base.plan(worker)
         frame = stages.draw_last(planned.for_frames(range(1, self.frame + 1)), worker.gpu)
-        yield ReferenceResult(_reference(self.spec, frame.arrays, self.encoding, self.kind), frame.device)
+        yield ReferenceResult(_reference(self.base, frame.arrays, self.encoding, self.kind), _origin(worker))
 
 
 def _reference(
-    run: RunSpec,
+    run: Run,
     arrays: Mapping[str, Pixels],
     encoding: Encoding,
     kind: Literal["variant", "pipeline"] = "variant",
@@ -281,11 +217,10 @@ def _reference(
 
 
 def _rendered(
-    run: RunSpec,
+    run: Run,
     planned: Planned,
     arrays: Mapping[str, Pixels],
     reference: Reference,
-    device: Mapping[str, object],
     worker: Worker,
     *,
     encode: bool = False,
@@ -303,16 +238,16 @@ def _rendered(
         "figures": figures_of(arrays),
     }
     picture = _encoded(run, graph, pixels) if encode else b""
-    return RenderedResult(run.number, measured, picture, device, _machine(worker), warnings)
+    return RenderedResult(run.number, measured, picture, _origin(worker), warnings)
 
 
-def _encoded(run: RunSpec, graph: Graph, pixels: Pixels) -> bytes:
+def _encoded(run: Run, graph: Graph, pixels: Pixels) -> bytes:
     """Return the file of a run's picture."""
     from rendergraph.images import PictureInfo, Saved, encoded  # a sweep is checked without OpenImageIO
 
     info = graph.textures[graph.outputs[run.output]]
     picture = PictureInfo(info.semantic.name, info.desc.format if info.desc else "", info.semantic.encoding)
-    return encoded(Saved(Path(f"{run.output}{run.extension}"), pixels, picture, raw=False), run.metadata)
+    return encoded(Saved(run.picture, pixels, picture, raw=False), run.metadata)
 
 
 def _take_turns(gpu: Gpu, planned: Sequence[Planned], frames: int) -> list[list[FrameTimes]]:
@@ -326,11 +261,11 @@ def _take_turns(gpu: Gpu, planned: Sequence[Planned], frames: int) -> list[list[
     return times
 
 
-def _machine(worker: Worker) -> dict[str, str]:
-    if "machine" not in worker.cache:
-        worker.cache["machine"] = machine()
-    described: dict[str, str] = worker.cache["machine"]
-    return described
+def _origin(worker: Worker) -> Origin:
+    if "origin" not in worker.cache:
+        worker.cache["origin"] = {"device": worker.gpu.device.as_json(), "machine": machine()}
+    origin: Origin = worker.cache["origin"]
+    return origin
 
 
 def _mapped(error: InputError | RenderError, worker: Worker) -> InputError | RenderError:

@@ -211,6 +211,7 @@ def test_a_full_disk_keeps_what_is_there(base: rg.Pipeline, gl: rg.Session, tmp_
         cwd=tmp_path,
         capture_output=True,
         text=True,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},  # a module's bytecode may be longer than that
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (9000, resource.RLIM_INFINITY)),
     )
     assert ended.returncode == 1, ended.stderr

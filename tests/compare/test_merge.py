@@ -47,8 +47,8 @@ def pictures(
     drawn: dict[int, Any] = {}
     planned = [variant.check() for variant in variants]
     for batch in batches(planned, range(len(variants)), most_bytes):
-        for each in render_batch(session, planned, batch, frame):
-            drawn[each.number] = each.arrays["radiance"]
+        for number, arrays in render_batch(session, batch, frame):
+            drawn[number] = arrays["radiance"]
     return [drawn[number] for number in range(len(variants))]
 
 
@@ -79,10 +79,10 @@ def test_random_variants_draw_each_distinct_pass_once_and_the_same_pictures(
 def test_ids_do_not_matter(make: Any) -> None:
     a = make({"p": {"type": "pattern"}, "q": {"type": "mix", "inputs": {"a": "p.color"}}}, "q.color")
     b = make({"x": {"type": "pattern"}, "y": {"type": "mix", "inputs": {"a": "x.color"}}}, "y.color")
-    merged = merge([a.link().graph, b.link().graph])
-    assert [node.id for node in merged.graph.nodes] == ["p", "q"]
-    assert merged.names == ({"p": "p", "q": "q"}, {"x": "p", "y": "q"})
-    assert {str(end) for end in merged.graph.outputs.values()} == {"q.color"}
+    graph, names = merge([a.link().graph, b.link().graph])
+    assert [node.id for node in graph.nodes] == ["p", "q"]
+    assert names == ({"p": "p", "q": "q"}, {"x": "p", "y": "q"})
+    assert {str(end) for end in graph.outputs.values()} == {"q.color"}
 
 
 def test_a_texture_that_two_continue_is_made_for_each(make: Any, gl: rg.Session) -> None:
@@ -98,8 +98,8 @@ def test_a_texture_that_two_continue_is_made_for_each(make: Any, gl: rg.Session)
         return found
 
     variants = [make(nodes(amount), "late.color") for amount in (0.25, 0.5, None, 0.25)]
-    merged = merge([variant.link().graph for variant in variants])
-    assert sum(node.type.name == "pattern" for node in merged.graph.nodes) == 3
+    graph, _ = merge([variant.link().graph for variant in variants])
+    assert sum(node.type.name == "pattern" for node in graph.nodes) == 3
     for together, own in zip(pictures(gl, variants), alone(gl, variants), strict=True):
         np.testing.assert_array_equal(together, own)
 
@@ -176,7 +176,7 @@ def test_every_shipped_pipeline_is_drawn_as_alone(gl: rg.Session, name: str) -> 
     variants = [base, *(base.set("display.exposure", 0.5) for _ in range("display" in ends))]
     planned = [variant.check() for variant in variants]
     (batch,) = batches(planned, range(len(variants)))
-    drawn = [each.arrays for each in render_batch(gl, planned, batch, 2)]
+    drawn = [arrays for _, arrays in render_batch(gl, batch, 2)]
     assert batch.pass_count <= len(passes(base.plan())) + 1
     for arrays, variant in zip(drawn, variants, strict=True):
         for output, pixels in gl.render(variant, frames=range(1, 3)).items():
