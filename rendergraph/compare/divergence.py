@@ -47,11 +47,7 @@ def first_difference(
     """Return the first pass of the variant that has a counterpart in the base and another output, bit by bit.
 
     A pass that only one of the two has is not a difference by itself: the passes that read it show whether it matters.
-
-    Args:
-        base, variant: frames from `every_output`.
-        plan, graph: of the variant.
-        difference: between the two graphs.
+    The frames are from `every_output`; plan and graph are the variant's.
     """
     counterparts = {new: old for old, new in difference.nodes.items()}
     for node in passes(plan):

@@ -39,9 +39,7 @@ class Sweep:
 
     Attributes:
         comparison: every run as a variant, in the order of the product.
-        space: the axes.
-        executed: passes that were executed this time.
-        alone: passes that those runs would have executed one by one.
+        executed, alone: passes that were executed this time, and that those runs would have executed one by one.
         resumed: runs that were complete already.
         timed: runs that were rendered already, and were measured.
         redrawn: runs that were stored, and rendered again because files have changed since.

@@ -23,7 +23,6 @@ class Listing:
 
     @property
     def executed(self) -> int:
-        """Number of passes that would be executed."""
         return sum(group.pass_count for group in self.groups)
 
     def shared(self) -> dict[str, tuple[int, int]]:
@@ -38,11 +37,9 @@ class Listing:
         return {name: (len(different), alone[name]) for name, different in shared.items()}
 
     def group_of(self) -> dict[int, int]:
-        """Return the number of each run to that of its group, from 1."""
         return {number: at for at, group in enumerate(self.groups, 1) for number in group.numbers}
 
     def as_json(self) -> dict[str, Any]:
-        """Return the document of `sweep --list --json`."""
         group_of, shared = self.group_of(), self.shared()
         return {
             "runs": [
@@ -77,11 +74,7 @@ class Listing:
 def list_sweep(
     prepared: Prepared, out: Path | None = None, options: SweepOptions = SweepOptions(), **settings: Any
 ) -> Listing:
-    """Return what `sweep` would render into a folder; without one, no run is complete.
-
-    Raises:
-        InputError: the folder has results already, or those of another study.
-    """
+    """Return what `sweep` would render into a folder; without one, no run is complete."""
     options = options.replace(**settings)
     numbers = range(len(prepared.runs))
     kept: frozenset[int] = frozenset()

@@ -130,10 +130,8 @@ def search(
 ) -> Sweep:
     """Search for the settings that minimise one or several objectives.
 
-    Args:
-        base, axes, out, reference, options, settings: as for `sweep`; continuous ranges need no samples. `minimise` has
-            the objectives, `budget` the maximum number of runs; with `resume` the search continues, also with a larger
-            budget.
+    The arguments are those of `sweep`; continuous ranges need no samples. `minimise` has the objectives, `budget` the
+    maximum number of runs; with `resume` the search continues, also with a larger budget.
 
     Raises:
         InputError: as from `sweep`; or there is no reference, or an unknown objective.

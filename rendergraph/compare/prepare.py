@@ -144,7 +144,6 @@ class Run:
 
     @property
     def picture(self) -> Path:
-        """The picture's file; light keeps its values."""
         return self.folder / (f"{self.output}.png" if self.output == "image" else f"{self.output}.exr")
 
     def for_task(self, *, is_rendered: bool = False) -> Run:
@@ -173,13 +172,10 @@ class Prepared:
     """A comparison of which nothing is rendered yet; everything that can be checked without GL has been checked.
 
     Attributes:
-        runs: in order.
         output, encoding: what is compared.
-        picture: the reference, where it is a file.
-        other: the reference, where it is a pipeline of its own.
+        picture, other: the reference, where it is a file, or a pipeline of its own.
         notes: changes that made the pipelines comparable.
-        space: the axes of a sweep.
-        study: what identifies the folder of a sweep.
+        space, study: the axes of a sweep, and what identifies its folder.
     """
 
     runs: tuple[Run, ...]
@@ -198,7 +194,6 @@ class Prepared:
 
     @property
     def modules(self) -> set[str]:
-        """The modules of the node classes in use."""
         runs = [*self.runs, *([self.other] if self.other else [])]
         return {type(node.node).__module__ for run in runs for node in run.planned.linked.graph.nodes}
 
@@ -364,5 +359,4 @@ def compared_output(graphs: Sequence[Graph], encoding: Encoding | None, *, measu
 
 
 def scene_name(linked: Linked) -> str:
-    """Return the name of the scene's file, or else of the scene."""
     return linked.spec.scene.stem if linked.spec.scene else linked.scene.name

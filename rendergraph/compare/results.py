@@ -35,14 +35,10 @@ K = TypeVar("K", bound=Hashable)
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The picture that variants are measured against.
+    """The picture, top row first, that variants are measured against: that of a variant, a pipeline or a file.
 
     Attributes:
-        name: of a variant, a pipeline or a file.
-        kind: which of the three.
-        pixels: top row first.
-        encoding: of the pixels.
-        output: the compared output.
+        output: the name of the compared output.
         light: its scene-linear light, if any.
     """
 
@@ -65,15 +61,13 @@ class Difference:
     """The first pass, in order of execution, whose output differs.
 
     Attributes:
-        node: the pass in the variant.
-        base_node: its counterpart in the base; another name if it was renamed.
+        node, base_node: the pass in the variant, and in the base, where it may have another name.
         port: the first output that differs.
         most: greatest difference of a channel, None where sizes or formats differ.
         share: fraction of the texels that differ, 0…1.
         causes: nodes on the way there that differ in structure, possibly the pass itself.
         added: the causes that the base does not have.
         pixels: the output in the base and in the variant.
-        semantic: of the output.
     """
 
     node: str
@@ -97,7 +91,6 @@ class Difference:
 
     @property
     def amount(self) -> str:
-        """How much differs, in words."""
         if self.most is None:
             return "in size"
         return f"in {100 * self.share:.3g} % of its texels, by up to {self.most:.4g}"
@@ -115,14 +108,9 @@ class Result:
         name: unique among the variants.
         source: the pipeline as it was typed.
         settings: path to value, as a sweep set them.
-        pixels, encoding: the compared output; no pixels where the picture was not kept.
-        metrics: against the reference.
+        pixels: the compared output; None where the picture was not kept, likewise `flip_map`, (height, width), 0…1.
         radiance_rmse: of linear light against the reference's; None where one of them has none.
-        flip_map: (height, width), 0…1; None where it was not kept.
-        times: of rendering.
-        graph, plan: None for pictures that were read from files.
-        memory: the plan's figures; empty for pictures that were read from files.
-        pass_count: number of passes.
+        graph, plan, memory: None and empty for pictures that were read from files.
         difference: of the graph to the base's.
         first: the first pass whose output differs from the base's.
         not_finite: number of pixels with NaN or infinity; if any, the result is excluded from the Pareto front.
@@ -166,7 +154,6 @@ class Result:
 
     @property
     def allocated_bytes(self) -> int:
-        """Memory of textures."""
         return int(str(self.memory["allocated_bytes"]))
 
     @property
@@ -189,7 +176,6 @@ class Result:
         return (Problem("RG619", f"{text}; {way}", Place(self.name), severity="warning"),)
 
     def as_json(self) -> dict[str, Any]:
-        """Return everything but the pictures."""
         document: dict[str, Any] = {"name": self.name, "pipeline" if self.memory else "picture": self.source}
         if self.settings:
             document["settings"] = typed_settings(self.settings)
@@ -212,12 +198,8 @@ class Comparison:
     """Variants against a reference, with one scene, at one size, on one machine.
 
     Attributes:
-        results: in the order of the variants.
-        reference: the picture that they are measured against.
         base: name and graph of what the variants' graphs are compared with.
-        scene: the scene's name.
-        camera: the camera's name, where one was chosen.
-        size: width and height.
+        camera: its name, where one was chosen.
         frame: number of the compared frame.
         device: the GL device, as in `run --json`.
         metric: the port that was measured instead of the picture.
@@ -299,11 +281,7 @@ def typed_settings(settings: Mapping[str, str]) -> dict[str, Any]:
 def measure_against(
     pixels: Pixels, reference: Reference | None, name: str, plugins: Sequence[Added[Metric]]
 ) -> tuple[Metrics, Pixels | None]:
-    """Return a picture's metrics and FLIP map; without a reference, or against itself, there is no map.
-
-    Raises:
-        InputError: the sizes differ, or a plugin's metric fails.
-    """
+    """Return a picture's metrics and FLIP map; without a reference, or against itself, there is no map."""
     if reference is None or reference.pixels is pixels:
         return metrics.same(pixels, plugins), None
     names = (name, reference.name)
@@ -318,7 +296,6 @@ def light_error(light: Pixels | None, reference: Pixels | None) -> float | None:
 
 
 def not_finite_pixels(graph: Graph, arrays: Mapping[str, Pixels]) -> int:
-    """Return how many pixels of a graph's outputs hold NaN or infinity."""
     return sum(not_finite(pixels, graph.textures[graph.outputs[name]].semantic.name) for name, pixels in arrays.items())
 
 
@@ -367,11 +344,9 @@ def pareto(results: Sequence[Result]) -> list[Result]:
 
 @dataclass(frozen=True)
 class Search:
-    """What an optimiser was asked for, and what it found.
+    """The objectives of an optimiser, its budget, and what it found.
 
     Attributes:
-        minimise: the objectives.
-        budget: maximum number of runs.
         order: names of the runs in the order in which the optimiser asked for them; None for a failed one.
         values: name to values of the objectives.
         front: names of the runs on the Pareto front.
@@ -401,7 +376,6 @@ class Search:
 
 
 def machine() -> dict[str, str]:
-    """Describe the computer and the versions of the software."""
     names = ("rendergraph", "moderngl", "numpy", "OpenImageIO")
     return {
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",

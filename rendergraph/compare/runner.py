@@ -28,11 +28,7 @@ from rendergraph.farm import Executor, Handle, TaskFailed, TaskFinished, TaskOut
 class Runner:
     """Compares the runs of a comparison, in memory; a run that fails ends it.
 
-    Attributes:
-        results: by the run's number; a result may lack times.
-        reference: what runs are measured against, once it is known.
-        device: the GL device that rendered last.
-        warnings: about frames.
+    Results are by the run's number; a result may lack times. The reference may be one of the results.
     """
 
     def __init__(self, prepared: Prepared, options: SweepOptions) -> None:
@@ -73,7 +69,6 @@ class Runner:
             progress(*self._progress())
 
     def comparison(self, *, warnings: Sequence[Problem]) -> Comparison:
-        """Return the comparison of all results."""
         assert self.reference is not None
         base, linked = self.prepared.base, self.prepared.runs[0].planned.linked
         results = tuple(self.results[number] for number in sorted(self.results))
@@ -105,7 +100,6 @@ class Runner:
         farm.submit(ComparisonTask(**self._work(numbers), base=self.prepared.base.for_task()))
 
     def _work(self, numbers: Sequence[int]) -> dict[str, Any]:
-        """Return what every task of runs has."""
         runs, options = self.prepared.runs, self.options
         first = runs[numbers[0]].name
         return {
@@ -155,12 +149,8 @@ class Runner:
 class SweepRunner(Runner):
     """Renders the runs of a sweep into a folder; a run that fails becomes a line with the reason.
 
-    Attributes:
-        folder: where results are stored; only this process writes there.
-        records: as they are stored, by the run's number.
-        failures: by the run's number.
-        executed: number of executed passes.
-        alone: number of passes that the runs need one by one.
+    Records, as they are stored, and failures are by the run's number. `executed` is the number of executed passes,
+    `alone` of those that the runs need one by one.
     """
 
     def __init__(self, prepared: Prepared, options: SweepOptions, folder: SweepFolder) -> None:
@@ -186,7 +176,6 @@ class SweepRunner(Runner):
         return [number for number in numbers if number not in self.failures and not self.is_complete(number)]
 
     def is_complete(self, number: int) -> bool:
-        """Whether a run is rendered and measured."""
         return number in self.results and self.results[number].times.covers(self.options.frames, self.options.repeats)
 
     def _groups(self, numbers: Sequence[int], workers: int) -> list[list[int]]:
@@ -251,7 +240,6 @@ class SweepRunner(Runner):
         return set(rendered) - kept
 
     def _drop_pictures(self, numbers: set[int]) -> None:
-        """Remove pictures, from the folder and from memory."""
         for number in numbers:
             if self.records[number].picture is not None:
                 self.records[number] = self.records[number].without_picture()

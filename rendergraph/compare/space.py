@@ -46,7 +46,6 @@ class Span:
     """A continuous range; both ends are included.
 
     Attributes:
-        low, high: the ends.
         log: equal factors are equally likely, rather than equal differences.
         whole: whole numbers only, as when both ends are written as such.
         text: as it was written.
@@ -82,9 +81,7 @@ class Axis:
     """One path, as `-s` takes it, and its values.
 
     Attributes:
-        path: the path.
         values: YAML texts; empty for a continuous range.
-        span: the continuous range.
         written: the text that was typed, where that is shorter than the values.
     """
 
@@ -178,7 +175,6 @@ class Space:
         return [{axis.path: axis.at(position) for axis in group} for position in positions]
 
     def count(self) -> int:
-        """Return the number of runs, duplicate samples included."""
         if self.chosen is not None:
             return len(self.chosen)
         if self.samples is not None:
@@ -388,11 +384,7 @@ def sample_positions(count: int, sampling: Sampling, seed: int, name: str) -> li
 
 
 def pipelines(base: Pipeline, runs: Sequence[Mapping[str, str]]) -> list[Pipeline]:
-    """Return the pipeline of every run, linked.
-
-    Raises:
-        InputError: an axis names nothing or a value does not fit; each mistake once, with the first run that shows it.
-    """
+    """Return the pipeline of every run, checked; each mistake is raised once, with the first run that shows it."""
     made: list[Pipeline] = []
     problems: dict[tuple[str, str], Problem] = {}
     shared = replace(base, catalog=base.resolve().catalog)

@@ -321,7 +321,6 @@ def _run_document(run: Run) -> dict[str, Any] | None:
 
 
 def restored_result(run: Run, record: RunRecord, encoding: Encoding) -> Result:
-    """Return a result that was stored."""
     from rendergraph.images import read  # a sweep is checked without OpenImageIO
 
     plugins = {name: _number(value) for name, value in record.plugin_metrics.items()}
@@ -349,11 +348,7 @@ def _number(value: float | None) -> float:
 
 @contextlib.contextmanager
 def locked(out: Path) -> Iterator[None]:
-    """Make the folder if it does not exist, and keep other sweeps out of it; the OS releases the lock on exit.
-
-    Raises:
-        InputError: it cannot be a folder, or another sweep is running in it.
-    """
+    """Make the folder if it does not exist, and keep other sweeps out of it; the OS releases the lock on exit."""
     import fcntl  # a sweep is read and checked on every system
 
     try:
@@ -372,11 +367,7 @@ def locked(out: Path) -> Iterator[None]:
 
 
 def check_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> None:
-    """Check that a sweep may write into a folder.
-
-    Raises:
-        InputError: it has results already, or those of another study.
-    """
+    """Raise an InputError if a folder has results already, or those of another study."""
     if ((out / RESULTS).exists() or (out / STUDY).exists()) and not resume:
         raise _refused(out, "it has results of a sweep; --resume adds what is missing, or use another folder")
     before = _read_study(out)
@@ -389,7 +380,6 @@ def check_folder(out: Path, study: Mapping[str, Any], *, resume: bool) -> None:
 
 
 def kept_runs(out: Path) -> int:
-    """Return the number of runs that a folder has, measured or not."""
     return sum(1 for _ in out.glob(f"*/{RUN}"))
 
 

@@ -79,11 +79,8 @@ class SweepFile(Struct, frozen=True, eq=False):
     """A sweep as its file has it.
 
     Attributes:
-        pipeline: a shipped name or a path, joined to the file's folder.
-        space: its axes, and how runs are made of them.
+        pipeline, reference, scene: shipped names, or paths joined to the file's folder.
         options: the attributes of `SweepOptions` that the file has.
-        reference, scene: shipped names or paths, as `pipeline`.
-        size: width and height.
         sets: `PATH=VALUE` texts.
         places: path to value of axes and of `set`, and the groups of `zip`.
     """
@@ -98,7 +95,6 @@ class SweepFile(Struct, frozen=True, eq=False):
     places: Mapping[str, Value]
 
     def placed(self, error: InputError) -> InputError:
-        """Relocate mistakes in what the file says about paths to its own lines."""
         return error.relocated(self._placed)
 
     def _placed(self, problem: Problem) -> Problem:
@@ -119,11 +115,6 @@ def is_sweep(path: Path) -> bool:
 
 
 def read_sweep(path: Path) -> SweepFile:
-    """Read a sweep's file.
-
-    Raises:
-        InputError: it is missing, not YAML, or has keys or values that a sweep cannot have; with all mistakes.
-    """
     validator = Validator(_CODES)
     root = validator.file(load(path).root, SWEEP, "`sweep: 1`, `pipeline` and `axes`")
     axes = [_axis(str(name), value, validator) for name, value in entries(root, "axes").items()] if root else []

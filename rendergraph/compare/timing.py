@@ -48,9 +48,7 @@ class Times(Struct, frozen=True):
     Attributes:
         frames: number of measured frames.
         frame_ms: from the first call until the device has finished; None where frames were shared with other pipelines.
-        gpu_ms: GPU time of all passes together.
-        cpu_ms: time of all passes together in Python and the driver.
-        passes: in order of execution.
+        gpu_ms, cpu_ms: time of all passes together, on the GPU, and in Python and the driver.
         repeats: the median of the headline time, in milliseconds, of each measurement; empty for a single one.
     """
 
@@ -83,11 +81,7 @@ NO_TIMES = Times(0, None, None, Spread(*[math.nan] * 5), ())
 def times_of(frames: Sequence[FrameTimes], types: Mapping[str, str], names: Mapping[str, str] | None = None) -> Times:
     """Return the times of one pipeline.
 
-    Args:
-        frames: the times of each frame.
-        types: node of the pipeline to the name of its type.
-        names: node of the pipeline to node of the rendered graph, where several pipelines were rendered as one graph;
-            two nodes may map to one.
+    If several pipelines were rendered as one graph, `names` maps its nodes to those of that graph; two may map to one.
     """
     order = {node: place for place, node in enumerate(dict.fromkeys(step.node for step in frames[0].steps))}
     rendered = names if names is not None else {node: node for node in order}

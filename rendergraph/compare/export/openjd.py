@@ -29,18 +29,9 @@ def template(
     chunk: int,
     most_tasks: int = MOST_TASKS,
 ) -> dict[str, Any]:
-    """Return the job's template.
+    """Return the job's template; its defaults are paths relative to `folder`, in which it will be written.
 
-    Args:
-        listing: the sweep, with the groups in which its runs are rendered.
-        sweep: its file.
-        folder: where the template will be written; files in it or below are defaults of the template.
-        frames: frames of each run to render in addition; None for none.
-        chunk: frames per task.
-        most_tasks: limit of the specification.
-
-    Raises:
-        InputError: there are more groups than a template may have tasks.
+    With `frames`, these frames of each run are rendered in addition, `chunk` frames per task.
     """
     groups = [numbers_text(number + 1 for number in group.numbers) for group in listing.groups]
     if len(groups) > most_tasks:
@@ -128,11 +119,7 @@ def numbers_text(numbers: Iterable[int]) -> str:
 
 
 def parse_numbers(text: str) -> tuple[int, ...]:
-    """Parse the text of `numbers_text`.
-
-    Raises:
-        ValueError: it is written in another way.
-    """
+    """Parse the text of `numbers_text`; a ValueError says what is wrong."""
     numbers: list[int] = []
     for part in text.split(","):
         match = _RANGE.match(part.strip())

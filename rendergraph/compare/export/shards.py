@@ -35,17 +35,8 @@ def measure(
     """Render and measure some runs of a sweep, while other workers may do others in the same folder.
 
     They stay in a private folder until they are complete, so that they can be started again at any time. Nothing is
-    added to `results.jsonl`, which has a single writer.
-
-    Args:
-        base, axes, out, reference, options, settings: as for `sweep`.
-        only: numbers of the runs, from 0.
-
-    Returns:
-        The results; None if all runs were complete already.
-
-    Raises:
-        InputError, RenderError, DeviceError: as from `sweep`.
+    added to `results.jsonl`, which has a single writer. The arguments are those of `sweep`, and the numbers of the
+    runs, from 0. Returns None if all runs were complete already.
     """
     options = options.replace(**settings, only=only)
     runs = prepare(base, axes, out, reference, options).runs
@@ -77,9 +68,6 @@ def render_frames(
     """Render frames of some runs into their folders, `frames/image.0001.png`, and yield each file's path.
 
     A frame does not depend on its chunk: where a pipeline has a history, the frames before are rendered first.
-
-    Raises:
-        InputError, RenderError: as from rendering.
     """
     from rendergraph.images import Saved, numbered, save_outputs  # exporting a job needs no OpenImageIO
     from rendergraph.session import RenderOptions, stages  # nor this

@@ -31,13 +31,10 @@ MOST_COLUMNS = 8
 
 
 def comparison_page(comparison: Comparison, command: str, *, title: str = "", note: str = "") -> str:
-    """Return the report of `compare`.
+    """Return the report of `compare`; `command` repeats it.
 
-    Args:
-        comparison: its results.
-        command: the command line that repeats it.
-        title: the names of the variants by default.
-        note: the author's text beneath the title; empty lines separate paragraphs.
+    The title is the names of the variants by default; the note is a text beneath it, whose empty lines separate
+    paragraphs.
     """
     names = [result.name for result in comparison.results]
     title = title or (f"{names[0]} against {', '.join(names[1:])}" if names[1:] else names[0])
