@@ -235,7 +235,9 @@ class NodeCheck:
         program = draw.program
         self.active |= {name.removeprefix(prefix(self.type.name)) for name in (*program.uniforms, *program.storage)}
         names = [read.name for read in step.reads] + [write.name for write in step.writes]
-        self.active |= {name for name in names if name in program.storage or f"{name}_view_block" in program.blocks}
+        self.active |= {
+            name for name in names if name in program.storage or f"{name}_view_block" in program.block_names
+        }
 
         colors = [write.name for write in step.writes if write.use == "color"]
         if step.node == self.type.name and colors and not outputs_of(program):

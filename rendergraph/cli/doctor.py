@@ -107,21 +107,7 @@ def _advice(found: dict[str, Any], devices: list[dict[str, Any]], packages: dict
     broken = [device for device in devices if not device["usable"] and not device.get("software")]
     if broken:
         advice.append("update the driver of the device that cannot be used: OpenGL 4.5 is needed")
-    if any(_overruns(device) for device in devices):
-        advice.append(
-            "unset GALLIUM_DRIVER, or use Mesa 23 or newer: zink over lavapipe of Mesa 22 crashes on some programs"
-        )
     return advice
-
-
-def _overruns(device: dict[str, Any]) -> bool:
-    """Whether the device is zink over Mesa 22's lavapipe.
-
-    It looks for uniforms to inline at every branch, and writes those of the block that it numbers 4 beyond the end of
-    its table, so the next draw reads through a wild pointer. The driver chooses which block gets that number.
-    """
-    version = re.search(r"Mesa (\d+)", device.get("version", ""))
-    return device.get("renderer", "").startswith("zink (llvmpipe") and version is not None and int(version[1]) <= 22
 
 
 def _text(report: dict[str, Any]) -> str:
@@ -139,6 +125,7 @@ def _text(report: dict[str, Any]) -> str:
         words = [f"OpenGL {device['gl']}", device["version"].split(" ", 1)[-1]]
         words += ["software: no measure of a GPU"] if device["software"] else []
         words += [f"lacks {', '.join(lacking)}"] if lacking else []
+        words += device.get("workarounds", [])
         words += [device[key] for key in ("render_node", "drm") if device.get(key)][:1]
         rows.append((device["number"], "yes", device["renderer"], ", ".join(words)))
     lines.append(table(rows, ("device", "usable", "renderer", "properties")) if rows else "no GL devices")

@@ -12,6 +12,8 @@ from typing import Any
 
 from rendergraph.gl.egl import devices
 
+_STORED_BLOCKS = "a crash of this driver is avoided: more than two uniform blocks a stage are storage blocks"
+
 
 def libraries() -> dict[str, str | None]:
     """Return shared libraries with the loader's error message, None where one loads."""
@@ -43,6 +45,7 @@ def context(index: int) -> dict[str, Any]:
                 "memory objects": "GL_EXT_memory_object" in extensions,
             },
             "limits": dict(device.limits),
+            "workarounds": [_STORED_BLOCKS] if device.stores_blocks else [],
         }
     finally:
         device.release()

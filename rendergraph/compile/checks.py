@@ -101,7 +101,7 @@ def _blocks(step: Step, program: Program, given: Collection[str], texts: Texts) 
     files = ", ".join(file for _, file in step.shaders)
     uses: tuple[Read | Write, ...] = (*step.all_reads, *step.writes)
     own = ", ".join(sorted({use.name for use in uses if use.use == "buffer"})) or "none"
-    for name in (*program.storage, *program.blocks):
+    for name in program.block_names:
         if name not in given:
             text = f"{files} looks at block '{name}', but the step has no buffer of that name; it has {own}"
             yield _placed(step.problem("RG430", text), name, texts)

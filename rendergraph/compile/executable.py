@@ -288,7 +288,7 @@ class Executable(Struct, eq=False, dict=True):
     @cached_property
     def reads_frame(self) -> bool:
         draws = (draw for step in self.steps[0] for draw in step.all_draws)
-        return any("frame_block" in draw.program.blocks for draw in draws)
+        return any("frame_block" in draw.program.block_names for draw in draws)
 
     def assemble(self) -> None:
         """Make the flat lists of calls from the steps' draws, leaving out what changes nothing."""

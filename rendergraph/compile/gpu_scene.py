@@ -123,7 +123,7 @@ class GpuScene(Struct, eq=False, dict=True):
             if storage:
                 buffer.bind_to_storage_buffer(FIXED_BLOCKS[name])
             else:
-                buffer.bind_to_uniform_block(FIXED_BLOCKS[name])
+                self.device.bind_block(buffer, FIXED_BLOCKS[name])
 
     def update(self, scene: Scene) -> None:
         """Take over an animated scene's lights and transforms; the meshes stay."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
 from msgspec import Struct, field
@@ -12,8 +12,8 @@ from msgspec import Struct, field
 from rendergraph.errors import InputError
 from rendergraph.gl import programs
 from rendergraph.gl.device import Device
-from rendergraph.gl.programs import Program
-from rendergraph.program import StageText
+from rendergraph.gl.programs import UNIFORM_BLOCK, Program
+from rendergraph.program import StageText, used_blocks
 from rendergraph.resources import folder
 
 
@@ -48,8 +48,9 @@ class ProgramCache(Struct, eq=False):
                 from rendergraph.glsl.expansion import check_expansion  # our own need no looking into
 
                 check_expansion(text.source)
+        stored = _beyond_limit(sources.values()) if self.device.stores_blocks else ()
         try:
-            program = programs.link(self.device, sources, outputs)
+            program = programs.link(self.device, sources, outputs, stored)
         except programs.ProgramError as error:
             from rendergraph.program.messages import compile_problems, link_problems  # where a driver refuses alone
 
@@ -97,6 +98,19 @@ class ProgramCache(Struct, eq=False):
             program.release()
         self._vertex_arrays.clear()
         self._programs.clear()
+
+
+def _beyond_limit(texts: Iterable[str]) -> set[str]:
+    """Return the blocks that become storage blocks so that no stage declares more than two uniform blocks.
+
+    Views are the last to go: pixels outside a triangle, whose values derivatives need, get nothing from storage.
+    """
+    stored: set[str] = set()
+    for text in texts:
+        used = used_blocks(text)
+        names = set(UNIFORM_BLOCK.findall(text))
+        stored |= set(sorted(names, key=lambda name: (name not in used, not name.endswith("_view_block"), name))[2:])
+    return stored
 
 
 def _return_free_memory() -> None:

@@ -267,7 +267,7 @@ class _Compiler(Struct, eq=False, dict=True):
             blocks["pass_view_block"] = self.views.binding(step.view)
             before_views["previous_pass_view_block"] = step.view
         reads = named(step)
-        storage = len(FIXED_BLOCKS)  # lights and materials may be storage blocks too
+        storage = self.views.first_storage_binding
         buffers: list[Call] = []
         touched: list[tuple[str, Read | Write]] = [*reads, *(("", write) for write in step.writes)]
         for before, use in touched:
@@ -288,7 +288,7 @@ class _Compiler(Struct, eq=False, dict=True):
         macros = {**self.scene.light_defines, **self._sample_positions(step), **defines}
         texts = self._texts(step, macros)
         program = self.programs.get(texts(), blocks, outputs)
-        for name in before_views.keys() & program.blocks.keys():
+        for name in before_views.keys() & program.block_names:
             self.views.look_back(before_views[name])
         binds: list[Call] = buffers
         uniforms = step_uniforms(step)

@@ -58,6 +58,11 @@ class ViewBuffers(Struct, eq=False, dict=True):
         """The binding point of the views that a table had in the frame before."""
         return len(FIXED_BLOCKS) + len(self.tables) + [CAMERA, *self.tables].index(table)
 
+    @property
+    def first_storage_binding(self) -> int:
+        """The first binding point of the steps' own buffers: lights and materials may be storage blocks too."""
+        return len(FIXED_BLOCKS) + (2 * len(self.tables) + 1 if self.device.stores_blocks else 0)
+
     def look_back(self, table: str) -> None:
         """Keep from now on what a table's views were in the frame before: a program looks at them."""
         if table not in self._buffers or table in self._before:
@@ -110,11 +115,11 @@ class ViewBuffers(Struct, eq=False, dict=True):
 
     def bind(self) -> None:
         """Bind every block to its point; once a frame."""
-        self._frame.bind_to_uniform_block(FIXED_BLOCKS["frame_block"])
+        self.device.bind_block(self._frame, FIXED_BLOCKS["frame_block"])
         for name, buffer in self._buffers.items():
-            buffer.bind_to_uniform_block(self.binding(name))
+            self.device.bind_block(buffer, self.binding(name))
         for name, buffer in self._before.items():
-            buffer.bind_to_uniform_block(self.previous_binding(name))
+            self.device.bind_block(buffer, self.previous_binding(name))
 
     def release(self) -> None:
         for buffer in (*self._buffers.values(), *self._before.values(), self._frame):

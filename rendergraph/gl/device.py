@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache, cached_property
@@ -96,6 +97,23 @@ class Device(Struct, eq=False, dict=True):
     def software(self) -> bool:
         """Whether it is a rasteriser on the CPU, whose times do not transfer to GPUs."""
         return any(name in self.renderer.lower() for name in SOFTWARE_RENDERERS)
+
+    @cached_property
+    def stores_blocks(self) -> bool:
+        """Whether a stage may use few uniform blocks, as on zink over the lavapipe of Mesa 22 and older.
+
+        To compile branches on uniforms away, that driver notes their offsets in a table with 4 places a block, but
+        counts 32 a block. It numbers push constants 0 and uniforms without a block 1; the notes on block 4 end up
+        beyond the table, and the next draw crashes.
+        """
+        version = re.search(r"Mesa (\d+)", str(self.ctx.info["GL_VERSION"]))
+        return self.renderer.startswith("zink (llvmpipe") and version is not None and int(version[1]) <= 22
+
+    def bind_block(self, buffer: moderngl.Buffer, point: int) -> None:
+        """Bind a buffer to the point of a uniform block."""
+        buffer.bind_to_uniform_block(point)
+        if self.stores_blocks:
+            buffer.bind_to_storage_buffer(point)
 
     @cached_property
     def has_depth_bounds(self) -> bool:

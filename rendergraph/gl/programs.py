@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +42,7 @@ _SAMPLERS = {
     0x910B: "sampler2DMSArray", 0x910C: "isampler2DMSArray", 0x910D: "usampler2DMSArray",
 }  # fmt: skip
 
+UNIFORM_BLOCK = re.compile(r"\blayout\(std140\) uniform (\w+)")
 ProgramError = moderngl.Error
 
 
@@ -98,6 +99,10 @@ class Program(Struct, eq=False):
         return int(self.object.glo)
 
     @property
+    def block_names(self) -> list[str]:
+        return [*self.storage, *self.blocks]
+
+    @property
     def local_size(self) -> tuple[int, int, int]:
         values = (ctypes.c_int * 3)()
         self.device.raw.glGetProgramiv(self.glo, 0x8267, ctypes.byref(values))
@@ -135,21 +140,26 @@ class Program(Struct, eq=False):
         self.object.release()
 
 
-def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) -> Program:
+def link(
+    device: Device, texts: Mapping[str, str], outputs: Sequence[str] = (), stored: Collection[str] = ()
+) -> Program:
     """Compile and link the stages; fragment outputs go to the locations of their order in `outputs`.
+
+    Uniform blocks named in `stored` become storage blocks.
 
     Raises:
         ProgramError: the driver's message, as moderngl wraps it.
     """
     before = device.raw.glCreateProgram()
+    final = {stage: _in_storage(text, stored) for stage, text in texts.items()} if stored else texts
     try:
-        if "compute" in texts:
-            made: Any = device.ctx.compute_shader(texts["compute"])
+        if "compute" in final:
+            made: Any = device.ctx.compute_shader(final["compute"])
         else:
             made = device.ctx.program(
-                vertex_shader=texts["vertex"],
-                geometry_shader=texts.get("geometry"),
-                fragment_shader=texts.get("fragment"),
+                vertex_shader=final["vertex"],
+                geometry_shader=final.get("geometry"),
+                fragment_shader=final.get("fragment"),
                 fragment_outputs={name: number for number, name in enumerate(outputs)},
             )
     except ProgramError:
@@ -161,6 +171,11 @@ def link(device: Device, texts: Mapping[str, str], outputs: Sequence[str] = ()) 
     program = Program(device, made, texts)
     _inspect(program)
     return program
+
+
+def _in_storage(text: str, blocks: Collection[str]) -> str:
+    """Return a text with some of its uniform blocks as storage blocks, whose members lie where they did."""
+    return UNIFORM_BLOCK.sub(lambda m: f"layout(std430) readonly buffer {m[1]}" if m[1] in blocks else m[0], text)
 
 
 def _delete_leftovers(raw: RawGL, before: int) -> None:

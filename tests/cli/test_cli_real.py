@@ -372,24 +372,13 @@ def test_doctor_survives_a_broken_driver(
     assert problem in cli("doctor").out
 
 
-@pytest.mark.parametrize(
-    ("renderer", "version", "said"),
-    [
-        ("zink (llvmpipe (LLVM 15.0.6, 256 bits))", "4.6 (Core Profile) Mesa 22.3.6", True),
-        ("zink (llvmpipe (LLVM 19.1.0, 256 bits))", "4.6 (Core Profile) Mesa 25.0.1", False),
-        ("llvmpipe (LLVM 15.0.6, 256 bits)", "4.5 (Core Profile) Mesa 22.3.6", False),
-    ],
-)
-def test_doctor_knows_a_driver_that_crashes(
-    cli: Any, monkeypatch: pytest.MonkeyPatch, renderer: str, version: str, said: bool
-) -> None:
+def test_doctor_names_the_workarounds_for_a_driver(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from rendergraph.cli import doctor
 
-    device = {"number": 0, "renderer": renderer, "version": version, "gl": "4.5", "software": True, "features": {}}
+    device = {"number": 0, "renderer": "zink", "version": "4.6 Mesa", "gl": "4.6", "software": True, "features": {}}
+    device["workarounds"] = ["a crash of this driver is avoided"]
     monkeypatch.setattr(doctor, "_probe", lambda *number: device if number else {"devices": [{"number": 0}]})
-    report = cli("doctor", "--json").json
-    assert report["ok"]
-    assert any("lavapipe of Mesa 22 crashes on some programs" in line for line in report["install"]) == said
+    assert "software: no measure of a GPU, a crash of this driver is avoided" in cli("doctor").out
 
 
 def test_doctor_says_what_to_install(cli: Any, monkeypatch: pytest.MonkeyPatch) -> None:
